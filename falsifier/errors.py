@@ -1,0 +1,94 @@
+"""The one tree of errors.
+
+A message names the thing that is wrong, what was expected and what to do. ``exit_code`` is what the
+command line ends with: 2 for wrong usage or a wrong file, 3 when a simulator, a language model or the
+machine failed.
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class FalsifierError(Exception):
+    """Base of all errors that this package raises on purpose."""
+
+    exit_code = 2
+
+
+class SpecError(FalsifierError):
+    """A spec file or an option is wrong; the message starts with ``file: key:`` where there is one."""
+
+    def __init__(self, message: str, *, file: str | None = None, key: str | None = None) -> None:
+        self.file = file
+        self.key = key
+        super().__init__(": ".join(part for part in (file, key, message) if part))
+
+
+class FormulaError(FalsifierError):
+    """A requirement's text is not exactly one STL formula, or cannot be judged on the given signals."""
+
+
+class CandidateError(FalsifierError):
+    """A candidate does not fit its search space: unknown name, wrong length, value outside its range."""
+
+
+class ModelError(FalsifierError):
+    """A model cannot be used at all: unreadable FMU, no binary for this platform, ..."""
+
+    exit_code = 3
+
+
+class SimulationError(FalsifierError):
+    """One simulation gave no full trajectory.
+
+    Attributes:
+        status: ``failed`` (the model said so, or gave NaN or inf), ``crashed``, ``timeout``.
+        time: simulated time in s that was reached, where known.
+        log: messages of the model during this simulation.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self, message: str, *, status: str = "failed", time: float | None = None, log: tuple[str, ...] = ()
+    ) -> None:
+        self.status = status
+        self.time = time
+        self.log = log
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Keep the keyword arguments when the error travels between processes."""
+        return _simulation_error, (str(self), self.status, self.time, self.log)
+
+
+class MonitorError(FalsifierError):
+    """A trajectory cannot be judged: NaN, unequal lengths, missing signal, too short for the formula."""
+
+    exit_code = 3
+
+
+class ChatError(FalsifierError):
+    """The language model could not be reached, or gave no usable reply."""
+
+    exit_code = 3
+
+
+class JournalError(FalsifierError):
+    """A run directory cannot be read, belongs to another problem or is in use."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """End of an error message that lists the known names, the nearest one first.
+
+    >>> did_you_mean("sped", ["rpm", "speed"])
+    "did you mean 'speed'? Known: rpm, speed"
+    """
+    names = list(known)
+    listing = "Known: " + (", ".join(names[:30]) + (", ..." if len(names) > 30 else "") if names else "none")
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    return f"did you mean {near[0]!r}? {listing}" if near else listing
+
+
+def _simulation_error(message: str, status: str, time: float | None, log: tuple[str, ...]) -> SimulationError:
+    return SimulationError(message, status=status, time=time, log=log)

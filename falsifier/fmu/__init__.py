@@ -1,0 +1,1 @@
+"""FMUs: what they say of themselves, how they are stepped, and the process they run in."""

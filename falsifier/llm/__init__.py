@@ -1,0 +1,1 @@
+"""Language models: typed prompts, typed replies, and one narrow door to every provider."""

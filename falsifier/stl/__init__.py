@@ -1,0 +1,1 @@
+"""Signal Temporal Logic: formulas, robustness, and what decided it."""

@@ -1,0 +1,26 @@
+"""Verdicts: what the monitor says of one trajectory."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Robustness of a requirement on one trajectory and what decided it.
+
+    Attributes:
+        robustness: signed margin at time 0; < 0 is a violation, exactly 0 is not.
+        critical_time: time in s that decided the value.
+        predicate: text of the deciding predicate.
+        values: signal values at the critical time, by name.
+    """
+
+    robustness: float
+    critical_time: float
+    predicate: str
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def violated(self) -> bool:
+        """Whether the requirement is violated."""
+        return self.robustness < 0
