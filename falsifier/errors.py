@@ -7,6 +7,9 @@ machine failed.
 
 import difflib
 from collections.abc import Iterable
+from typing import Literal
+
+FailureStatus = Literal["failed", "crashed", "timeout"]
 
 
 class FalsifierError(Exception):
@@ -50,9 +53,14 @@ class SimulationError(FalsifierError):
     exit_code = 3
 
     def __init__(
-        self, message: str, *, status: str = "failed", time: float | None = None, log: tuple[str, ...] = ()
+        self,
+        message: str,
+        *,
+        status: FailureStatus = "failed",
+        time: float | None = None,
+        log: tuple[str, ...] = (),
     ) -> None:
-        self.status = status
+        self.status: FailureStatus = status
         self.time = time
         self.log = log
         super().__init__(message)
@@ -90,5 +98,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}? {listing}" if near else listing
 
 
-def _simulation_error(message: str, status: str, time: float | None, log: tuple[str, ...]) -> SimulationError:
+def _simulation_error(
+    message: str, status: FailureStatus, time: float | None, log: tuple[str, ...]
+) -> SimulationError:
     return SimulationError(message, status=status, time=time, log=log)

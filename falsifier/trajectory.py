@@ -69,13 +69,13 @@ class Trajectory:
         return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})})
 
     def save(self, path: Path) -> None:
-        """Write the trajectory as a compressed numpy archive."""
+        """Write the trajectory as a numpy archive."""
         names = np.array(self.names)
         units = np.array([self.units.get(n, "") for n in self.names])
         stacked = (
             np.stack([self.columns[n] for n in self.names]) if self.columns else np.empty((0, len(self)))
         )
-        np.savez_compressed(path, times=self.times, names=names, units=units, columns=stacked)
+        np.savez(path, times=self.times, names=names, units=units, columns=stacked)
 
     @classmethod
     def load(cls, path: Path) -> "Trajectory":

@@ -1,0 +1,77 @@
+"""The command line. Commands live in their own modules and are imported when they are used."""
+
+import sys
+import traceback
+from importlib import import_module
+
+import click
+
+from falsifier import __version__
+from falsifier.errors import FalsifierError
+
+# name: (module, what --help says)
+_COMMANDS = {
+    "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
+    "resume": ("falsifier.cli.run", "Continue an interrupted run."),
+    "info": ("falsifier.cli.inspect", "Show what an FMU says of itself."),
+    "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
+    "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
+    "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files."),
+    "prompt": ("falsifier.cli.model", "Print what would be sent to a language model; send nothing."),
+}
+
+
+class _LazyGroup(click.Group):
+    """Lists commands from the table and imports a command's module only when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(_COMMANDS[cmd_name][0]), cmd_name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in _COMMANDS.items()])
+
+
+@click.command(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="falsifier")
+def cli() -> None:
+    r"""Find inputs that make an FMU violate a requirement.
+
+    \b
+    falsifier run AT1                                      a bundled problem
+    falsifier run my.toml:REQ --budget 300                 one of your own
+    falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --input u=-1:1:5
+
+    Exit code 0: nothing falsified, 1: falsified, 2: wrong usage or spec, 3: simulator, language model or
+    machine failed, 130: interrupted.
+    """
+
+
+def main() -> None:
+    """Entry point: every error ends with its exit code, and never with the code of a falsification."""
+    try:
+        sys.exit(cli.main(standalone_mode=False))
+    except click.exceptions.Exit as end:
+        sys.exit(end.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        sys.exit(130)
+    except FalsifierError as error:
+        click.echo(f"falsifier: {error}", err=True)
+        sys.exit(error.exit_code)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(3)
+    except Exception:
+        traceback.print_exc()
+        click.echo("falsifier: this is a defect of falsifier itself; please report the lines above", err=True)
+        sys.exit(3)

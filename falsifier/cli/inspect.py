@@ -1,0 +1,147 @@
+"""``falsifier info``, ``init``, ``check`` and ``schema``: everything that does not search."""
+
+import json
+from dataclasses import asdict
+from os.path import relpath
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from falsifier.adhoc import starter_spec
+from falsifier.cli.options import json_option
+from falsifier.errors import SpecError
+from falsifier.model import ModelInfo, Variable
+from falsifier.problem import Problem, bundled, load_problems
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+# Rows of a table of parameters or states; models have thousands of them.
+_SHOWN_VARIABLES = 60
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option("--all", "everything", is_flag=True, help="Show all variables, internal ones too.")
+@json_option
+def info(*, fmu: Path, everything: bool, as_json: bool) -> None:
+    """Show what an FMU says of itself: interfaces, inputs, outputs, parameters with units and ranges."""
+    from falsifier.fmu import read_info
+
+    found = read_info(_existing_fmu(fmu))
+    if as_json:
+        click.echo(json.dumps(asdict(found), indent=2))
+        return
+    _print_info(found, everything=everything)
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Spec file; default: beside the FMU.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def init(*, fmu: Path, out: Path | None, force: bool) -> None:
+    """Write a starter spec for an FMU; it loads as it is."""
+    from falsifier.fmu import read_info
+
+    found = read_info(_existing_fmu(fmu))
+    path = out or fmu.with_suffix(".toml")
+    if path.exists() and not force:
+        raise SpecError(f"{path} exists already: give another --out, or --force to replace it")
+    path.write_text(starter_spec(_relative(fmu, path), found), encoding="utf-8")
+    load_problems(str(path))
+    click.echo(f"{path} written. Put in the real ranges and the requirement, then: falsifier run {path}")
+
+
+@click.command()
+@click.argument("target")
+@click.option("--profile", help="Another parameterization that the spec offers.")
+def check(*, target: str, profile: str | None) -> None:
+    """Check a spec file: its keys, its signals, its ranges and its formulas; nothing is simulated."""
+    for problem in load_problems(target, profile=profile):
+        click.echo(_problem_line(problem))
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON Schema of spec files, for editors."""
+    from falsifier.spec import Spec
+
+    click.echo(json.dumps(Spec.model_json_schema(), indent=2))
+
+
+def _existing_fmu(fmu: Path) -> Path:
+    if fmu.is_file():
+        return fmu
+    inside = bundled("fmus") / f"{fmu.name.removesuffix('.fmu')}.fmu"
+    if fmu.parent == Path() and inside.is_file():
+        return inside
+    raise SpecError(f"there is no file {fmu}")
+
+
+def _relative(fmu: Path, spec: Path) -> Path:
+    """Path of the FMU as seen from the spec's folder (Path.relative_to cannot walk up before Python 3.12)."""
+    return Path(relpath(fmu.resolve(), spec.resolve().parent))
+
+
+def _problem_line(problem: Problem) -> str:
+    space = problem.space
+    searched = [
+        f"{r.name} [{r.low:g}, {r.high:g}] {r.control_points} {r.interpolation} points" for r in space.inputs
+    ]
+    searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
+    return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
+
+
+def _print_info(found: ModelInfo, *, everything: bool) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    console.print(f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces)}")
+    if found.description:
+        console.print(found.description, markup=False)
+    console.print(
+        f"platforms: {', '.join(found.platforms) or 'none'}; made by {found.tool or 'unknown'}", markup=False
+    )
+    experiment = (
+        f"{label} {value:g}{unit}"
+        for label, value, unit in (
+            ("stop time", found.stop_time, " s"),
+            ("step", found.step_size, " s"),
+            ("tolerance", found.tolerance, ""),
+        )
+        if value is not None
+    )
+    console.print(f"default experiment: {', '.join(experiment) or 'none'}", markup=False)
+    groups = {
+        "inputs": found.inputs,
+        "outputs": found.outputs,
+        "parameters": found.parameters,
+        "states": tuple(v for v in found.variables if v.is_state),
+    }
+    if everything:
+        shown = {v.name for group in groups.values() for v in group}
+        groups["other variables"] = tuple(v for v in found.variables if v.name not in shown)
+    for title, variables in groups.items():
+        if variables:
+            limit = len(variables) if everything else _SHOWN_VARIABLES
+            console.print(_table(title, variables[:limit]))
+            if len(variables) > limit:
+                console.print(f"... and {len(variables) - limit} more {title}: --all shows them")
+
+
+def _table(title: str, variables: tuple[Variable, ...]) -> "Table":
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for column in ("name", "type", "unit", "min", "max", "start", "description"):
+        table.add_column(column, justify="right" if column in ("min", "max", "start") else "left")
+    for v in variables:
+        unit = f"{v.unit} (shown in {v.display_unit})" if v.display_unit else v.unit
+        cells = (v.name, v.kind, unit, _cell(v.low), _cell(v.high), _cell(v.start), v.description)
+        table.add_row(*(cell.replace("[", "\\[") for cell in cells))
+    return table
+
+
+def _cell(value: float | str | None) -> str:
+    return "" if value is None else f"{value:g}" if isinstance(value, int | float) else value

@@ -1,0 +1,98 @@
+"""``falsifier run`` and ``falsifier resume``."""
+
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import click
+
+from falsifier.budget import Budget
+from falsifier.cli.options import json_option, out_option, problem_options, problem_request
+from falsifier.display import make_display, result_json, result_text
+from falsifier.engine import Result
+from falsifier.export import write_counterexample
+from falsifier.request import ModelRequest, RunRequest, execute, resume_run
+
+_EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 130}
+
+
+@click.command()
+@problem_options
+@click.option("--engine", metavar="NAME", help="Search engine; see the README for the list.")
+@click.option(
+    "--model", metavar="NAME", help="Language model, e.g. openai/gpt-5-mini, ollama_chat/gpt-oss:20b."
+)
+@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
+@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
+@click.option("--variant", metavar="MP1..", help="Prompt variant.")
+@click.option("--budget", type=int, default=100, show_default=True, help="Most simulations.")
+@click.option("--seconds", type=float, help="Most wall-clock seconds.")
+@click.option("--max-tokens", type=int, help="Most tokens of the language model.")
+@click.option("--max-cost", type=float, help="Most US dollars for the language model.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the engine.")
+@click.option("--jobs", type=int, default=1, show_default=True, help="Simulations at a time.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+@out_option
+@json_option
+def run(
+    *,
+    engine: str | None,
+    model: str | None,
+    budget: int,
+    seconds: float | None,
+    max_tokens: int | None,
+    max_cost: float | None,
+    seed: int,
+    jobs: int,
+    quiet: bool,
+    out: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Search for inputs that violate a requirement.
+
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl.
+    """
+    language = {name: options.pop(name) for name in ("effort", "api_base", "variant")}
+    if model is None and any(value is not None for value in language.values()):
+        raise click.UsageError("--effort, --api-base and --variant need --model NAME")
+    request = RunRequest(
+        problem=problem_request(options),
+        engine=engine,
+        model=None if model is None else ModelRequest(name=model, **language),
+        seed=seed,
+        budget=Budget(budget, seconds, max_tokens, max_cost),
+        jobs=jobs,
+    )
+    directory = out or _new_directory(request.problem.target)
+    with make_display(quiet=quiet) as display:
+        result = execute(request, directory, listeners=[display])
+    _finish(result, as_json=as_json)
+
+
+@click.command()
+@click.argument("directory", type=click.Path(path_type=Path))
+@click.option("--quiet", is_flag=True, help="No progress.")
+@json_option
+def resume(*, directory: Path, quiet: bool, as_json: bool) -> None:
+    """Continue the run in DIRECTORY; nothing that it holds is simulated or asked again."""
+    with make_display(quiet=quiet) as display:
+        result = resume_run(directory, listeners=[display])
+    _finish(result, as_json=as_json)
+
+
+def _finish(result: Result, *, as_json: bool) -> None:
+    if result.counterexample is not None and result.directory is not None:
+        write_counterexample(result.problem, result.counterexample, result.directory)
+    click.echo(result_json(result) if as_json else result_text(result))
+    sys.exit(_EXIT_CODES[result.status])
+
+
+def _new_directory(target: str) -> Path:
+    name = Path(target.rpartition(":")[2] or target).stem
+    stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
+    base = Path("runs") / f"{name}-{stamp}"
+    return next(
+        p for p in (base, *(base.with_name(f"{base.name}-{i}") for i in range(2, 1000))) if not p.exists()
+    )

@@ -1,0 +1,211 @@
+"""What people see of a run: progress on stderr, the result as text or JSON."""
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from falsifier.budget import Spent
+from falsifier.engine import Result
+from falsifier.evaluation import Evaluation
+from falsifier.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunStarted
+from falsifier.signals import Signal
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+# Control points printed in full; longer signals are cut in the middle.
+_SHOWN_POINTS = 12
+
+
+@contextmanager
+def make_display(*, quiet: bool = False) -> Iterator[Listener]:
+    """Listener that shows progress on stderr: a live line on a terminal, plain lines elsewhere."""
+    if quiet:
+        yield lambda event: None
+        return
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield PlainDisplay(console)
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("starting", total=None, note="")
+
+        def show(event: Event) -> None:
+            match event:
+                case RunStarted():
+                    total = event.budget.simulations
+                    progress.update(task, description=f"{event.problem.name} {event.proposer}", total=total)
+                case Evaluated():
+                    progress.update(task, completed=event.spent.simulations, note=_note(event))
+                case Exchanged():
+                    progress.update(task, note=f"model answered, {event.spent.tokens} tokens so far")
+                case Confirmed():
+                    c = event.confirmation
+                    progress.console.print(
+                        f"violation {c.outcome}: {c.reason}", highlight=False, markup=False
+                    )
+                case _:
+                    pass
+
+        yield show
+
+
+class PlainDisplay:
+    """One line at the start, at each improvement, at each failure and at each confirmation."""
+
+    def __init__(self, console: "Console") -> None:
+        self._console = console
+
+    def __call__(self, event: Event) -> None:
+        """Print what is worth a line."""
+        match event:
+            case RunStarted():
+                replayed = f", {event.replayed} evaluations from the journal" if event.replayed else ""
+                self._line(f"{event.problem.name}: {event.problem.requirement.formula}")
+                self._line(f"engine {event.proposer}{replayed}")
+            case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
+                self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
+            case Evaluated(evaluation=evaluation, best=best) if (
+                best is not None and best.candidate is evaluation.candidate
+            ):
+                self._line(f"simulation {event.index + 1}: {_note(event)}")
+            case Confirmed():
+                self._line(f"violation {event.confirmation.outcome}: {event.confirmation.reason}")
+            case _:
+                pass
+
+    def _line(self, text: str) -> None:
+        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+def result_text(result: Result) -> str:
+    """Result for people."""
+    name, count = result.problem.name, result.spent.simulations
+    simulations = f"{count} simulation{'' if count == 1 else 's'}"
+    lines = [f"{name}: {result.status} after {simulations} ({_seconds(result.spent)})"]
+    shown = result.counterexample.evaluation if result.counterexample else result.best
+    if result.counterexample is not None:
+        lines.append(f"  confirmed      {result.counterexample.reason}")
+    else:
+        lines.append(f"  reason         {result.reason}")
+    lines.append(f"  requirement    {result.problem.requirement.formula}")
+    if shown is not None:
+        lines += _evaluation_lines(result, shown)
+    lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
+    if result.spent.calls:
+        lines.append(f"  language model {_model_use(result.spent)}")
+    if result.directory is not None:
+        lines.append(f"  files          {result.directory}")
+        if result.counterexample is not None:
+            lines.append(f"  picture        {result.directory / 'counterexample.png'}")
+    return "\n".join(lines)
+
+
+def result_json(result: Result) -> str:
+    """Result for machines: one JSON object."""
+    spent: dict[str, Any] = {field: getattr(result.spent, field) for field in Spent.__dataclass_fields__}
+    return json.dumps(
+        {
+            "requirement": result.problem.name,
+            "formula": str(result.problem.requirement.formula),
+            "status": result.status,
+            "reason": result.reason,
+            "counterexample": result.counterexample and _evaluation_json(result.counterexample.evaluation),
+            "best": result.best and _evaluation_json(result.best),
+            "not_confirmed": [c.reason for c in result.refuted],
+            "spent": spent,
+            "directory": result.directory and str(result.directory),
+        },
+        indent=2,
+    )
+
+
+def signal_text(signal: Signal) -> str:
+    """Control points of a signal in one line."""
+    if len(set(signal.values)) == 1:
+        return f"constant {signal.values[0]:g}"
+    points = [f"{v:g} at {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
+    if len(points) > _SHOWN_POINTS:
+        half = _SHOWN_POINTS // 2
+        points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
+    return f"{signal.interpolation}: {', '.join(points)}"
+
+
+def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
+    verdict = evaluation.verdict
+    lines = []
+    if verdict is not None:
+        info = result.problem.info
+        values = ", ".join(
+            f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
+            for name, value in verdict.values.items()
+        )
+        lines.append(f"  robustness     {verdict.robustness:+.6g}")
+        lines.append(f"  critical time  {verdict.critical_time:.6g} s, at {verdict.predicate}")
+        lines.append(f"  values there   {values}")
+    space = result.problem.space
+    units = {r.name: r.unit for r in space.inputs} | {p.name: p.unit for p in space.parameters}
+    for name, signal in evaluation.candidate.signals.items():
+        lines.append(f"  input          {name}{_bracketed(units[name])} {signal_text(signal)}")
+    for name, value in evaluation.candidate.parameters.items():
+        lines.append(f"  parameter      {name}{_bracketed(units[name])} = {value:.10g}")
+    if evaluation.candidate.rationale:
+        lines.append(f"  rationale      {evaluation.candidate.rationale}")
+    return lines
+
+
+def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
+    verdict = evaluation.verdict
+    return {
+        **evaluation.candidate.to_json(),
+        "robustness": evaluation.robustness,
+        "critical_time": verdict and verdict.critical_time,
+        "predicate": verdict and verdict.predicate,
+        "values": dict(verdict.values) if verdict else None,
+    }
+
+
+def _note(event: Evaluated) -> str:
+    best = event.best
+    if best is None or best.verdict is None:
+        return "no successful simulation yet"
+    return f"best robustness {best.verdict.robustness:+.5g} at t = {best.verdict.critical_time:.5g} s"
+
+
+def _model_use(spent: Spent) -> str:
+    cost = "price unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
+    reasoning = f" ({spent.reasoning_tokens} of them reasoning)" if spent.reasoning_tokens else ""
+    return f"{spent.calls} calls, {spent.tokens} tokens{reasoning}, {cost}"
+
+
+def _seconds(spent: Spent) -> str:
+    return (
+        f"{spent.seconds:.1f} s; simulator {spent.simulation_seconds:.2f} s, "
+        f"engine {spent.proposal_seconds:.2f} s"
+    )
+
+
+def _unit(unit: str) -> str:
+    return f" {unit}" if unit else ""
+
+
+def _bracketed(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def warn(text: str) -> None:
+    """Print a message for people on stderr."""
+    print(text, file=sys.stderr)

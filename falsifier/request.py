@@ -1,0 +1,199 @@
+"""What a user asked for, as one value: enough to run it, to record it and to run it again."""
+
+import platform
+import sys
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from datetime import UTC, datetime
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from falsifier import __version__
+from falsifier.adhoc import adhoc_problem, changes_from_options
+from falsifier.budget import Budget
+from falsifier.engine import ProposerBuilder, Result, search
+from falsifier.errors import JournalError, SpecError
+from falsifier.events import Listener
+from falsifier.execution import local_executor
+from falsifier.journal import (
+    Journal,
+    Record,
+    open_journal,
+    read_journal,
+    read_manifest,
+    write_manifest,
+)
+from falsifier.model import Interface
+from falsifier.problem import Problem, load_problem
+
+_RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ProblemRequest(_Strict):
+    """Which problem: a spec's requirement, or an FMU with a formula, and changes to either."""
+
+    target: str
+    stl: str | None = None
+    profile: str | None = None
+    parameterization: Literal["free", "fixed"] = "free"
+    interface: Interface | None = None
+    inputs: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    stop_time: float | None = None
+    output_interval: float | None = None
+
+    def load(self) -> Problem:
+        """Return the problem.
+
+        Raises:
+            SpecError: naming what is wrong and the cure.
+            ModelError: when the FMU cannot be used.
+        """
+        changes = changes_from_options(
+            inputs=self.inputs,
+            parameters=self.parameters,
+            stop_time=self.stop_time,
+            output_interval=self.output_interval,
+            interface=self.interface,
+        )
+        if self.target.endswith(".fmu"):
+            if self.stl is None:
+                raise SpecError(f"{self.target}: give the requirement with --stl 'G[0,10] (SIGNAL <= 1)'")
+            problem = adhoc_problem(Path(self.target), self.stl, changes=changes)
+        else:
+            problem = load_problem(
+                self.target,
+                profile=self.profile,
+                stl=self.stl,
+                changes=changes,
+            )
+        return problem if self.parameterization == "free" else fixed_parameterization(problem)
+
+
+class ModelRequest(_Strict):
+    """Which language model, and how it is asked."""
+
+    name: str
+    effort: Literal["low", "medium", "high"] | None = None
+    api_base: str | None = None
+    variant: str | None = None
+
+
+class RunRequest(_Strict):
+    """One run. Naming a language model without an engine means that the model leads the search."""
+
+    problem: ProblemRequest
+    engine: str | None = None
+    model: ModelRequest | None = None
+    seed: int = Field(0, ge=0)
+    budget: Budget = Budget()
+    jobs: int = Field(1, ge=1)
+
+
+def fixed_parameterization(problem: Problem) -> Problem:
+    """Return the same problem with only the spec's fixed control points allowed."""
+    inputs = tuple(replace(r, free=None) for r in problem.space.inputs)
+    return replace(problem, space=replace(problem.space, inputs=inputs))
+
+
+def execute(
+    request: RunRequest, directory: Path | None, *, listeners: Iterable[Listener] = (), resume: bool = False
+) -> Result:
+    """Run a request, recorded in a directory; with resume, go on where that directory's journal ends.
+
+    Raises:
+        JournalError: when the directory holds another run, or its FMU or spec has changed since.
+        SpecError: when the request cannot be understood.
+        ModelError: when the FMU cannot be used.
+        ChatError: when the language model cannot be used, before the first simulation.
+    """
+    problem = request.problem.load()
+    with ExitStack() as stack:
+        journal: Journal | None = None
+        records: Sequence[Record] = ()
+        if directory is not None:
+            if not resume and (directory / "manifest.json").exists():
+                raise JournalError(
+                    f"{directory} already holds a run: choose another --out, or continue it with "
+                    f"'falsifier resume {directory}'"
+                )
+            journal = stack.enter_context(open_journal(directory))
+            if resume:
+                _check_unchanged(directory, problem)
+                records = read_journal(directory)
+            else:
+                write_manifest(directory, manifest(request, problem))
+        build = proposer_builder(request, problem, records)
+        executor = stack.enter_context(local_executor(request.jobs))
+        stack.callback(problem.model.close)
+        return search(
+            problem,
+            build,
+            request.budget,
+            batch=request.jobs,
+            executor=executor,
+            journal=journal,
+            records=records,
+            listeners=listeners,
+        )
+
+
+def resume_run(directory: Path, *, listeners: Iterable[Listener] = ()) -> Result:
+    """Continue the run of a directory."""
+    request = RunRequest.model_validate(read_manifest(directory)["request"])
+    return execute(request, directory, listeners=listeners, resume=True)
+
+
+def manifest(request: RunRequest, problem: Problem) -> dict[str, Any]:
+    """What a run directory says of how it came to be."""
+    return {
+        "falsifier": __version__,
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "packages": {name: found for name in _RECORDED_PACKAGES if (found := _version(name))},
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "request": request.model_dump(mode="json"),
+        "source": problem.source,
+        "requirement": {"name": problem.name, "formula": str(problem.requirement.formula)},
+        "hashes": file_hashes(problem),
+    }
+
+
+def file_hashes(problem: Problem) -> dict[str, str]:
+    """SHA-256 by path of the files that decide what is simulated: the FMU and the spec."""
+    spec = problem.source.rpartition(":")[0]
+    paths = [getattr(problem.model, "path", None), Path(spec) if spec.endswith(".toml") else None]
+    return {str(p): sha256(Path(p).read_bytes()).hexdigest() for p in paths if p is not None}
+
+
+def proposer_builder(request: RunRequest, problem: Problem, records: Sequence[Record]) -> ProposerBuilder:
+    """Return what makes the request's proposer; a language model is checked here, before any simulation."""
+    from falsifier.proposers import DEFAULT_ENGINE, make_proposer
+
+    if request.model is None:
+        engine = request.engine or DEFAULT_ENGINE
+        return lambda _: make_proposer(engine, problem, seed=request.seed)
+    raise SpecError("language models are not wired yet")
+
+
+def _check_unchanged(directory: Path, problem: Problem) -> None:
+    recorded = read_manifest(directory)["hashes"]
+    for path, digest in file_hashes(problem).items():
+        if recorded.get(path, digest) != digest:
+            raise JournalError(f"{directory}: {path} has changed since this run was started; start a new run")
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
