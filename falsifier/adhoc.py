@@ -9,6 +9,7 @@ from falsifier.model import Interface, ModelInfo, Variable
 from falsifier.problem import Problem, build_problem
 from falsifier.signals import INTERPOLATIONS
 from falsifier.spec import ModelChanges, parse_spec
+from falsifier.stl.names import name_text
 
 # Control points of an input when nobody says how many: both ends, the middle and two between.
 _DEFAULT_POINTS = 5
@@ -178,7 +179,7 @@ def _requirement_section(info: ModelInfo) -> str:
     stop_time = info.stop_time or _DEFAULT_STOP_TIME
     return (
         "[requirements.R1]\n"
-        f"formula = 'G[0,{stop_time:.10g}] ({_stl_name(output.name)} <= {bound:.10g})'"
+        f"formula = 'G[0,{stop_time:.10g}] ({name_text(output.name)} <= {bound:.10g})'"
         '  # put the real requirement here\ndescription = ""'
     )
 
@@ -235,9 +236,3 @@ def _bounded_inputs(info: ModelInfo) -> dict[str, object]:
 
 def _toml_key(name: str) -> str:
     return name if name.replace("_", "").replace("-", "").isalnum() else f'"{name}"'
-
-
-def _stl_name(name: str) -> str:
-    from falsifier.stl import quoted
-
-    return str(quoted(name))

@@ -20,7 +20,7 @@ from falsifier.spec import (
     overlay,
     read_spec,
 )
-from falsifier.stl import Formula, parse
+from falsifier.stl import Formula, Monitor, parse
 
 # Share of the output interval by which the stop time may miss a whole multiple of it: 15 / (1/30) is exact
 # only up to rounding.
@@ -208,15 +208,13 @@ def parse_requirement(
         SpecError: naming file and key, with the parser's position, the unknown signal or the window that
             reaches past the stop time.
     """
-    from falsifier.stl import check_grid
-
     try:
         formula = parse(text)
         for name in formula.signals:
             if name not in info:
                 known = [v.name for v in (*info.outputs, *info.inputs)]
                 raise FormulaError(f"unknown signal {name!r}; {did_you_mean(name, known)}")
-        check_grid(formula, step=experiment.output_interval, samples=experiment.samples)
+        Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:
         raise SpecError(str(error), file=file, key=key) from None
     return formula
