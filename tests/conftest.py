@@ -1,0 +1,29 @@
+"""What all tests share: no keys in the environment, no network but this machine's own."""
+
+import os
+import socket
+from typing import Any
+
+import pytest
+
+_real_connect = socket.socket.connect
+
+
+def _guarded_connect(self: socket.socket, address: Any) -> None:
+    if self.family in (socket.AF_INET, socket.AF_INET6) and address[0] not in (
+        "127.0.0.1",
+        "::1",
+        "localhost",
+    ):
+        raise AssertionError(f"a test tried to reach {address[0]}")
+    _real_connect(self, address)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def closed_network() -> Any:
+    patch = pytest.MonkeyPatch()
+    patch.setattr(socket.socket, "connect", _guarded_connect)
+    for name in [n for n in os.environ if n.endswith(("_API_KEY", "_TOKEN"))]:
+        patch.delenv(name)
+    yield
+    patch.undo()

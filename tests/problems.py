@@ -1,0 +1,64 @@
+"""Small problems of Python functions, for tests that need no FMU."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.problem import Problem, Requirement
+from falsifier.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.stl import parse
+
+Array = NDArray[np.float64]
+STEP, STOP = 0.1, 10.0
+
+
+def follow(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """First-order lag x' = gain * u - x from x0, by explicit Euler."""
+    x = np.empty_like(times)
+    x[0] = parameters.get("x0", 0.0)
+    for k in range(1, len(times)):
+        x[k] = x[k - 1] + STEP * (parameters.get("gain", 1.0) * inputs["u"][k - 1] - x[k - 1])
+    return {"x": x}
+
+
+def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Give NaN whenever the input ends in the upper half of its range."""
+    x = follow(times, inputs, parameters)["x"].copy()
+    if inputs["u"][-1] > 0:
+        x[5] = np.nan
+    return {"x": x}
+
+
+def never(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Fail always."""
+    raise RuntimeError("out of order")
+
+
+INFO = ModelInfo(
+    "lag",
+    "A first-order lag.",
+    variables=(
+        Variable("u", causality="input", unit="V", low=-1.0, high=1.0, start=0.0, description="drive"),
+        Variable("x", causality="output", unit="m", description="position"),
+        Variable("gain", causality="parameter", start=1.0, settable=True),
+        Variable("x0", causality="parameter", start=0.0, settable=True),
+    ),
+)
+
+
+def lag_problem(
+    stl: str = "G[0,10] (x <= 0.9)",
+    *,
+    function: object = follow,
+    points: int = 4,
+    free: Freedom | None = None,
+    parameters: tuple[ParameterRange, ...] = (),
+) -> Problem:
+    """Problem over the lag: falsified only where u stays near its upper end for long."""
+    space = SearchSpace(
+        (InputRange("u", -1.0, 1.0, points, "linear", None, free, "V", "drive"),), parameters, STOP
+    )
+    model = FunctionModel(function, INFO)  # type: ignore[arg-type]
+    return Problem(model, Requirement("LAG", parse(stl)), space, Experiment(STOP, STEP, ("x",)))
