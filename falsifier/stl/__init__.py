@@ -1,1 +1,13 @@
-"""Signal Temporal Logic: formulas, robustness, and what decided it."""
+"""Signal Temporal Logic: formulas, robustness, and what decided it.
+
+>>> formula = parse("G[0,20] (speed <= 120)")
+>>> formula.signals, formula.horizon()
+(('speed',), 20.0)
+"""
+
+from falsifier.stl.formula import Formula
+from falsifier.stl.monitor import Monitor
+from falsifier.stl.parser import parse
+from falsifier.stl.verdict import Verdict
+
+__all__ = ["Formula", "Monitor", "Verdict", "parse"]

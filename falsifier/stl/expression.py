@@ -1,0 +1,186 @@
+"""Arithmetic over signals: the terms that predicates compare.
+
+An expression is an immutable tree. ``str(expression)`` is a text that parses to the same tree, and
+``expression.evaluate(columns)`` its value, for whole columns or for single numbers.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.stl.names import name_text
+
+Operator = Literal["+", "-", "*", "/", "^"]
+Function = Literal["abs", "sqrt", "exp", "log", "sin", "cos", "min", "max"]
+
+UNARY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "sin": np.sin,
+    "cos": np.cos,
+}
+BINARY_FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
+OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "^": np.float_power,
+}
+
+# How tightly a form binds; the parser climbs the same ladder. Formulas hold the levels below.
+SUM, PRODUCT, SIGN, POWER, ATOM = 7, 8, 9, 10, 11
+
+
+class Expression:
+    """An arithmetic term over signals."""
+
+    __slots__ = ()
+    binding: ClassVar[int] = ATOM
+
+    @property
+    def operands(self) -> tuple["Expression", ...]:
+        """Expressions directly below this one."""
+        return ()
+
+    def walk(self) -> Iterator["Expression"]:
+        """Yield this expression and all below it, from left to right."""
+        yield self
+        for operand in self.operands:
+            yield from operand.walk()
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals in order of first appearance."""
+        return tuple(dict.fromkeys(e.name for e in self.walk() if isinstance(e, Name)))
+
+    def evaluate(self, columns: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Value over columns by name, in the shape that they have; a constant is a number.
+
+        Where the value is not defined (square root of a negative number, division by zero) it is NaN or
+        infinite, without a warning.
+        """
+        with np.errstate(all="ignore"):
+            value: NDArray[np.float64] = np.asarray(self._value(columns), dtype=np.float64)
+            return value
+
+    def _value(self, columns: Mapping[str, Any]) -> Any:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Expression):
+    """A constant."""
+
+    value: float
+
+    @property
+    def binding(self) -> int:  # type: ignore[override]
+        """A negative number binds like a sign."""
+        return SIGN if self.value < 0 else ATOM
+
+    def __str__(self) -> str:
+        return number_text(self.value)
+
+    def _value(self, columns: Mapping[str, Any]) -> Any:
+        return self.value
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Expression):
+    """A signal by the name that the model gives it."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return name_text(self.name)
+
+    def _value(self, columns: Mapping[str, Any]) -> Any:
+        return columns[self.name]
+
+
+@dataclass(frozen=True, slots=True)
+class Negative(Expression):
+    """Unary minus."""
+
+    operand: Expression
+    binding: ClassVar[int] = SIGN
+
+    @property
+    def operands(self) -> tuple[Expression, ...]:
+        """The operand."""
+        return (self.operand,)
+
+    def __str__(self) -> str:
+        return f"-{embraced(self.operand, SIGN)}"
+
+    def _value(self, columns: Mapping[str, Any]) -> Any:
+        return -np.asarray(self.operand._value(columns), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic(Expression):
+    """Two expressions joined by ``+ - * / ^``."""
+
+    operator: Operator
+    left: Expression
+    right: Expression
+
+    @property
+    def binding(self) -> int:  # type: ignore[override]
+        """Binding of the operator."""
+        return {"+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "^": POWER}[self.operator]
+
+    @property
+    def operands(self) -> tuple[Expression, ...]:
+        """Left and right side."""
+        return (self.left, self.right)
+
+    def __str__(self) -> str:
+        if self.operator == "^":
+            return f"{embraced(self.left, ATOM)}^{embraced(self.right, SIGN)}"
+        left, right = embraced(self.left, self.binding), embraced(self.right, self.binding + 1)
+        return f"{left} {self.operator} {right}" if self.binding == SUM else f"{left}{self.operator}{right}"
+
+    def _value(self, columns: Mapping[str, Any]) -> Any:
+        return OPERATORS[self.operator](self.left._value(columns), self.right._value(columns))
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Expression):
+    """A function of one expression, or the smallest or largest of several."""
+
+    function: Function
+    operands: tuple[Expression, ...]
+
+    def __str__(self) -> str:
+        return f"{self.function}({', '.join(map(str, self.operands))})"
+
+    def _value(self, columns: Mapping[str, Any]) -> Any:
+        values = [operand._value(columns) for operand in self.operands]
+        if self.function in UNARY_FUNCTIONS:
+            return UNARY_FUNCTIONS[self.function](values[0])
+        result = values[0]
+        for value in values[1:]:
+            result = BINARY_FUNCTIONS[self.function](result, value)
+        return result
+
+
+def embraced(part: Any, binding: int) -> str:
+    """Text of a part, in parentheses where it binds less tightly than its place asks."""
+    return str(part) if part.binding >= binding else f"({part})"
+
+
+def number_text(value: float) -> str:
+    """Shortest text that reads back as this number.
+
+    >>> number_text(120.0), number_text(0.05), number_text(1e-7)
+    ('120', '0.05', '1e-07')
+    """
+    text = repr(float(value))
+    return text.removesuffix(".0")

@@ -1,0 +1,14 @@
+"""The steps of a compiled formula; ``program`` writes them, ``kernels`` carries them out.
+
+Each row of a program is ``(code, out, a, b, length, width)``: offsets into one flat buffer, the number of
+samples to write, and for sliding windows how many samples a window reaches beyond its first.
+"""
+
+SCALE = 0  # out = p*a + q, with the row's two numbers
+FILL = 1  # out = q
+ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, MINIMUM, MAXIMUM = 2, 3, 4, 5, 6, 7, 8
+ABS, SQRT, EXP, LOG, SIN, COS = 9, 10, 11, 12, 13, 14
+WINDOW_MINIMUM, WINDOW_MAXIMUM = 15, 16  # out[i] = smallest, largest of a[i..i+width]
+REST_MINIMUM, REST_MAXIMUM = 17, 18  # out[i] = smallest, largest of a[i..end]
+UNTIL = 19  # out[i] = max(b[i], min(a[i], out[i+1]))
+CHECK = 20  # nothing is written: a must be finite

@@ -1,0 +1,452 @@
+"""Text to formula: exactly one formula, or an error that points at the place.
+
+From the loosest to the tightest binding::
+
+    <->  <=>                        left associative
+    ->   =>                         right associative
+    or   |   ||                     left associative
+    and  &   &&                     left associative
+    U[a,b]   until[a,b]             right associative
+    not  !   G[a,b]  always[a,b]  F[a,b]  eventually[a,b]  X  next
+    <  <=  >  >=  ==  !=            chains: 1 <= x <= 3 means 1 <= x and x <= 3
+    +  -                            left associative
+    *  /                            left associative
+    -x
+    ^                               right associative, so -x^2 is -(x^2)
+    numbers, names, abs sqrt exp log sin cos min max, parentheses
+
+So ``G[0,5] x <= 3 -> y <= 1`` reads ``(G[0,5] (x <= 3)) -> (y <= 1)``. Windows are closed, in seconds unless
+each bound has a unit (``us ms s min h``); an operator without a window reaches to the stop time. A signal
+that stands alone is a Boolean one: ``b`` means ``b >= 0.5``. Names: see ``falsifier.stl.names``.
+"""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NoReturn, cast
+
+from falsifier.errors import FormulaError, did_you_mean
+from falsifier.stl.expression import (
+    POWER,
+    PRODUCT,
+    SIGN,
+    SUM,
+    Arithmetic,
+    Call,
+    Expression,
+    Function,
+    Name,
+    Negative,
+    Number,
+    Operator,
+    number_text,
+)
+from falsifier.stl.formula import (
+    COMPARISON,
+    CONJUNCTION,
+    DISJUNCTION,
+    EQUIVALENCE,
+    IMPLICATION,
+    PREFIX,
+    UNTIL,
+    Always,
+    And,
+    Comparison,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+)
+from falsifier.stl.names import FUNCTIONS, RESERVED, scan_name, scan_word
+
+MAX_DEPTH = 100
+UNITS = {"us": (1, 1_000_000), "ms": (1, 1000), "s": (1, 1), "min": (60, 1), "h": (3600, 1)}  # seconds
+
+_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
+_SPACE = re.compile(r"\s*")
+
+_SPELLINGS = {
+    "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
+    "always": "G", "eventually": "F", "until": "U", "next": "X",
+}  # fmt: skip
+_LEVELS = {
+    "<->": EQUIVALENCE, "->": IMPLICATION, "or": DISJUNCTION, "and": CONJUNCTION, "U": UNTIL,
+    "<": COMPARISON, "<=": COMPARISON, ">": COMPARISON, ">=": COMPARISON, "==": COMPARISON, "!=": COMPARISON,
+    "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "^": POWER,
+}  # fmt: skip
+_RIGHT_ASSOCIATIVE = {"->", "U", "^"}
+_CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
+    "<->": Iff, "->": Implies, "or": Or, "and": And,
+}  # fmt: skip
+_CLOSED = "only closed windows in seconds are understood: [a,b]"
+_HINTS = {
+    "=": "equality is ==",
+    "%": "write the plain number, without a percent sign",
+    "'": "a single quote opens a Modelica name and needs a second one",
+    '"': "a double quote opens a name and needs a second one",
+    "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
+    "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *", "~": "write not",
+    "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
+    "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
+    "pow": "write x^y", "ln": "the natural logarithm is log", "s": _CLOSED,
+}  # fmt: skip
+
+Node = Formula | Expression
+
+
+@dataclass(frozen=True, slots=True)
+class _Token:
+    kind: Literal["number", "name", "symbol", "end"]
+    text: str
+    position: int
+    end: int
+
+
+def parse(text: str) -> Formula:
+    """Parse a text that is exactly one formula.
+
+    Raises:
+        FormulaError: with the position, a caret under it and a hint.
+    """
+    return _Parser(text).formula()
+
+
+class _Parser:
+    """Precedence climbing over one grammar for formulas and expressions; each operator checks its sides."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens = self._tokens()
+        self.index = 0
+        self.depth = 0
+
+    # -- tokens ------------------------------------------------------------------------------------------
+
+    def _tokens(self) -> list[_Token]:
+        tokens: list[_Token] = []
+        position = _end_of(_SPACE, self.text, 0)
+        while position < len(self.text):
+            tokens.append(self._token(position))
+            position = _end_of(_SPACE, self.text, tokens[-1].end)
+        end = len(self.text.rstrip())
+        return [*tokens, _Token("end", "the end", end, end)]
+
+    def _token(self, position: int) -> _Token:
+        text = self.text
+        if number := _NUMBER.match(text, position):
+            return _Token("number", number[0], position, number.end())
+        if word := scan_word(text, position):
+            return _Token("symbol", _SPELLINGS.get(word, word), position, position + len(word))
+        if name := scan_name(text, position):
+            return _Token("name", name[0], position, name[1])
+        if symbol := _SYMBOL.match(text, position):
+            return _Token("symbol", _SPELLINGS.get(symbol[0], symbol[0]), position, symbol.end())
+        character = text[position]
+        hint = _HINTS.get(character, "it has no meaning in a formula; names with it need double quotes")
+        self._fail(f"unexpected character {character!r}", position, hint)
+
+    @property
+    def _next(self) -> _Token:
+        return self.tokens[self.index]
+
+    def _take(self) -> _Token:
+        token = self._next
+        self.index += 1
+        return token
+
+    def _accept(self, symbol: str) -> bool:
+        if self._next.kind == "symbol" and self._next.text == symbol:
+            self.index += 1
+            return True
+        return False
+
+    def _word(self, token: _Token) -> str:
+        return self.text[token.position : token.end]
+
+    def _shown(self, token: _Token) -> str:
+        return "the end" if token.kind == "end" else repr(self._word(token))
+
+    # -- the grammar -------------------------------------------------------------------------------------
+
+    def formula(self) -> Formula:
+        if self._next.kind == "end":
+            self._fail("the formula is empty", 0, "for example: G[0,20] (speed <= 120)")
+        formula = self._as_formula(self._climb(EQUIVALENCE), 0)
+        behind = self._next
+        if behind.kind != "end":
+            self._fail_behind(behind)
+        if _depth(formula) > MAX_DEPTH:
+            self._fail_depth(0)
+        return formula
+
+    def _climb(self, level: int) -> Node:
+        """Parse everything that binds at least as tightly as this level."""
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            self._fail_depth(self._next.position)
+        start = self._next.position
+        left = self._operand(level)
+        while self._next.kind == "symbol" and _LEVELS.get(self._next.text, -1) >= level:
+            token = self._take()
+            if token.text == "U":
+                window = self._window()
+                right = self._formula_at(UNTIL)
+                left = Until(self._as_formula(left, start), right, window)
+            elif token.text in _CONNECTIVES:
+                here = _LEVELS[token.text]
+                condition = self._as_formula(left, start)
+                right = self._formula_at(here if token.text in _RIGHT_ASSOCIATIVE else here + 1)
+                left = _CONNECTIVES[token.text](condition, right)
+            elif _LEVELS[token.text] == COMPARISON:
+                left = self._chain(self._as_expression(left, start), token)
+            else:
+                here = _LEVELS[token.text]
+                term = self._as_expression(left, start)
+                other = self._expression_at(here if token.text in _RIGHT_ASSOCIATIVE else here + 1)
+                left = Arithmetic(cast(Operator, token.text), term, other)
+        self.depth -= 1
+        return left
+
+    def _formula_at(self, level: int) -> Formula:
+        start = self._next.position
+        return self._as_formula(self._climb(level), start)
+
+    def _expression_at(self, level: int) -> Expression:
+        start = self._next.position
+        return self._as_expression(self._climb(level), start)
+
+    def _chain(self, left: Expression, token: _Token) -> Formula:
+        right = self._expression_at(SUM)
+        formula: Formula = Predicate(cast(Comparison, token.text), left, right)
+        while self._next.kind == "symbol" and _LEVELS.get(self._next.text) == COMPARISON:
+            token = self._take()
+            left, right = right, self._expression_at(SUM)
+            formula = And(formula, Predicate(cast(Comparison, token.text), left, right))
+        return formula
+
+    def _operand(self, level: int) -> Node:
+        token = self._take()
+        if token.kind == "number":
+            value = float(token.text)
+            if not math.isfinite(value):
+                self._fail(f"the number {token.text} is too large", token.position, "numbers end at 1e308")
+            return Number(value)
+        if token.kind == "name":
+            return self._named(token)
+        if token.text == "(":
+            inside = self._climb(EQUIVALENCE)
+            self._close(token)
+            return inside
+        if token.text == "-":
+            operand = self._expression_at(SIGN)
+            return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
+        if token.text in FUNCTIONS:
+            return self._call(token)
+        if token.text in ("not", "G", "F", "X"):
+            if level > PREFIX:
+                self._fail(
+                    f"{self._shown(token)} opens a formula, but a number or a signal is expected here",
+                    token.position,
+                    "arithmetic and comparisons take numbers and signals; is a parenthesis missing?",
+                )
+            return self._prefix(token)
+        self._fail_operand(token)
+
+    def _prefix(self, token: _Token) -> Formula:
+        if token.text == "not":
+            return Not(self._formula_at(PREFIX))
+        if token.text == "X":
+            return Next(self._formula_at(PREFIX))
+        window = self._window()
+        operand = self._formula_at(PREFIX)
+        return Always(operand, window) if token.text == "G" else Eventually(operand, window)
+
+    def _named(self, token: _Token) -> Name:
+        if self._next.kind == "symbol" and self._next.position == token.end:
+            if self._next.text == "(":
+                hint = _HINTS.get(token.text) or did_you_mean(token.text, FUNCTIONS)
+                self._fail(f"unknown function {token.text!r}", token.position, hint)
+            if self._next.text == "[":
+                self._fail(
+                    f"{token.text!r} has no index that can be read",
+                    self._next.position,
+                    "indices are whole numbers as in x[1,2]; any other name stands in double quotes",
+                )
+        return Name(token.text)
+
+    def _call(self, token: _Token) -> Call:
+        opening = self._take()
+        operands = [self._expression_at(SUM)]
+        while self._accept(","):
+            operands.append(self._expression_at(SUM))
+        self._close(opening)
+        is_pair = token.text in ("min", "max")
+        if is_pair != (len(operands) > 1):
+            wanted = "two or more expressions" if is_pair else "one expression"
+            self._fail(
+                f"{token.text} takes {wanted}, got {len(operands)}", token.position, "check the commas"
+            )
+        return Call(cast(Function, token.text), tuple(operands))
+
+    def _close(self, opening: _Token) -> None:
+        if not self._accept(")"):
+            self._fail(
+                f"expected ')' before {self._shown(self._next)}",
+                self._next.position,
+                f"it closes the '(' at position {opening.position + 1}"
+                if self._next.kind in ("end", "symbol")
+                else "join two formulas with and, or, ->; numbers and signals with + - * /",
+            )
+
+    # -- windows -----------------------------------------------------------------------------------------
+
+    def _window(self) -> Window | None:
+        bracket = self._next
+        if bracket.text == "(" and self._looks_like_open_window():
+            self._fail("open windows are not understood", bracket.position, _CLOSED)
+        if not self._accept("["):
+            return None
+        start, start_unit = self._bound()
+        if not self._accept(","):
+            self._fail("expected ',' between the bounds", self._next.position, _CLOSED)
+        end_token = self._next
+        end, end_unit = self._bound()
+        if not self._accept("]"):
+            self._fail(f"expected ']' before {self._shown(self._next)}", self._next.position, _CLOSED)
+        if start > 0 and bool(start_unit) != bool(end_unit):
+            self._fail(
+                "one bound has a unit, the other has none",
+                bracket.position,
+                f"write it at both, for example [{number_text(start)}{start_unit or end_unit},"
+                f"{number_text(end)}{end_unit or start_unit}]",
+            )
+        window = Window(_seconds(start, start_unit), _seconds(end, end_unit))
+        if window.start > window.end:
+            self._fail(
+                f"the window {window} ends before it starts",
+                bracket.position,
+                f"the smaller bound comes first: {Window(window.end, window.start)}",
+            )
+        if not math.isfinite(window.end):
+            self._fail("the bound is too large", end_token.position, "leave the window out")
+        return window
+
+    def _bound(self) -> tuple[float, str]:
+        token = self._take()
+        if token.kind != "number":
+            hint = {
+                "-": "windows look forward: bounds are 0 or more",
+                "inf": "leave the window out to reach to the stop time",
+            }.get(token.text, f"bounds are plain numbers; {_CLOSED}")
+            self._fail(f"expected a bound, not {self._shown(token)}", token.position, hint)
+        unit = ""
+        if self._next.kind == "name":
+            word = self._take()
+            unit = word.text
+            if unit not in UNITS:
+                self._fail(f"unknown unit {unit!r}", word.position, did_you_mean(unit, UNITS))
+        return float(token.text), unit
+
+    def _looks_like_open_window(self) -> bool:
+        following = self.tokens[self.index + 1 : self.index + 3]
+        return [t.kind for t in following] == ["number", "symbol"] and following[1].text == ","
+
+    # -- what went wrong ---------------------------------------------------------------------------------
+
+    def _as_formula(self, node: Node, start: int) -> Formula:
+        if isinstance(node, Formula):
+            return node
+        if isinstance(node, Name):
+            return Predicate(">=", node, Number(0.5))
+        what = "a number" if isinstance(node, Number) else "an expression"
+        hint = f"compare it, for example {node} >= 0"
+        if "=>" in self.text:
+            hint += "; => is an implication, greater or equal is >="
+        self._fail(f"{what}, {node}, stands where a formula is expected", start, hint)
+
+    def _as_expression(self, node: Node, start: int) -> Expression:
+        if isinstance(node, Expression):
+            return node
+        self._fail(
+            "a formula stands where a number or a signal is expected",
+            start,
+            "comparisons and arithmetic take numbers and signals; join formulas with and, or, ->, <->",
+        )
+
+    def _fail_operand(self, token: _Token) -> NoReturn:
+        problem = f"expected a formula, a signal or a number, not {self._shown(token)}"
+        if token.kind == "end":
+            problem = "the formula ends too early"
+        hint = "something is missing before it"
+        previous = self.tokens[self.index - 2] if self.index > 1 else None
+        if token.text in ("true", "false"):
+            problem, hint = f"{token.text} has no margin", "a Boolean signal b is written b or not b"
+        elif token.text == "U":
+            hint = 'U stands between two formulas; a signal of that name is written "U"'
+        elif token.text in ("[", "]"):
+            hint = "windows stand directly behind G, F or U"
+        elif token.text == ")":
+            hint = "there is nothing between the parentheses, or one parenthesis too many"
+        elif token.text == "*":
+            hint = "powers are written x^y"
+        elif token.kind == "symbol" and previous and self._word(previous) in RESERVED:
+            word = self._word(previous)
+            hint = f'{word} is a reserved word; a signal of that name is written "{word}"'
+        self._fail(problem, token.position, hint)
+
+    def _fail_behind(self, token: _Token) -> NoReturn:
+        previous = self.tokens[self.index - 1]
+        hint = "join two formulas with and, or, ->; numbers and signals with + - * /"
+        if token.text in _HINTS or previous.text in _HINTS:
+            hint = _HINTS.get(token.text) or _HINTS[previous.text]
+        elif token.text.lower() in RESERVED and token.kind == "name":
+            hint = f"operators are written in small letters: {token.text.lower()}"
+        elif token.text in UNITS and previous.kind == "number":
+            hint = "only the bounds of windows have units; compare in the signal's own unit"
+        elif token.text == ")":
+            hint = "there is one ')' too many"
+        elif token.text == "[":
+            hint = "windows stand directly behind G, F or U, indices directly behind a name"
+        self._fail(f"unexpected {self._shown(token)} behind a complete formula", token.position, hint)
+
+    def _fail_depth(self, position: int) -> NoReturn:
+        self._fail(
+            f"the formula is nested deeper than {MAX_DEPTH} levels", position, "split it into requirements"
+        )
+
+    def _fail(self, problem: str, position: int, hint: str) -> NoReturn:
+        start = self.text.rfind("\n", 0, position) + 1
+        line = self.text[start:].split("\n", 1)[0].rstrip()
+        caret = " " * (position - start) + "^"
+        raise FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
+
+
+def _seconds(bound: float, unit: str) -> float:
+    numerator, denominator = UNITS[unit or "s"]
+    return bound * numerator / denominator
+
+
+def _end_of(pattern: re.Pattern[str], text: str, position: int) -> int:
+    match = pattern.match(text, position)
+    return match.end() if match else position
+
+
+def _depth(formula: Formula) -> int:
+    deepest = 0
+    below: list[tuple[Node, int]] = [(formula, 1)]
+    while below:
+        node, depth = below.pop()
+        deepest = max(deepest, depth)
+        parts: tuple[Node, ...] = node.children if isinstance(node, Formula) else node.operands
+        if isinstance(node, Predicate):
+            parts = (node.left, node.right)
+        below.extend((part, depth + 1) for part in parts)
+    return deepest

@@ -1,0 +1,100 @@
+"""Random formulas and trajectories with many ties: small whole numbers, short windows, few samples."""
+
+import random
+
+import numpy as np
+
+from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Comparison,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+)
+from falsifier.trajectory import Trajectory
+
+STEP = 0.5
+SIGNALS = ("x", "y", "der(b)")
+
+
+def random_expression(rng: random.Random, depth: int) -> Expression:
+    if depth == 0 or rng.random() < 0.4:
+        return Name(rng.choice(SIGNALS)) if rng.random() < 0.7 else Number(float(rng.randint(-3, 3)))
+    below = [random_expression(rng, depth - 1) for _ in range(2)]
+    choice = rng.randrange(6)
+    if choice < 3:
+        return Arithmetic(("+", "-", "*")[choice], below[0], below[1])
+    if choice == 3:
+        return Call(rng.choice(("min", "max")), tuple(below))
+    if choice == 4:
+        return Call("abs", (below[0],))
+    return Arithmetic("^", below[0], Number(2.0)) if rng.random() < 0.3 else negative(below[0])
+
+
+def negative(operand: Expression) -> Expression:
+    return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
+
+
+def random_formula(rng: random.Random, depth: int, *, unbounded: bool = True) -> Formula:
+    """Formula of at most this depth; operators without a window have no window inside."""
+    if depth == 0 or rng.random() < 0.15:
+        operator: Comparison = rng.choice(("<", "<=", ">", ">=", "==", "!="))
+        return Predicate(operator, random_expression(rng, 2), random_expression(rng, 1))
+    choice = rng.choice(["not", "and", "or", "->", "<->", "G", "F", "U", "X"])
+    window = random_window(rng)
+    if unbounded and choice in "GFU" and rng.random() < 0.25:
+        window = None
+
+    def below() -> Formula:
+        part = random_formula(rng, depth - 1, unbounded=unbounded)
+        while window is None and part.horizon(STEP) > 0:
+            part = random_formula(rng, depth - 1, unbounded=unbounded)
+        return part
+
+    match choice:
+        case "not":
+            return Not(below())
+        case "X":
+            return Next(below())
+        case "G":
+            return Always(below(), window)
+        case "F":
+            return Eventually(below(), window)
+        case "U":
+            return Until(below(), below(), window)
+    joined = {"and": And, "or": Or, "->": Implies, "<->": Iff}[choice]
+    return joined(below(), below())
+
+
+def random_window(rng: random.Random) -> Window | None:
+    start = rng.randint(0, 3)
+    return Window(start * STEP, (start + rng.randint(0, 4)) * STEP)
+
+
+def random_trajectory(rng: random.Random, samples: int) -> Trajectory:
+    """Columns of small whole numbers, sometimes constant."""
+    generator = np.random.default_rng(rng.getrandbits(32))
+    columns = {
+        name: generator.integers(-4, 5, samples).astype(np.float64)
+        if rng.random() < 0.9
+        else np.full(samples, float(rng.randint(-3, 3)))
+        for name in SIGNALS
+    }
+    return Trajectory(np.arange(samples, dtype=np.float64) * STEP, columns)
+
+
+def random_case(seed: int, *, depth: int = 4, unbounded: bool = True) -> tuple[Formula, Trajectory]:
+    """Formula and a trajectory that is just long enough, or a little longer."""
+    rng = random.Random(seed)
+    formula = random_formula(rng, rng.randint(0, depth), unbounded=unbounded)
+    samples = round(formula.horizon(STEP) / STEP) + 1 + rng.choice((0, 0, 1, 3))
+    return formula, random_trajectory(rng, samples)
