@@ -1,1 +1,5 @@
-"""Search engines, one file each."""
+"""Search engines, one file each (``surrogate`` is a folder); all are made by ``make_proposer``."""
+
+from falsifier.proposers.registry import DEFAULT_ENGINE, ENGINES, make_proposer
+
+__all__ = ["DEFAULT_ENGINE", "ENGINES", "make_proposer"]

@@ -1,0 +1,60 @@
+"""Engines by name; an engine's module is imported when the engine is first made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any
+
+from falsifier.errors import SpecError, did_you_mean
+from falsifier.problem import Problem
+from falsifier.proposers.protocol import Proposer
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """One registered engine.
+
+    Attributes:
+        target: ``module:class``; the class is called as ``class(problem, seed=seed, **options)``.
+        summary: what it does, in one line for ``--help``.
+    """
+
+    target: str
+    summary: str
+
+    def load(self) -> Any:
+        """Import the engine's class."""
+        module, _, name = self.target.partition(":")
+        return getattr(import_module(module), name)
+
+
+ENGINES: Mapping[str, Engine] = MappingProxyType(
+    {
+        "uniform": Engine("falsifier.proposers.uniform:Uniform", "uniform random points of the box"),
+        "corners": Engine("falsifier.proposers.corners:Corners", "constant extremes first, then random"),
+        "sobol": Engine("falsifier.proposers.sobol:Sobol", "scrambled Sobol sequence over the box"),
+    }
+)
+
+DEFAULT_ENGINE = "surrogate"
+
+
+def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> Proposer:
+    """Make the engine of this name for a problem.
+
+    Args:
+        name: one of ENGINES.
+        problem: what is searched.
+        seed: the same seed and the same sequence of calls give the same candidates.
+        options: what the engine takes beside that; ``hybrid`` needs the language model's side.
+
+    Raises:
+        SpecError: for an unknown name, or a problem in which nothing may be varied.
+    """
+    if name not in ENGINES:
+        raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
+    if not problem.space.names:
+        raise SpecError("nothing may be varied: give at least one input or parameter a range")
+    proposer: Proposer = ENGINES[name].load()(problem, seed=seed, **options)
+    return proposer
