@@ -37,7 +37,7 @@ ENGINES: Mapping[str, Engine] = MappingProxyType(
     }
 )
 
-DEFAULT_ENGINE = "surrogate"
+DEFAULT_ENGINE = "corners"
 
 
 def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> Proposer:
