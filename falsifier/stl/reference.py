@@ -1,0 +1,154 @@
+"""rtamt as an independent second opinion on the robustness at time 0.
+
+rtamt (D. Nickovic, T. Yamaguchi, "RTAMT: Online robustness monitors from STL", ATVA 2020) reads some texts
+silently in another way than they look, so it never sees a formula as written. It gets a text made of our tree:
+every operator in parentheses, signals under plain aliases, times counted in samples of one second. What its
+discrete-time semantics has not is rewritten:
+
+- the compared expressions are columns of their own, because versions differ in the arithmetic they know;
+- its ``until`` leaves the last sample of the left operand out: ``l U r`` becomes ``l U (l and r)``;
+- ``l U[a,b] r`` takes cubic time there and becomes
+  ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, which is equivalent;
+- its ``iff`` and ``xor`` have no sign: ``<->`` becomes two implications.
+"""
+
+import sys
+import types
+import typing
+import warnings
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from falsifier.errors import MonitorError
+from falsifier.stl.expression import Expression, Number, number_text
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+)
+from falsifier.stl.program import window_samples
+from falsifier.trajectory import Trajectory
+
+
+def robustness(formula: Formula, trajectory: Trajectory) -> float:
+    """Robustness at time 0 as rtamt computes it.
+
+    Raises:
+        FormulaError: when a window's bound is not a multiple of the trajectory's step.
+        MonitorError: when the trajectory is empty, too short, not finite or lacks a signal, or rtamt fails.
+    """
+    if len(trajectory) == 0:
+        raise MonitorError("the trajectory is empty")
+    end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
+    if needed > end + 1e-6 * trajectory.step:
+        raise MonitorError(f"the formula needs {needed:g} s, the trajectory ends at {end:g} s")
+    translation = _Translation(trajectory)
+    text = translation.formula(formula)
+    columns = translation.columns
+    if len(trajectory) == 1:  # rtamt fails on one sample; a second one like it changes no value at time 0
+        columns = {name: values * 2 for name, values in columns.items()}
+    return _evaluate(text, columns or {"v0": [0.0] * max(2, len(trajectory))})
+
+
+@dataclass(slots=True)
+class _Translation:
+    """Text for rtamt and the columns that it speaks of."""
+
+    trajectory: Trajectory
+    columns: dict[str, list[float]] = field(default_factory=dict)
+    aliases: dict[Expression, str] = field(default_factory=dict)
+
+    def formula(self, f: Formula) -> str:
+        """Text of a formula, in parentheses."""
+        match f:
+            case Predicate("!=", left, right):
+                return f"(not ({self.side(left)} == {self.side(right)}))"
+            case Predicate(operator, left, right):
+                return f"({self.side(left)} {operator} {self.side(right)})"
+            case Not(operand):
+                return f"(not {self.formula(operand)})"
+            case Next(operand):
+                return f"(next {self.formula(operand)})"
+            case And(left, right):
+                return f"({self.formula(left)} and {self.formula(right)})"
+            case Or(left, right):
+                return f"({self.formula(left)} or {self.formula(right)})"
+            case Implies(left, right):
+                return f"({self.formula(left)} -> {self.formula(right)})"
+            case Iff(left, right):
+                return self.formula(And(Implies(left, right), Implies(right, left)))
+            case Always(operand, window):
+                return f"(always{self.window(window)} {self.formula(operand)})"
+            case Eventually(operand, window):
+                return f"(eventually{self.window(window)} {self.formula(operand)})"
+            case Until(left, right, window):
+                return self.until(left, right, window)
+        raise TypeError(f"not a formula: {f!r}")
+
+    def until(self, left: Formula, right: Formula, window: Window | None) -> str:
+        """Text of an until whose left operand includes the last sample."""
+        text, both = self.formula(left), self.formula(And(left, right))
+        until = f"({text} until {both})"
+        if window is None:
+            return until
+        start, end = window_samples(window, self.trajectory.step or 1.0)
+        within = f"((eventually[{start},{end}] {both}) and (eventually[{start},{start}] {until}))"
+        return f"((always[0,{start - 1}] {text}) and {within})" if start else within
+
+    def window(self, window: Window | None) -> str:
+        """Text of a window in samples."""
+        if window is None:
+            return ""
+        start, end = window_samples(window, self.trajectory.step or 1.0)
+        return f"[{start},{end}]"
+
+    def side(self, expression: Expression) -> str:
+        """Text of a compared expression: a number, or the alias of its column."""
+        if isinstance(expression, Number):
+            return number_text(expression.value)
+        if expression not in self.aliases:
+            known = {name: self.trajectory[name] for name in expression.signals}
+            values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)
+            if not np.isfinite(values).all():
+                time = self.trajectory.times[int(np.flatnonzero(~np.isfinite(values))[0])]
+                raise MonitorError(f"{expression} has no finite value at {time:g} s")
+            self.aliases[expression] = f"v{len(self.columns)}"
+            self.columns[self.aliases[expression]] = values.tolist()
+        return self.aliases[expression]
+
+
+def _evaluate(text: str, columns: dict[str, list[float]]) -> float:
+    specification = _rtamt().StlDiscreteTimeOfflineSpecification()
+    for name in columns:
+        specification.declare_var(name, "float")
+    specification.spec = text
+    specification.parse()
+    if len(specification.ast.specs) != 1:
+        raise MonitorError(f"rtamt reads {len(specification.ast.specs)} formulas in {text}")
+    samples = len(next(iter(columns.values())))
+    values = specification.evaluate({"time": [float(k) for k in range(samples)], **columns})
+    return float(values[0][1])
+
+
+def _rtamt() -> Any:
+    if sys.version_info >= (3, 13) and "typing.io" not in sys.modules:
+        # The antlr runtime that rtamt asks for imports a module that Python 3.13 no longer has.
+        shim = types.ModuleType("typing.io")
+        vars(shim)["TextIO"] = typing.TextIO
+        sys.modules["typing.io"] = shim
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # the same import, on older Pythons
+        import rtamt
+
+    return rtamt
