@@ -5,9 +5,11 @@
 (('speed',), 20.0)
 """
 
+from falsifier.stl.diagnosis import Diagnosis
 from falsifier.stl.formula import Formula
 from falsifier.stl.monitor import Monitor
 from falsifier.stl.parser import parse
 from falsifier.stl.verdict import Verdict
+from falsifier.stl.words import in_words
 
-__all__ = ["Formula", "Monitor", "Verdict", "parse"]
+__all__ = ["Diagnosis", "Formula", "Monitor", "Verdict", "in_words", "parse"]

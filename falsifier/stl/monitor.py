@@ -1,5 +1,6 @@
 """The monitor: robustness, critical time and diagnosis of a formula on trajectories of one time grid."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -7,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import FormulaError, MonitorError
+from falsifier.stl.compiler import compile_formula
+from falsifier.stl.diagnosis import Diagnosis, diagnose
+from falsifier.stl.evaluator import fill, fill_many
 from falsifier.stl.formula import Formula
-from falsifier.stl.program import Program, compile_formula
+from falsifier.stl.program import Program
 from falsifier.stl.verdict import Verdict
-from falsifier.stl.witness import Waypoint, trace
+from falsifier.stl.witness import trace
 from falsifier.trajectory import Trajectory
 
 
@@ -40,7 +44,7 @@ class Monitor:
             )
         program = compile_formula(self.formula, step=self.step, samples=self.samples)
         object.__setattr__(self, "_program", program)
-        object.__setattr__(self, "_spare", [])
+        object.__setattr__(self, "_spare", [])  # buffers of finished evaluations, to be written over
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel as what it was made from and compile again on arrival."""
@@ -52,81 +56,81 @@ class Monitor:
         Raises:
             MonitorError: when the trajectory cannot be judged: other time grid, missing signal, NaN or inf.
         """
-        buffer = self._filled(trajectory)
-        way = trace(self._program, buffer)
+        buffer = fill(self._program, trajectory, self._take_buffer())
+        way = trace(self._program.root, buffer)
         self._spare.append(buffer)
-        return _verdict(way, trajectory)
+        predicate, sample = way[-1].formula, way[-1].sample
+        values = {name: column.item(sample) for name, column in trajectory.columns.items()}
+        return Verdict(way[0].value, trajectory.times.item(sample), str(predicate), values)
 
-    def _filled(self, trajectory: Trajectory) -> NDArray[np.float64]:
-        return fill(self._program, trajectory, self._spare.pop() if self._spare else None)
+    def diagnose(self, trajectory: Trajectory) -> Diagnosis:
+        """Way from the formula to the predicate that decided its value, in words too, and vacuity.
 
+        Raises:
+            MonitorError: when the trajectory cannot be judged.
+        """
+        buffer = fill(self._program, trajectory, self._take_buffer())
+        diagnosis = diagnose(self._program.root, buffer, trajectory)
+        self._spare.append(buffer)
+        return diagnosis
 
-def fill(
-    program: Program, trajectory: Trajectory, buffer: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
-    """Evaluate a program on a trajectory; return the buffer with the values of all its parts.
+    def robustness(self, trajectory: Trajectory, time: float = 0.0) -> dict[Formula, float]:
+        """Robustness of every distinct sub-formula at one time in s.
 
-    Args:
-        program: the compiled formula.
-        trajectory: what was simulated.
-        buffer: one that may be written over, of an earlier call.
+        Sub-formulas whose windows reach past the end from there are left out; at time 0 there are none.
 
-    Raises:
-        MonitorError: when the trajectory cannot be judged.
-    """
-    from falsifier.stl import kernels
+        Raises:
+            MonitorError: when the trajectory cannot be judged or the time lies outside it.
+        """
+        sample = round(time / self.step)
+        if not 0 <= sample < self.samples:
+            raise MonitorError(f"{time:g} s lies outside the trajectory, which ends at {self._end:g} s")
+        result: dict[Formula, float] = {}
+        for part in dict.fromkeys(self.formula.walk()):
+            if sample + self._reach(part) < self.samples:
+                result[part] = self._values(part, trajectory, sample, sample).item(0)
+        return result
 
-    if buffer is None:
-        buffer = np.empty(program.size)
-    n = program.samples
-    if len(trajectory) != n:
-        raise MonitorError(
-            f"the trajectory has {len(trajectory)} samples, expected {n} from 0 s to "
-            f"{(n - 1) * program.step:g} s every {program.step:g} s"
-        )
-    for i, name in enumerate(program.signals):
-        buffer[i * n : (i + 1) * n] = trajectory[name]
-    times = np.ascontiguousarray(trajectory.times, dtype=np.float64)
-    size = len(program.signals) * n
-    status, position = kernels.judge(program.rows, program.numbers, buffer, size, times, program.step)
-    if status != kernels.FINE:
-        raise _complaint(program, buffer, times, status, position)
-    return buffer
+    def course(self, trajectory: Trajectory, part: Formula | None = None) -> NDArray[np.float64]:
+        """Robustness of a sub-formula, or of the formula, over time.
 
+        Returns:
+            One value per sample from time 0 on, as far as the windows do not reach past the end, shape (k,).
 
-def _complaint(
-    program: Program, buffer: NDArray[np.float64], times: NDArray[np.float64], status: int, position: int
-) -> MonitorError:
-    from falsifier.stl import kernels
+        Raises:
+            FormulaError: when the part cannot be judged on this grid.
+            MonitorError: when the trajectory cannot be judged.
+        """
+        part = self.formula if part is None else part
+        return self._values(part, trajectory, 0, self.samples - 1 - self._reach(part))
 
-    if status == kernels.BAD_TIME:
-        return MonitorError(
-            f"the time grid is not uniform: sample {position} lies at {times[position]:g} s, expected "
-            f"{position * program.step:g} s"
-        )
-    if status == kernels.BAD_SIGNAL:
-        signal, sample = divmod(position, program.samples)
-        return MonitorError(
-            f"signal {program.signals[signal]!r} is {buffer[position]} at {times[sample]:g} s"
-        )
-    predicate = program.checked[position]
-    place = program.places[predicate]
-    values = buffer[place.at(place.first) : place.at(place.last) + 1]
-    sample = place.first + int(np.flatnonzero(~np.isfinite(values))[0])
-    n = program.samples
-    known = {name: buffer[i * n + sample] for i, name in enumerate(program.signals)}
-    sides = ", ".join(
-        f"{side} = {float(side.evaluate(known)):g}"
-        for side in (predicate.left, predicate.right)
-        if side.signals
-    )
-    return MonitorError(
-        f"{predicate} has no finite value at {times[sample]:g} s, where {sides}; "
-        "keep the arguments of /, sqrt, log, exp and ^ where they are defined"
-    )
+    def batch(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Robustness at time 0 of many trajectories at once.
 
+        Args:
+            columns: samples of all trajectories by signal, shape (m, n) each.
 
-def _verdict(way: list[Waypoint], trajectory: Trajectory) -> Verdict:
-    sample = way[-1].sample
-    values = {name: column[sample].item() for name, column in trajectory.columns.items()}
-    return Verdict(way[0].value, trajectory.times[sample].item(), str(way[-1].formula), values)
+        Returns:
+            One robustness per trajectory, shape (m,).
+
+        Raises:
+            MonitorError: naming the trajectory and the signal that cannot be judged.
+        """
+        return fill_many(self._program, columns)
+
+    @property
+    def _end(self) -> float:
+        return (self.samples - 1) * self.step
+
+    def _take_buffer(self) -> NDArray[np.float64]:
+        return self._spare.pop() if self._spare else np.empty(self._program.size)
+
+    def _reach(self, part: Formula) -> int:
+        return round(part.horizon(self.step) / self.step)
+
+    def _values(
+        self, part: Formula, trajectory: Trajectory, first: int, last: int
+    ) -> NDArray[np.float64]:
+        program = compile_formula(part, step=self.step, samples=self.samples, first=first, last=last)
+        buffer = fill(program, trajectory, np.empty(program.size))
+        return program.root.over(buffer, first, last).copy()

@@ -1,40 +1,12 @@
-"""A formula compiled for one time grid.
+"""A compiled formula: the steps for the kernels, and where they leave the value of each part."""
 
-Every distinct sub-formula and expression gets the samples at which the formula's value needs it, a place in
-one flat buffer, and the steps that fill it. Nothing outside those samples is computed; a part that stands in
-a formula twice is computed once.
-"""
-
-import math
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.errors import FormulaError
-from falsifier.stl import opcodes as op
-from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, number_text
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Formula,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-)
-
-_BOUND_TOLERANCE = 1e-6  # of one sampling step
-_ARITHMETIC = {"+": op.ADD, "-": op.SUBTRACT, "*": op.MULTIPLY, "/": op.DIVIDE, "^": op.POWER}
-_FUNCTIONS = {
-    "abs": op.ABS, "sqrt": op.SQRT, "exp": op.EXP, "log": op.LOG, "sin": op.SIN, "cos": op.COS,
-    "min": op.MINIMUM, "max": op.MAXIMUM,
-}  # fmt: skip
-Node = Formula | Expression
+from falsifier.stl.formula import Formula, Predicate
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,296 +29,66 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
+class Part:
+    """A sub-formula and where its values lie.
+
+    Attributes:
+        formula: the sub-formula.
+        place: its samples and their offsets.
+        window: of a temporal operator, in samples from where it stands; without an end it reaches to the last
+            sample of all.
+        samples: samples of one trajectory.
+        children: parts directly below.
+    """
+
+    formula: Formula
+    place: Place
+    window: tuple[int, int | None] | None
+    samples: int
+    children: tuple["Part", ...]
+
+    def at(self, buffer: NDArray[np.float64], sample: int) -> float:
+        """Robustness at a sample."""
+        return buffer.item(self.place.base + sample)
+
+    def over(self, buffer: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
+        """Robustness at the samples from first to last."""
+        return buffer[self.place.base + first : self.place.base + last + 1]
+
+    def window_at(self, sample: int) -> tuple[int, int] | None:
+        """First and last sample that a temporal operator looks at from here."""
+        if self.window is None:
+            return None
+        start, end = self.window
+        return sample + start, self.samples - 1 if end is None else sample + end
+
+    def walk(self) -> Iterator["Part"]:
+        """Yield this part and all below it, from left to right."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+@dataclass(frozen=True, slots=True)
 class Program:
     """Steps for the kernels, and where they leave the value of each part.
 
     Attributes:
-        formula: what is computed.
+        root: the whole formula.
         signals: names in the order in which the buffer holds them.
         step: sampling step in s.
         samples: samples of one trajectory.
         rows: steps as described in opcodes, shape (r, 6).
         numbers: two constants for each step, shape (r, 2).
         size: length of the buffer.
-        places: where the values of each distinct formula and expression lie.
-        checked: the predicate that each checking row looks at.
+        checked: the predicate that each checking row looks at, and its place.
     """
 
-    formula: Formula
+    root: Part
     signals: tuple[str, ...]
     step: float
     samples: int
     rows: NDArray[np.int64]
     numbers: NDArray[np.float64]
     size: int
-    places: dict[Node, Place]
-    checked: dict[int, Predicate]
-
-
-def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 0) -> Program:
-    """Compile a formula for trajectories of one grid.
-
-    Args:
-        formula: what to compute.
-        step: sampling step in s.
-        samples: number of samples of a trajectory.
-        last: the formula's value is computed at the samples 0 to last.
-
-    Raises:
-        FormulaError: naming the window that reaches past the end or is no multiple of the step.
-    """
-    compiler = _Compiler(formula, step, samples, size=len(formula.signals) * samples)
-    compiler.demand(formula, 0, last)
-    compiler.place(formula)
-    return compiler.program()
-
-
-def window_samples(window: Window, step: float) -> tuple[int, int]:
-    """Bounds of a window in samples.
-
-    Raises:
-        FormulaError: when a bound is not a multiple of the step.
-    """
-    start, end = (_bound_samples(bound, window, step) for bound in (window.start, window.end))
-    return start, end
-
-
-def _bound_samples(bound: float, window: Window, step: float) -> int:
-    nearest = round(bound / step)
-    if abs(bound / step - nearest) > _BOUND_TOLERANCE:
-        raise FormulaError(
-            f"the bound {number_text(bound)} s of the window {window} is not a multiple of the sampling step "
-            f"{number_text(step)} s; the nearest multiple is {number_text(round(nearest * step, 12))} s"
-        )
-    return nearest
-
-
-@dataclass(slots=True)
-class _Compiler:
-    formula: Formula
-    step: float
-    samples: int
-    needs: dict[Node, tuple[int, int]] = field(default_factory=dict)
-    places: dict[Node, Place] = field(default_factory=dict)
-    rows: list[tuple[int, int, int, int, int, int]] = field(default_factory=list)
-    numbers: list[tuple[float, float]] = field(default_factory=list)
-    checked: dict[int, Predicate] = field(default_factory=dict)
-    size: int = 0
-
-    # -- where each part is needed -----------------------------------------------------------------------
-
-    def demand(self, node: Node, first: int, last: int) -> None:
-        """Note that a part is needed at the samples from first to last, and all that this needs below it."""
-        if last >= self.samples:
-            self._fail_past_end(node, last)
-        reach = (first, last)
-        if isinstance(node, Always | Eventually | Until) and node.window is None:
-            reach = (first, self.samples - 1)
-        elif isinstance(node, Always | Eventually | Until) and node.window:
-            start, end = window_samples(node.window, self.step)
-            if last + end >= self.samples:
-                self._fail_past_end(node, last + end)
-            reach = (first if isinstance(node, Until) else first + start, last + end)
-        elif isinstance(node, Next):
-            reach = (first + 1, last + 1)
-        seen = self.needs.get(node, (first, last))
-        self.needs[node] = (min(seen[0], first), max(seen[1], last))
-        for part in _parts(node):
-            self.demand(part, *reach)
-
-    def _fail_past_end(self, node: Node, last: int) -> None:
-        end = (self.samples - 1) * self.step
-        window = getattr(node, "window", None)
-        what = f"the window {window} of {node}" if window else f"{node}"
-        hint = "shorten the windows or simulate longer"
-        if any(isinstance(f, Always | Eventually | Until) and f.window is None for f in self.formula.walk()):
-            hint += "; an operator without a window reaches to the stop time: give it one that ends earlier"
-        raise FormulaError(
-            f"{what} is needed up to {number_text(round(last * self.step, 9))} s, but the trajectory ends at "
-            f"{number_text(round(end, 9))} s; {hint}"
-        )
-
-    # -- the steps ---------------------------------------------------------------------------------------
-
-    def place(self, node: Node) -> Place:
-        """Emit the steps of a part, once, and return where its values lie."""
-        if node not in self.places:
-            if isinstance(node, Expression):
-                self.places[node] = self._expression(node)
-            else:
-                self.places[node] = self._formula(node)
-        return self.places[node]
-
-    def _emit(
-        self,
-        code: int,
-        first: int,
-        second: int,
-        *,
-        length: int,
-        width: int = 0,
-        p: float = 0.0,
-        q: float = 0.0,
-    ) -> int:
-        """Append one step and return the offset of what it writes."""
-        self.rows.append((code, self.size, first, second, length, width))
-        self.numbers.append((p, q))
-        self.size += length
-        return self.size - length
-
-    def _expression(self, node: Expression) -> Place:
-        first, last = self.needs[node]
-        n = last - first + 1
-        if isinstance(node, Name):
-            return Place(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
-        if not node.signals:
-            return Place(self._emit(op.FILL, 0, 0, length=n, q=_constant(node)) - first, first, last)
-        if isinstance(node, Arithmetic):
-            offset = self._arithmetic(node, first, n)
-        elif isinstance(node, Negative):
-            offset = self._emit(op.SCALE, self.place(node.operand).at(first), 0, length=n, p=-1.0)
-        else:
-            offset = self._call(node, first, n)
-        return Place(offset - first, first, last)
-
-    def _call(self, node: Expression, first: int, n: int) -> int:
-        assert isinstance(node, Call)
-        code = _FUNCTIONS[node.function]
-        offsets = [self.place(operand).at(first) for operand in node.operands]
-        if len(offsets) == 1:
-            return self._emit(code, offsets[0], 0, length=n)
-        offset = offsets[0]
-        for other in offsets[1:]:
-            offset = self._emit(code, offset, other, length=n)
-        return offset
-
-    def _arithmetic(self, node: Arithmetic, first: int, n: int) -> int:
-        left, right, operator = node.left, node.right, node.operator
-        if operator == "^" and not right.signals and _constant(right) == 2:
-            base = self.place(left).at(first)
-            return self._emit(op.MULTIPLY, base, base, length=n)
-        if not right.signals and operator in "+-*":
-            c = _constant(right)
-            p, q = (c, 0.0) if operator == "*" else (1.0, c if operator == "+" else -c)
-            return self._emit(op.SCALE, self.place(left).at(first), 0, length=n, p=p, q=q)
-        if not left.signals and operator in "+-*":
-            c = _constant(left)
-            p, q = (c, 0.0) if operator == "*" else (1.0 if operator == "+" else -1.0, c)
-            return self._emit(op.SCALE, self.place(right).at(first), 0, length=n, p=p, q=q)
-        a, b = self.place(left).at(first), self.place(right).at(first)
-        return self._emit(_ARITHMETIC[operator], a, b, length=n)
-
-    def _predicate(self, node: Predicate, first: int, n: int) -> int:
-        left, right = (node.right, node.left) if node.operator in ("<", "<=") else (node.left, node.right)
-        difference = Arithmetic("-", left, right)
-        if difference.signals:
-            offset = self._arithmetic(difference, first, n)
-        else:
-            offset = self._emit(op.FILL, 0, 0, length=n, q=_constant(difference))
-        if node.operator in ("==", "!="):
-            offset = self._emit(op.ABS, offset, 0, length=n)
-        if node.operator == "==":
-            offset = self._negated(offset, n)
-        self.checked[len(self.rows)] = node
-        self._emit(op.CHECK, offset, 0, length=n)
-        self.size -= n
-        return offset
-
-    def _negated(self, offset: int, n: int) -> int:
-        return self._emit(op.SCALE, offset, 0, length=n, p=-1.0)
-
-    def _formula(self, node: Formula) -> Place:
-        first, last = self.needs[node]
-        n = last - first + 1
-        if isinstance(node, Predicate):
-            return Place(self._predicate(node, first, n) - first, first, last)
-        if isinstance(node, Next):
-            below = self.place(node.operand)
-            return Place(below.base + 1, first, last)
-        if isinstance(node, Always | Eventually):
-            return self._window(node, first, last)
-        if isinstance(node, Until):
-            return self._until(node, first, last)
-        sides = [self.place(child).at(first) for child in node.children]
-        if isinstance(node, Not):
-            offset = self._negated(sides[0], n)
-        elif isinstance(node, And):
-            offset = self._emit(op.MINIMUM, *sides, length=n)
-        elif isinstance(node, Or):
-            offset = self._emit(op.MAXIMUM, *sides, length=n)
-        elif isinstance(node, Implies):
-            offset = self._implication(sides[0], sides[1], n)
-        else:
-            offset = self._emit(
-                op.MINIMUM,
-                self._implication(sides[0], sides[1], n),
-                self._implication(sides[1], sides[0], n),
-                length=n,
-            )
-        return Place(offset - first, first, last)
-
-    def _implication(self, left: int, right: int, n: int) -> int:
-        return self._emit(op.MAXIMUM, self._negated(left, n), right, length=n)
-
-    def _window(self, node: Always | Eventually, first: int, last: int) -> Place:
-        below = self.place(node.operand)
-        is_always = isinstance(node, Always)
-        code = op.WINDOW_MINIMUM if is_always else op.WINDOW_MAXIMUM
-        start, end = window_samples(node.window, self.step) if node.window else (0, self.samples - 1 - first)
-        if node.window is None and first < last:
-            code, last = (op.REST_MINIMUM if is_always else op.REST_MAXIMUM), self.samples - 1
-            offset = self._emit(code, below.at(first), 0, length=last - first + 1)
-        else:
-            offset = self._emit(code, below.at(first + start), 0, length=last - first + 1, width=end - start)
-        return Place(offset - first, first, last)
-
-    def _until(self, node: Until, first: int, last: int) -> Place:
-        """Emit until as: left up to the window, then both within it, and until itself from there to the end.
-
-        Beyond its window an unbounded until only says that left goes on holding, so the three together are
-        the bounded one.
-        """
-        left, right = (self.place(child) for child in node.children)
-        if node.window is None:
-            n = self.samples - first
-            both = self._emit(op.MINIMUM, left.at(first), right.at(first), length=n)
-            offset = self._emit(op.UNTIL, left.at(first), both, length=n)
-            return Place(offset - first, first, self.samples - 1)
-        n = last - first + 1
-        start, end = window_samples(node.window, self.step)
-        begin, width = first + start, end - start
-        both = self._emit(op.MINIMUM, left.at(begin), right.at(begin), length=n + width)
-        until = self._emit(op.UNTIL, left.at(begin), both, length=n + width)
-        soon = self._emit(op.WINDOW_MAXIMUM, both, 0, length=n, width=width)
-        offset = self._emit(op.MINIMUM, until, soon, length=n)
-        if start > 0:
-            before = self._emit(op.WINDOW_MINIMUM, left.at(first), 0, length=n, width=start - 1)
-            offset = self._emit(op.MINIMUM, before, offset, length=n)
-        return Place(offset - first, first, last)
-
-    def program(self) -> Program:
-        """Return what was compiled."""
-        return Program(
-            self.formula,
-            self.formula.signals,
-            self.step,
-            self.samples,
-            np.array(self.rows, dtype=np.int64).reshape(-1, 6),
-            np.array(self.numbers, dtype=np.float64).reshape(-1, 2),
-            self.size,
-            self.places,
-            self.checked,
-        )
-
-
-def _constant(node: Expression) -> float:
-    value = float(node.evaluate({}))
-    if not math.isfinite(value):
-        raise FormulaError(f"the constant {node} has no finite value")
-    return value
-
-
-def _parts(node: Node) -> tuple[Node, ...]:
-    if isinstance(node, Expression):
-        return node.operands
-    return (node.left, node.right) if isinstance(node, Predicate) else node.children
+    checked: dict[int, tuple[Predicate, Place]]

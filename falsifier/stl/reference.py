@@ -37,7 +37,7 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.stl.program import window_samples
+from falsifier.stl.compiler import window_samples
 from falsifier.trajectory import Trajectory
 
 

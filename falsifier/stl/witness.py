@@ -2,32 +2,21 @@
 
 At each operator the way goes to the operand whose value became the operator's value. Ties go to the earliest
 sample and to the left operand; ``or`` and ``->`` are read as their negated conjunctions, which gives the left
-operand too.
+operand too. Until goes to its left operand only where that is strictly smaller.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Formula,
-    Iff,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-)
-from falsifier.stl.program import Program, window_samples
+from falsifier.stl.formula import Always, And, Eventually, Formula, Iff, Implies, Next, Not, Or, Until
+from falsifier.stl.program import Part
+
+Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Waypoint:
+class Waypoint(NamedTuple):
     """One formula on the way.
 
     Attributes:
@@ -40,96 +29,61 @@ class Waypoint:
     formula: Formula
     sample: int
     value: float
-    window: tuple[int, int] | None = None
+    window: tuple[int, int] | None
 
 
-def trace(program: Program, buffer: NDArray[np.float64], sample: int = 0) -> list[Waypoint]:
-    """Way from the program's formula at this sample to the predicate that decided its value.
+def trace(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoint]:
+    """Way from a compiled formula at this sample to the predicate that decided its value.
 
     Args:
-        program: the compiled formula.
+        part: the compiled formula.
         buffer: after the kernels filled it.
         sample: where the formula's value is asked for.
     """
-    values = Values(program, buffer)
     way: list[Waypoint] = []
-    formula: Formula | None = program.formula
-    while formula is not None:
-        window = values.window(formula, sample)
-        way.append(Waypoint(formula, sample, values.at(formula, sample), window))
-        formula, sample = _decider(values, formula, sample, window)
-    return way
+    while True:
+        window = part.window_at(sample)
+        way.append(Waypoint(part.formula, sample, part.at(buffer, sample), window))
+        if not part.children:
+            return way
+        part, sample = _decider(part, buffer, sample, window)
 
 
-@dataclass(frozen=True, slots=True)
-class Values:
-    """Values of the parts of a formula after an evaluation."""
-
-    program: Program
-    buffer: NDArray[np.float64]
-
-    def at(self, formula: Formula, sample: int) -> float:
-        """Robustness of a sub-formula at a sample."""
-        return float(self.buffer[self.program.places[formula].base + sample])
-
-    def over(self, formula: Formula, first: int, last: int) -> NDArray[np.float64]:
-        """Robustness of a sub-formula at the samples from first to last."""
-        base = self.program.places[formula].base
-        return self.buffer[base + first : base + last + 1]
-
-    def window(self, formula: Formula, sample: int) -> tuple[int, int] | None:
-        """First and last sample that a temporal operator looks at from here."""
-        if not isinstance(formula, Always | Eventually | Until):
-            return None
-        if formula.window is None:
-            return sample, self.program.samples - 1
-        start, end = window_samples(formula.window, self.program.step)
-        return sample + start, sample + end
+def _decider(part: Part, buffer: Floats, sample: int, window: tuple[int, int] | None) -> tuple[Part, int]:
+    kind, children = type(part.formula), part.children
+    if kind is Not:
+        return children[0], sample
+    if kind is Next:
+        return children[0], sample + 1
+    if window is not None and kind is Always:
+        return children[0], window[0] + int(children[0].over(buffer, *window).argmin())
+    if window is not None and kind is Eventually:
+        return children[0], window[0] + int(children[0].over(buffer, *window).argmax())
+    if window is not None and kind is Until:
+        return _decider_of_until(part, buffer, sample, window)
+    return children[_side(kind, *(child.at(buffer, sample) for child in children))], sample
 
 
-def _decider(
-    values: Values, formula: Formula, sample: int, window: tuple[int, int] | None
-) -> tuple[Formula | None, int]:
-    match formula:
-        case Predicate():
-            return None, sample
-        case Not(operand):
-            return operand, sample
-        case Next(operand):
-            return operand, sample + 1
-        case And(left, right):
-            return (left if values.at(left, sample) <= values.at(right, sample) else right), sample
-        case Or(left, right):
-            return (left if values.at(left, sample) >= values.at(right, sample) else right), sample
-        case Implies(left, right):
-            return (left if -values.at(left, sample) >= values.at(right, sample) else right), sample
-        case Iff(left, right):
-            return _decider_of_iff(values, left, right, sample), sample
-        case Always(operand) if window:
-            return operand, window[0] + int(values.over(operand, *window).argmin())
-        case Eventually(operand) if window:
-            return operand, window[0] + int(values.over(operand, *window).argmax())
-        case Until(left, right) if window:
-            return _decider_of_until(values, left, right, sample, window)
-    raise TypeError(f"not a formula: {formula!r}")
+def _side(kind: type[Formula], left: float, right: float) -> int:
+    """Which operand decided, 0 for the left one."""
+    if kind is And:
+        return int(left > right)
+    if kind is Or:
+        return int(left < right)
+    if kind is Implies:
+        return int(-left < right)
+    if kind is Iff:
+        is_forward = max(-left, right) <= max(-right, left)
+        return int(-left < right) if is_forward else int(-right >= left)
+    raise TypeError(f"{kind.__name__} has no two sides")
 
 
-def _decider_of_iff(values: Values, left: Formula, right: Formula, sample: int) -> Formula:
-    a, b = values.at(left, sample), values.at(right, sample)
-    forward, backward = max(-a, b), max(-b, a)
-    if forward <= backward:
-        return left if -a >= b else right
-    return right if -b >= a else left
-
-
-def _decider_of_until(
-    values: Values, left: Formula, right: Formula, sample: int, window: tuple[int, int]
-) -> tuple[Formula, int]:
-    """Left at its smallest up to the best end of the window where that is the smaller, else right there."""
+def _decider_of_until(part: Part, buffer: Floats, sample: int, window: tuple[int, int]) -> tuple[Part, int]:
     first, last = window
-    lefts = values.over(left, sample, last)
+    left, right = part.children
+    lefts = left.over(buffer, sample, last)
     lowest = np.minimum.accumulate(lefts)[first - sample :]
-    rights = values.over(right, first, last)
+    rights = right.over(buffer, first, last)
     best = int(np.minimum(lowest, rights).argmax())
     if lowest[best] < rights[best]:
         return left, sample + int(lefts[: first - sample + best + 1].argmin())

@@ -1,0 +1,189 @@
+"""Why a robustness value is what it is, for people, prompts and plots."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.stl.expression import Expression, Number
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+)
+from falsifier.stl.program import Part
+from falsifier.stl.witness import trace
+from falsifier.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One formula on the way to the predicate that decided.
+
+    Attributes:
+        formula: the formula.
+        time: where its value was asked for, in s.
+        value: its robustness there.
+        window: begin and end in s of what its operator looked at; None without a window.
+        text: what happened here, in words.
+    """
+
+    formula: Formula
+    time: float
+    value: float
+    window: tuple[float, float] | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Vacuity:
+    """An implication whose left side was never true at any time at which it was asked.
+
+    Attributes:
+        implication: the implication.
+        window: first and last time in s at which it was asked.
+        nearest: time in s at which the left side came nearest to being true.
+        margin: robustness of the left side there.
+        only: whether the implication held only for that reason, as its right side failed somewhere.
+    """
+
+    implication: Implies
+    window: tuple[float, float]
+    nearest: float
+    margin: float
+    only: bool
+
+    @property
+    def text(self) -> str:
+        """The finding in words."""
+        over = _moment(self.window)
+        near = f"it came nearest at {_s(self.nearest)}, missing by {_n(-self.margin)}"
+        if self.only:
+            return f"vacuous: {self.implication} held {over} only because its left side was never true; {near}"
+        return f"the left side of {self.implication} was never true {over}; {near}"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The way from a formula to the predicate that decided its value.
+
+    Attributes:
+        robustness: of the formula at time 0.
+        critical_time: time in s that decided it.
+        path: from the formula down to the deciding predicate.
+        vacuities: implications whose left side was never true.
+    """
+
+    robustness: float
+    critical_time: float
+    path: tuple[Step, ...]
+    vacuities: tuple[Vacuity, ...] = ()
+
+    @property
+    def vacuous(self) -> bool:
+        """Whether an implication held only because its left side was never true."""
+        return any(v.only for v in self.vacuities)
+
+    @property
+    def text(self) -> str:
+        """The way in words, and what was vacuous."""
+        way = ", where ".join(step.text for step in self.path)
+        return ". ".join((way, *(v.text for v in self.vacuities))) + "."
+
+
+def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
+    """Diagnosis of an evaluated formula.
+
+    Args:
+        root: the compiled formula.
+        buffer: values of all its parts.
+        trajectory: what was judged.
+    """
+    times = trajectory.times
+    way = trace(root, buffer)
+    steps = []
+    for here, following in zip(way, [*way[1:], way[-1]], strict=True):
+        window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
+        text = _words(here.formula, following.formula, window, float(times[following.sample]), here.value)
+        if isinstance(here.formula, Predicate):
+            text = _judged(here.formula, here.value, trajectory.at(float(times[here.sample])))
+        steps.append(Step(here.formula, float(times[here.sample]), here.value, window, text))
+    vacuities = {
+        v.implication: v for part in root.walk() for v in [_vacuity(part, buffer, times)] if v is not None
+    }
+    critical = float(times[way[-1].sample])
+    return Diagnosis(way[0].value, critical, tuple(steps), tuple(vacuities.values()))
+
+
+def _vacuity(part: Part, buffer: NDArray[np.float64], times: NDArray[np.float64]) -> Vacuity | None:
+    if not isinstance(part.formula, Implies):
+        return None
+    first, last = part.place.first, part.place.last
+    lefts, rights = (child.over(buffer, first, last) for child in part.children)
+    nearest = int(lefts.argmax())
+    if lefts[nearest] >= 0:
+        return None
+    window = (float(times[first]), float(times[last]))
+    return Vacuity(
+        part.formula, window, float(times[first + nearest]), float(lefts[nearest]), bool((rights < 0).any())
+    )
+
+
+def _words(
+    formula: Formula, decider: Formula, window: tuple[float, float] | None, time: float, value: float
+) -> str:
+    match formula:
+        case Always():
+            return f"G {_over(window)} was worst at {_s(time)}"
+        case Eventually():
+            return f"F {_over(window)} was best at {_s(time)}"
+        case Until(left, _):
+            side = "left" if decider is left else "right"
+            return f"U {_over(window)} was decided by its {side} side at {_s(time)}"
+        case Next():
+            return f"X looked at {_s(time)}"
+        case Not():
+            return f"not {'holds' if value >= 0 else 'fails'}"
+        case Implies(left, _):
+            return "the condition of -> decided" if decider is left else "the consequence of -> decided"
+        case And(left, _) | Or(left, _) | Iff(left, _):
+            name = {And: "and", Or: "or", Iff: "<->"}[type(formula)]
+            return f"the {'left' if decider is left else 'right'} side of '{name}' decided"
+    return ""
+
+
+def _judged(predicate: Predicate, value: float, values: dict[str, float]) -> str:
+    left, right = (_valued(side, values) for side in (predicate.left, predicate.right))
+    outcome = f"misses by {_n(-value)}" if value < 0 else f"holds by {_n(value)}"
+    if value == 0:
+        outcome = "holds with nothing to spare"
+    return f"{left} {predicate.operator} {right} {outcome}"
+
+
+def _valued(side: Expression, values: dict[str, float]) -> str:
+    return str(side) if isinstance(side, Number) else f"{side} = {_n(float(side.evaluate(values)))}"
+
+
+def _over(window: tuple[float, float] | None) -> str:
+    start, end = window or (0.0, 0.0)
+    return f"over [{_n(start)}, {_n(end)}] s"
+
+
+def _moment(window: tuple[float, float]) -> str:
+    return f"at {_s(window[0])}" if window[0] == window[1] else _over(window)
+
+
+def _s(time: float) -> str:
+    return f"{_n(time)} s"
+
+
+def _n(value: float) -> str:
+    return f"{value:.6g}"

@@ -1,0 +1,145 @@
+"""Formulas read aloud, for prompts and reports."""
+
+from falsifier.stl.expression import Arithmetic, Call, Number
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Comparison,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+    is_flag,
+)
+
+_IS: dict[Comparison, str] = {
+    "<": "is below",
+    "<=": "is at most",
+    ">": "is above",
+    ">=": "is at least",
+    "==": "equals",
+    "!=": "differs from",
+}
+_OPPOSITE: dict[Comparison, Comparison] = {
+    "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
+}  # fmt: skip
+_MIRRORED: dict[Comparison, Comparison] = {
+    "<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!=",
+}  # fmt: skip
+
+
+def in_words(formula: Formula) -> str:
+    """One plain sentence that says what a formula demands.
+
+    >>> from falsifier.stl import parse
+    >>> print(in_words(parse("G[0,20] (speed <= 120)")))
+    At all times from 0 to 20 s, speed is at most 120.
+    """
+    text = _read(formula, later=False)
+    return text[0].upper() + text[1:] + "." if not formula.signals or not _starts_with_name(formula) else text + "."
+
+
+def _starts_with_name(formula: Formula) -> bool:
+    while formula.children:
+        if not isinstance(formula, And | Or | Iff | Until | Not):
+            return False
+        formula = formula.children[0]
+    return True
+
+
+def _read(formula: Formula, *, later: bool) -> str:
+    """Read a formula; times count from the beginning or, later, from wherever the formula stands."""
+    match formula:
+        case Predicate():
+            return _predicate(formula)
+        case Not(Predicate() as predicate):
+            return _negated(predicate)
+        case Not(operand):
+            return f"it is not so that {_part(operand, later=later)}"
+        case And(Predicate() as low, Predicate() as high) if _is_chain(low, high):
+            return f"{low.right} lies between {low.left} and {high.right}"
+        case And(left, right):
+            return f"{_part(left, later=later, within=And)} and {_part(right, later=later, within=And)}"
+        case Or(left, right):
+            return f"{_part(left, later=later, within=Or)} or {_part(right, later=later, within=Or)}"
+        case Implies(left, right):
+            return f"if {_part(left, later=later)}, then {_part(right, later=later)}"
+        case Iff(left, right):
+            return f"{_part(left, later=later)} exactly when {_part(right, later=later)}"
+        case Always(operand, window):
+            return f"{_throughout(window, later=later)}, {_read(operand, later=True)}"
+        case Eventually(operand, window):
+            return f"{_sometime(window, later=later)}, {_read(operand, later=True)}"
+        case Until(left, right, window):
+            end = _sometime(window, later=later).replace("at some time ", "")
+            return f"{_part(left, later=True)} until, {end}, {_part(right, later=True)}"
+        case Next(operand):
+            return f"at the next sample, {_read(operand, later=True)}"
+    raise TypeError(f"not a formula: {formula!r}")
+
+
+def _part(formula: Formula, *, later: bool, within: type[Formula] | None = None) -> str:
+    """Read an operand, in parentheses where its own words could run into its neighbour's."""
+    text = _read(formula, later=later)
+    is_plain = isinstance(formula, Predicate | within) if within else isinstance(formula, Predicate)
+    is_range = isinstance(formula, And) and "lies between" in text and " and " not in text.split(" and ", 1)[1]
+    is_negated = isinstance(formula, Not) and isinstance(formula.operand, Predicate)
+    return text if is_plain or is_range or is_negated else f"({text})"
+
+
+def _predicate(predicate: Predicate) -> str:
+    left, operator, right = predicate.left, predicate.operator, predicate.right
+    if is_flag(predicate):
+        return f"{left} is true"
+    if isinstance(left, Number) and not isinstance(right, Number):
+        left, operator, right = right, _MIRRORED[operator], left
+    match left, operator:
+        case Call("abs", (Arithmetic("-", a, b),)), "<" | "<=":
+            return f"{a} is within {right} of {b}"
+        case Call("abs", (Arithmetic("-", a, b),)), ">" | ">=":
+            return f"{a} is {right} or more away from {b}"
+    return f"{left} {_IS[operator]} {right}"
+
+
+def _negated(predicate: Predicate) -> str:
+    if is_flag(predicate):
+        return f"{predicate.left} is false"
+    return _predicate(Predicate(_OPPOSITE[predicate.operator], predicate.left, predicate.right))
+
+
+def _is_chain(low: Predicate, high: Predicate) -> bool:
+    return low.operator == high.operator == "<=" and low.right == high.left
+
+
+def _throughout(window: Window | None, *, later: bool) -> str:
+    if window is None:
+        return "from then on" if later else "at all times"
+    if window.start == window.end:
+        return _moment(window.start, later=later)
+    if later and window.start == 0:
+        return f"throughout the next {window.end:g} s"
+    return f"at all times {_between(window, later=later)}"
+
+
+def _sometime(window: Window | None, *, later: bool) -> str:
+    if window is None:
+        return "at some later time" if later else "at some time"
+    if window.start == window.end:
+        return _moment(window.start, later=later)
+    if later and window.start == 0:
+        return f"at some time within the next {window.end:g} s"
+    return f"at some time {_between(window, later=later)}"
+
+
+def _between(window: Window, *, later: bool) -> str:
+    return f"from {window.start:g} to {window.end:g} s{' later' if later else ''}"
+
+
+def _moment(time: float, *, later: bool) -> str:
+    return f"{time:g} s later" if later else f"at {time:g} s"
