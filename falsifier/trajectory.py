@@ -18,11 +18,13 @@ class Trajectory:
         times: sample times in s, shape (n,), from 0 with a constant step.
         columns: one array of shape (n,) per signal, by name; Booleans and integers as numbers.
         units: unit by signal name, where known.
+        log: what the model said while it was simulated.
     """
 
     times: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.float64]]
     units: Mapping[str, str] = field(default_factory=dict)
+    log: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, column in self.columns.items():
@@ -66,7 +68,7 @@ class Trajectory:
         self, columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str] | None = None
     ) -> "Trajectory":
         """Return this trajectory with further columns behind its own."""
-        return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})})
+        return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})}, self.log)
 
     def save(self, path: Path) -> None:
         """Write the trajectory as a numpy archive."""

@@ -1,0 +1,182 @@
+"""FMU archives: checked before anything in them is written to disk or loaded."""
+
+import hashlib
+import platform
+import stat
+import sys
+import zipfile
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from falsifier.errors import ModelError
+
+# Far above what exporters write (a few MB, some hundred with tables), far below what fills a disk.
+_MOST_BYTES = 8 << 30
+_MOST_FILES = 100_000
+# Text deflates by 5 to 20, a file of zeros by 1000: only a bomb is both large and that dense.
+_DENSEST = 300
+_DENSE_FROM_BYTES = 256 << 20
+
+_SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows", "cygwin": "windows"}
+_MACHINES = {
+    "amd64": "x86_64",
+    "x86_64": "x86_64",
+    "i386": "x86",
+    "i686": "x86",
+    "x86": "x86",
+    "arm64": "aarch64",
+    "aarch64": "aarch64",
+}
+# Folder names of FMI 1 and 2 in the words of FMI 3; FMI 2 has no name for ARM, tools write these.
+_OLD_PLATFORMS = {
+    "linux64": "x86_64-linux",
+    "linux32": "x86-linux",
+    "win64": "x86_64-windows",
+    "win32": "x86-windows",
+    "darwin64": "x86_64-darwin",
+}
+_LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file as hexadecimal digits.
+
+    Raises:
+        ModelError: when the file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ModelError(f"{path}: cannot read the FMU ({error.strerror or error})") from error
+
+
+@contextmanager
+def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open an FMU whose entries have been checked.
+
+    Raises:
+        ModelError: when it is not a zip file, or would write outside its folder or fill the disk.
+    """
+    try:
+        archive = zipfile.ZipFile(path)
+    except FileNotFoundError:
+        raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
+    except (zipfile.BadZipFile, OSError) as error:
+        raise ModelError(f"{path}: not a readable FMU, which is a zip archive ({error})") from error
+    with archive:
+        _check(path, archive.infolist())
+        yield archive
+
+
+def read_entry(path: Path, name: str) -> bytes:
+    """One file of an FMU.
+
+    Raises:
+        ModelError: when the archive is refused or has no such file.
+    """
+    with open_archive(path) as archive:
+        try:
+            return archive.read(name)
+        except KeyError:
+            raise ModelError(
+                f"{path}: no {name} in the archive, so it is not an FMU; export the model again"
+            ) from None
+        except zipfile.BadZipFile as error:
+            raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
+
+
+def extract(path: Path, folder: Path) -> None:
+    """Unpack an FMU into a folder after the checks.
+
+    Raises:
+        ModelError: when the archive is refused, damaged, or the disk is full.
+    """
+    with open_archive(path) as archive:
+        try:
+            archive.extractall(folder)
+        except (zipfile.BadZipFile, OSError, RuntimeError) as error:
+            raise ModelError(f"{path}: cannot unpack the FMU into {folder} ({error})") from error
+
+
+def entry_names(path: Path) -> tuple[str, ...]:
+    """Names of all files in an FMU, with forward slashes."""
+    with open_archive(path) as archive:
+        return tuple(archive.namelist())
+
+
+def platforms(names: Iterable[str]) -> tuple[str, ...]:
+    """Platforms that the entries carry a library for, in the words of FMI 3 (``x86_64-linux``)."""
+    found = set()
+    for name in names:
+        parts = PurePosixPath(name).parts
+        if len(parts) == 3 and parts[0] == "binaries":
+            found.add(_OLD_PLATFORMS.get(parts[1], parts[1]))
+    return tuple(sorted(found))
+
+
+def this_platform() -> str:
+    """Platform of this Python in the words of FMI 3."""
+    machine = platform.machine().lower()
+    system = _SYSTEMS.get(sys.platform, sys.platform)
+    return f"{_MACHINES.get(machine, machine)}-{system}"
+
+
+def binary_folder(fmi_version: str) -> str:
+    """Folder below ``binaries`` that an FMU of this version has for this platform."""
+    here = this_platform()
+    if fmi_version.startswith("3"):
+        return here
+    return next((old for old, new in _OLD_PLATFORMS.items() if new == here), here)
+
+
+def library_file(fmi_version: str, identifier: str) -> PurePosixPath:
+    """Path of this platform's library inside an FMU."""
+    suffix = _LIBRARY_SUFFIX.get(_SYSTEMS.get(sys.platform, ""), ".so")
+    return PurePosixPath("binaries", binary_folder(fmi_version), identifier + suffix)
+
+
+def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
+    if len(entries) > _MOST_FILES:
+        raise ModelError(
+            f"{path}: refused, it holds {len(entries)} files (at most {_MOST_FILES} are unpacked)"
+        )
+    total = sum(entry.file_size for entry in entries)
+    if total > _MOST_BYTES:
+        raise ModelError(
+            f"{path}: refused, it would unpack to {total / 2**30:.1f} GiB (at most {_MOST_BYTES >> 30} GiB)"
+        )
+    for name, count in Counter(entry.filename for entry in entries).items():
+        if count > 1:
+            raise ModelError(f"{path}: refused, it holds {name!r} {count} times")
+    for entry in entries:
+        _check_entry(path, entry)
+
+
+def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
+    # zipfile cuts names at NUL and turns backslashes on Windows only: judge the name as it was written.
+    written = entry.orig_filename.replace("\\", "/")
+    if (
+        written.startswith("/")
+        or ":" in written.split("/")[0]
+        or ".." in written.split("/")
+        or "\0" in written
+    ):
+        raise ModelError(
+            f"{path}: refused, its entry {entry.orig_filename!r} would be written outside the folder it is "
+            "unpacked to"
+        )
+    if stat.S_ISLNK(entry.external_attr >> 16):
+        raise ModelError(f"{path}: refused, its entry {entry.filename!r} is a symbolic link")
+    if entry.flag_bits & 0x1:
+        raise ModelError(
+            f"{path}: its entry {entry.filename!r} is encrypted; export the FMU without a password"
+        )
+    dense = entry.file_size > _DENSEST * max(entry.compress_size, 1)
+    if dense and entry.file_size > _DENSE_FROM_BYTES:
+        raise ModelError(
+            f"{path}: refused, its entry {entry.filename!r} grows from {entry.compress_size} to "
+            f"{entry.file_size} bytes"
+        )

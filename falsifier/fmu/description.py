@@ -1,0 +1,379 @@
+"""What an FMU says of itself: modelDescription.xml as plain values.
+
+Element and attribute names are those of the FMI standards 1.0.1, 2.0.5 and 3.0.2.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import cast
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from falsifier.errors import ModelError, did_you_mean
+from falsifier.fmu import archive
+from falsifier.model import Causality, Interface, Kind, ModelInfo, Variable
+
+# Element name -> (kind, type code). A type code is how the FMU's get and set functions pass the value.
+_TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
+    "Real": ("real", "Real"),
+    "Integer": ("integer", "Integer"),
+    "Boolean": ("boolean", "Boolean"),
+    "Enumeration": ("enumeration", "Integer"),
+    "String": ("string", "String"),
+}
+_TYPES_3: Mapping[str, tuple[Kind, str]] = {
+    "Float64": ("real", "Float64"),
+    "Float32": ("real", "Float32"),
+    **{f"{sign}Int{bits}": ("integer", f"{sign}Int{bits}") for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    "Boolean": ("boolean", "Boolean"),
+    "Enumeration": ("enumeration", "Int64"),
+    "String": ("string", "String"),
+}
+_CAUSALITIES: Mapping[str, Causality] = {
+    "input": "input",
+    "output": "output",
+    "parameter": "parameter",
+    "structuralParameter": "parameter",
+    "calculatedParameter": "calculatedParameter",
+    "independent": "independent",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """Where one scalar lives in the FMU.
+
+    Attributes:
+        reference: value reference of the variable or, for an element, of its array.
+        type: type code, e.g. ``Real``, ``Float32``, ``Boolean``.
+        offset: position in the array in row-major order, 0 for scalars.
+        size: number of elements of the array, 1 for scalars.
+        negated: an FMI 1 alias with the opposite sign.
+        refusal: why it cannot be set, empty where it can.
+    """
+
+    reference: int
+    type: str
+    offset: int = 0
+    size: int = 1
+    negated: bool = False
+    refusal: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A modelDescription.xml.
+
+    Attributes:
+        info: what the other layers need.
+        token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
+        identifiers: file name of the library without suffix, by interface.
+        slots: where each scalar variable lives, by name.
+        arrays: start values of all elements by value reference, for arrays only.
+        event_mode: whether a co-simulation FMU can be driven in event mode (FMI 3).
+        needs_tool: names of interfaces that need the exporting tool to be installed.
+    """
+
+    info: ModelInfo
+    token: str
+    identifiers: Mapping[Interface, str]
+    slots: Mapping[str, Slot]
+    arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+    event_mode: bool = False
+    needs_tool: tuple[Interface, ...] = ()
+
+    @property
+    def major(self) -> int:
+        """Major FMI version: 1, 2 or 3."""
+        return int(self.info.fmi_version[0])
+
+    def slot(self, name: str) -> Slot:
+        """Where a variable that is a number lives.
+
+        Raises:
+            ModelError: for an unknown name or a string, with the nearest names.
+        """
+        if name not in self.slots:
+            raise ModelError(f"{self.info.name}: no variable {name!r}; {did_you_mean(name, self.slots)}")
+        if self.slots[name].type == "String":
+            raise ModelError(f"{self.info.name}: {name!r} is a string; only numbers can be simulated with")
+        return self.slots[name]
+
+
+def read_info(path: str | Path) -> ModelInfo:
+    """What an FMU says of itself, without loading its library.
+
+    Raises:
+        ModelError: when the file is not an FMU that this package understands.
+    """
+    return read_description(path).info
+
+
+def read_description(path: str | Path) -> Description:
+    """Description of an FMU; read once per file content.
+
+    Raises:
+        ModelError: when the file is not an FMU that this package understands.
+    """
+    path = Path(path)
+    return describe(path, archive.file_hash(path))
+
+
+@lru_cache(maxsize=32)
+def describe(path: Path, sha256: str) -> Description:
+    """Description of an FMU with this content hash, from memory where it was read before.
+
+    Raises:
+        ModelError: when the file is not an FMU that this package understands.
+    """
+    text = archive.read_entry(path, "modelDescription.xml")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ModelError(f"{path}: modelDescription.xml is not well-formed XML ({error})") from error
+    return parse(root, name=str(path), platforms=archive.platforms(archive.entry_names(path)))
+
+
+def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Description:
+    """Description of a parsed modelDescription.xml.
+
+    Args:
+        root: the ``fmiModelDescription`` element.
+        name: file name for error messages.
+        platforms: what the archive carries libraries for.
+
+    Raises:
+        ModelError: for versions other than 1, 2 and 3, and for missing or wrong attributes.
+    """
+    version = root.get("fmiVersion", "")
+    if version[:1] not in ("1", "2", "3"):
+        raise ModelError(f"{name}: fmiVersion is {version!r}; export it as FMI 1.0, 2.0 or 3.0")
+    try:
+        return _parse(root, version, platforms)
+    except (KeyError, ValueError, IndexError) as error:
+        raise ModelError(
+            f"{name}: modelDescription.xml does not follow FMI {version} ({type(error).__name__}: {error})"
+        ) from error
+
+
+def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Description:
+    major = int(version[0])
+    identifiers, needs_tool = _interfaces(root, major)
+    arrays: dict[int, tuple[float, ...]] = {}
+    variables: list[Variable] = []
+    slots: dict[str, Slot] = {}
+    for variable, slot in _variables_3(root, arrays) if major == 3 else _variables_1_2(root, major):
+        variables.append(variable)
+        slots[variable.name] = slot
+    experiment = _child(root, "DefaultExperiment")
+    co_simulation = root.find("CoSimulation")
+    info = ModelInfo(
+        name=root.attrib["modelName"],
+        description=root.get("description", ""),
+        fmi_version=version,
+        interfaces=tuple(identifiers),
+        platforms=platforms,
+        tool=root.get("generationTool", ""),
+        stop_time=_number(experiment.get("stopTime")),
+        step_size=_number(experiment.get("stepSize")),
+        tolerance=_number(experiment.get("tolerance")),
+        variables=tuple(variables),
+    )
+    return Description(
+        info=info,
+        token=root.get("instantiationToken" if major == 3 else "guid", ""),
+        identifiers=identifiers,
+        slots=slots,
+        arrays=arrays,
+        event_mode=co_simulation is not None and _flag(co_simulation.get("hasEventMode")),
+        needs_tool=needs_tool,
+    )
+
+
+def _interfaces(root: Element, major: int) -> tuple[dict[Interface, str], tuple[Interface, ...]]:
+    if major == 1:
+        implementation = root.find("Implementation")
+        interface: Interface = "model-exchange" if implementation is None else "co-simulation"
+        tool = implementation is not None and implementation.find("CoSimulation_Tool") is not None
+        return {interface: root.attrib["modelIdentifier"]}, (interface,) if tool else ()
+    found: dict[Interface, str] = {}
+    needs_tool: list[Interface] = []
+    names: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
+    for tag, interface in names.items():
+        element = root.find(tag)
+        if element is not None:
+            found[interface] = element.attrib["modelIdentifier"]
+            if _flag(element.get("needsExecutionTool")):
+                needs_tool.append(interface)
+    return found, tuple(needs_tool)
+
+
+def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]:
+    types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/*") if "name" in t.attrib}
+    elements = root.findall("ModelVariables/ScalarVariable")
+    states = _states_2(root, elements)
+    for position, element in enumerate(elements, start=1):
+        typed = next(child for child in element if child.tag in _TYPES_1_2)
+        kind, code = _TYPES_1_2[typed.tag]
+        declared = types.get(typed.get("declaredType", ""))
+        definition = None if declared is None else next(iter(declared), None)
+        attributes = {**({} if definition is None else definition.attrib), **typed.attrib}
+        causality, variability, refusal = _role(element, major, has_start=typed.get("start") is not None)
+        yield (
+            Variable(
+                name=element.attrib["name"],
+                kind=kind,
+                causality=causality,
+                variability=variability,
+                unit=attributes.get("unit", ""),
+                display_unit=attributes.get("displayUnit", ""),
+                low=_number(attributes.get("min")),
+                high=_number(attributes.get("max")),
+                nominal=_number(attributes.get("nominal")),
+                start=_start(kind, typed.get("start")),
+                settable=not refusal,
+                is_state=position in states,
+                literals=_literals(definition),
+                description=element.get("description", ""),
+            ),
+            Slot(
+                reference=int(element.attrib["valueReference"]),
+                type=code,
+                negated=element.get("alias") == "negatedAlias",
+                refusal=refusal,
+            ),
+        )
+
+
+def _states_2(root: Element, elements: list[Element]) -> set[int]:
+    """Positions from 1 of the continuous states (FMI 2; FMI 1 tells them at run time only)."""
+    states = set()
+    for unknown in root.findall("ModelStructure/Derivatives/Unknown"):
+        derivative = elements[int(unknown.attrib["index"]) - 1].find("Real")
+        if derivative is not None and derivative.get("derivative"):
+            states.add(int(derivative.attrib["derivative"]))
+    return states
+
+
+def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterator[tuple[Variable, Slot]]:
+    types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/*")}
+    elements = {int(e.attrib["valueReference"]): e for e in root.findall("ModelVariables/*")}
+    states = {
+        int(elements[int(d.attrib["valueReference"])].attrib["derivative"])
+        for d in root.findall("ModelStructure/ContinuousStateDerivative")
+    }
+    for reference, element in elements.items():
+        if element.tag not in _TYPES_3:
+            continue
+        kind, code = _TYPES_3[element.tag]
+        definition = types.get(element.get("declaredType", ""))
+        attributes = {**({} if definition is None else definition.attrib), **element.attrib}
+        starts = _starts_3(kind, element)
+        default = "continuous" if kind == "real" else "discrete"
+        causality, variability, refusal = _role(element, 3, default, has_start=bool(starts))
+        if element.get("clocks"):
+            refusal = "it belongs to a clock, and clocks are not supported"
+        shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
+        count = prod(shape)
+        starts = starts * count if len(starts) == 1 else starts
+        if shape and kind != "string":
+            arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
+        variable = Variable(
+            name=element.attrib["name"],
+            kind=kind,
+            causality=causality,
+            variability=variability,
+            unit=attributes.get("unit", ""),
+            display_unit=attributes.get("displayUnit", ""),
+            low=_number(attributes.get("min")),
+            high=_number(attributes.get("max")),
+            nominal=_number(attributes.get("nominal")),
+            settable=not refusal,
+            is_state=reference in states,
+            literals=_literals(definition),
+            description=element.get("description", ""),
+        )
+        names = [(variable.name, variable.description)]
+        names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
+        for name, description in names:
+            for offset, index in enumerate(product(*(range(1, n + 1) for n in shape))):
+                suffix = f"[{','.join(map(str, index))}]" if shape else ""
+                yield (
+                    replace(
+                        variable,
+                        name=name + suffix,
+                        description=description,
+                        start=starts[offset] if starts else None,
+                    ),
+                    Slot(reference, code, offset, count, refusal=refusal),
+                )
+
+
+def _role(
+    element: Element, major: int, default_variability: str = "continuous", *, has_start: bool
+) -> tuple[Causality, str, str]:
+    """Causality, variability and why the variable cannot be set (empty where it can)."""
+    causality = element.get("causality", "local")
+    variability = element.get("variability", default_variability)
+    if major == 1:
+        if variability == "parameter":
+            causality, variability = "parameter", "fixed"
+        refusal = "" if has_start or causality == "input" else "it has no start value, the model computes it"
+    elif causality in ("parameter", "input"):
+        if causality == "parameter":
+            variability = element.get("variability", "fixed")
+        refusal = ""
+    elif causality == "structuralParameter":
+        refusal = "it is a structural parameter, which sets array sizes"
+    elif causality == "calculatedParameter":
+        refusal = "it is a calculated parameter: the model computes it from other parameters, set those"
+    elif causality == "independent":
+        refusal = "it is the independent variable, time"
+    else:
+        initial = element.get("initial", "exact" if has_start else "calculated")
+        refusal = "" if initial in ("exact", "approx") else "the model computes its initial value"
+    if variability == "constant":
+        refusal = "it is a constant"
+    return _CAUSALITIES.get(causality, "local"), variability, refusal
+
+
+def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:
+    if "start" in dimension.attrib:
+        return int(dimension.attrib["start"])
+    return int(elements[int(dimension.attrib["valueReference"])].attrib["start"])
+
+
+def _starts_3(kind: Kind, element: Element) -> tuple[float | str | None, ...]:
+    if kind == "string":
+        return tuple(s.get("value", "") for s in element.findall("Start"))
+    return tuple(_start(kind, word) for word in element.get("start", "").split())
+
+
+def _start(kind: Kind, text: str | None) -> float | str | None:
+    if text is None or kind == "string":
+        return text
+    return float(_flag(text)) if kind == "boolean" else float(text)
+
+
+def _literals(definition: Element | None) -> dict[str, int]:
+    if definition is None:
+        return {}
+    items = definition.findall("Item")
+    return {item.attrib["name"]: int(item.get("value", k)) for k, item in enumerate(items, start=1)}
+
+
+def _child(root: Element, tag: str) -> Mapping[str, str]:
+    element = root.find(tag)
+    return {} if element is None else cast(Mapping[str, str], element.attrib)
+
+
+def _number(text: str | None) -> float | None:
+    return None if text is None else float(text)
+
+
+def _flag(text: str | None) -> bool:
+    return text is not None and text.strip() in ("true", "1")

@@ -1,0 +1,88 @@
+"""Simulating in this process: for benchmarks and tests, where a crash of the FMU may be a crash of all."""
+
+import atexit
+import shutil
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.errors import SimulationError
+from falsifier.fmu import archive
+from falsifier.fmu.order import Order, Reuse
+from falsifier.fmu.plan import Plan
+from falsifier.fmu.room import Room
+from falsifier.fmu.session import Session
+
+
+class LocalFmu:
+    """One FMU that is loaded into this process."""
+
+    def __init__(self, order: Order) -> None:
+        self._lock = threading.Lock()
+        self._log: list[str] = []
+        self._folder = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
+        try:
+            archive.extract(order.path, self._folder)
+            self._session = Session(order.description, self._folder, order.interface, self._log.append)
+        except BaseException:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+        self._plan: Plan | None = None
+        self._reuse: Reuse | None = order.reuse
+
+    def simulate(
+        self, plan: Plan, fill: Callable[[Room], None]
+    ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        """Simulate once; see IsolatedFmu.simulate."""
+        with self._lock:
+            if self._plan is not plan:
+                self._room = Room.over(plan, np.zeros(Room.size(plan)))
+                self._session.prepare(plan, self._room)
+                self._plan = plan
+            fill(self._room)
+            self._log.clear()
+            self._session.reuse = self._reuse or "instance"
+            try:
+                self._session.run()
+            except SimulationError as error:
+                raise SimulationError(
+                    str(error), status=error.status, time=error.time, log=tuple(self._log)
+                ) from None
+            log = tuple(self._log)
+            if self._reuse is None:
+                # A new process is not to be had here: a new instance comes nearest.
+                self._reuse = "reset" if self._session.find_reuse() == "reset" else "instance"
+            return self._room.outputs.copy(), log
+
+    def close(self) -> None:
+        """Unload the library and remove the folder."""
+        self._session.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+_FMUS: dict[tuple[str, str], LocalFmu] = {}
+
+
+def fmu(order: Order) -> LocalFmu:
+    """Return the loaded FMU of this process."""
+    key = (order.sha256, order.interface)
+    if key not in _FMUS:
+        _FMUS[key] = LocalFmu(order)
+    return _FMUS[key]
+
+
+def drop(sha256: str, interface: str) -> None:
+    """Unload an FMU, if it is loaded."""
+    found = _FMUS.pop((sha256, interface), None)
+    if found is not None:
+        found.close()
+
+
+@atexit.register
+def _close_all() -> None:
+    for key in list(_FMUS):
+        drop(*key)

@@ -1,0 +1,366 @@
+"""Simulating in other processes: the side that asks.
+
+One nursery per process that simulates, one worker per FMU and interface. A worker that crashes, hangs or
+leaks is replaced; what it was doing becomes a SimulationError.
+"""
+
+import atexit
+import contextlib
+import json
+import mmap
+import os
+import pickle
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.errors import ModelError, SimulationError
+from falsifier.fmu import nursery
+from falsifier.fmu.channel import (
+    Closed,
+    Reply,
+    is_closed,
+    receive_reply,
+    send_request,
+)
+from falsifier.fmu.environment import worker_environment
+from falsifier.fmu.order import Order, Reuse
+from falsifier.fmu.plan import Plan
+from falsifier.fmu.room import Room
+from falsifier.fmu.worker import PREPARE, RUN
+
+# The worker watches the clock itself; this much later it is taken to hang and is killed.
+_GRACE_SECONDS = 0.1
+# Loading an FMU may mean starting a tool's run-time or asking a licence server.
+_LOADING_SECONDS = 120.0
+_STARTING_SECONDS = 300.0
+_MOST_LOG_BYTES = 64 << 10
+
+_BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
+    "from falsifier.fmu.nursery import main; main(int(sys.argv[2]), Path(sys.argv[3]))"
+)
+
+
+class Nursery:
+    """The process that this process's workers are forked from; started at once, awaited when first needed."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._root = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
+        self._sock, theirs = socket.socketpair()
+        paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-c", _BOOT, paths, str(theirs.fileno()), str(self._root)],
+                env=worker_environment(os.environ),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+        self._ready = False
+
+    def start_worker(self, order: Order, connection: int, log: int) -> int:
+        """Fork a worker that serves the connection; returns its process id.
+
+        Raises:
+            ModelError: when the FMU cannot be unpacked or the nursery is gone.
+        """
+        return int(self._ask(nursery.START, pickle.dumps(order), (connection, log)))
+
+    def reap(self, pid: int) -> int:
+        """Wait for a worker to end; returns its exit code, negative for a signal."""
+        return int(self._ask(nursery.REAP, str(pid).encode(), ()))
+
+    def close(self) -> None:
+        """End the process with all its workers and remove its folder."""
+        self._sock.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(5.0)
+        self._process.kill()
+        self._process.wait()
+        shutil.rmtree(self._root, ignore_errors=True)
+
+    def forget(self) -> None:
+        """Let go of it in a forked copy of this process: it belongs to the original."""
+        self._sock.close()
+
+    def _ask(self, kind: int, payload: bytes, descriptors: tuple[int, ...]) -> str:
+        with self._lock:
+            try:
+                if not self._ready:
+                    receive_reply(self._sock, _STARTING_SECONDS)
+                    self._ready = True
+                send_request(self._sock, kind, payload, descriptors)
+                reply = receive_reply(self._sock, _STARTING_SECONDS)
+            except (Closed, TimeoutError) as error:
+                raise ModelError(
+                    "the process that FMU workers are started from has ended; see the messages above"
+                ) from error
+        if reply.status != "ok":
+            raise ModelError(reply.text)
+        return reply.text
+
+
+class _Worker:
+    """One worker process, the memory it shares with this process, and its messages."""
+
+    def __init__(self, owner: Nursery, order: Order) -> None:
+        self._owner = owner
+        self.log: IO[bytes] = tempfile.TemporaryFile(mode="ab+")  # noqa: SIM115 (closed in kill)
+        self.sock, theirs = socket.socketpair()
+        with theirs:
+            self.pid = owner.start_worker(order, theirs.fileno(), self.log.fileno())
+        self.plan: Plan | None = None
+        self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
+        self.awaits_test = False
+
+    def prepare(self, plan: Plan) -> Reply:
+        """Share memory for a plan and have the worker look up its names."""
+        size = max(Room.size(plan) * 8, 8)
+        with _anonymous_file() as file:
+            file.truncate(size)
+            self.room = Room.over(plan, _floats(file, size))
+            send_request(self.sock, PREPARE, pickle.dumps(plan), (file.fileno(),))
+        reply = receive_reply(self.sock, _LOADING_SECONDS)
+        self.plan = plan if reply.status == "ok" else None
+        return reply
+
+    def take_log(self) -> tuple[str, ...]:
+        """Lines that the FMU wrote since the last call."""
+        size = os.fstat(self.log.fileno()).st_size
+        if not size:
+            return ()
+        text = os.pread(self.log.fileno(), _MOST_LOG_BYTES, max(0, size - _MOST_LOG_BYTES))
+        self.log.truncate(0)
+        return tuple(text.decode("utf-8", "replace").splitlines())
+
+    def kill(self) -> int:
+        """End the process; returns its exit code, negative for a signal."""
+        # A process that is ending by itself keeps its own exit code.
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+        self.sock.close()
+        self.log.close()
+        return self._owner.reap(self.pid)
+
+
+class IsolatedFmu:
+    """Simulates one FMU in a worker process, which is replaced when needed."""
+
+    def __init__(self, owner: Nursery, order: Order) -> None:
+        self._owner, self._order = owner, order
+        self._worker: _Worker | None = None
+        self._reuse: Reuse | None = None
+        self._lock = threading.Lock()
+
+    def simulate(
+        self, plan: Plan, fill: Callable[[Room], None]
+    ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        """Simulate once.
+
+        Args:
+            plan: what is common to the simulations.
+            fill: writes parameters and inputs into the memory that the worker reads.
+
+        Returns:
+            The outputs, shape (outputs, samples), and the FMU's messages.
+
+        Raises:
+            SimulationError: when there is no full trajectory.
+            ModelError: when the FMU cannot be used.
+        """
+        with self._lock:
+            worker = self._worker_for(plan)
+            try:
+                fill(worker.room)
+                send_request(worker.sock, RUN)
+                reply = receive_reply(worker.sock, plan.time_limit + _GRACE_SECONDS)
+            except TimeoutError:
+                raise self._end(
+                    f"stopped after the time limit of {plan.time_limit:g} s without an answer", "timeout"
+                ) from None
+            except Closed:
+                raise self._end("", "crashed") from None
+            except BaseException:
+                # Interrupted: its answer would be taken for the next simulation's.
+                self._drop()
+                raise
+            if reply.status == "unusable":
+                self._drop()
+                raise ModelError(reply.text)
+            if reply.status != "ok":
+                log = worker.take_log()
+                self._drop()
+                raise _error(reply, log)
+            outputs = worker.room.outputs.copy()
+            log = worker.take_log()
+            worker.awaits_test = reply.more
+            if reply.leaving:
+                self._drop()
+            return outputs, log
+
+    def close(self) -> None:
+        """End the worker."""
+        with self._lock:
+            self._drop()
+
+    def forget(self) -> None:
+        """Let go of the worker in a forked copy of this process."""
+        if self._worker is not None:
+            self._worker.sock.close()
+            self._worker = None
+
+    def _worker_for(self, plan: Plan) -> _Worker:
+        if self._worker is not None and is_closed(self._worker.sock):
+            self._drop()
+        if self._worker is not None and self._worker.awaits_test:
+            self._await_test(self._worker, plan)
+        worker = self._worker
+        if worker is None:
+            order = replace(self._order, reuse=self._reuse)
+            worker = self._worker = _Worker(self._owner, order)
+        if worker.plan is not plan:
+            self._prepare(worker, plan)
+        return worker
+
+    def _prepare(self, worker: _Worker, plan: Plan) -> None:
+        try:
+            reply = worker.prepare(plan)
+        except (Closed, TimeoutError) as error:
+            how = "hangs" if isinstance(error, TimeoutError) else "crashes"
+            log = worker.take_log()
+            code = self._drop()
+            raise ModelError(
+                f"{self._order.path}: the FMU {how} when it is loaded ({_how_it_ended(code)})"
+                + "".join(f"\n  {line}" for line in log[-5:])
+            ) from None
+        except BaseException:
+            self._drop()
+            raise
+        if reply.status != "ok":
+            self._drop()
+            raise ModelError(f"{self._order.path}: {reply.text}")
+
+    def _await_test(self, worker: _Worker, plan: Plan) -> None:
+        """Take the outcome of the worker's test of repeated runs; dying of it says: do not repeat."""
+        worker.awaits_test = False
+        try:
+            reply = receive_reply(worker.sock, 3 * plan.time_limit + _GRACE_SECONDS)
+        except (Closed, TimeoutError):
+            self._reuse = "process"
+            self._drop()
+            return
+        except BaseException:
+            self._drop()
+            raise
+        worker.take_log()
+        self._reuse = cast(Reuse, reply.text)
+        if reply.leaving:
+            self._drop()
+
+    def _end(self, reason: str, status: str) -> SimulationError:
+        worker = self._worker
+        assert worker is not None, "a simulation was under way"
+        log = worker.take_log()
+        code = self._drop()
+        name = self._order.description.info.name
+        reason = reason or f"the FMU's process crashed: {_how_it_ended(code)}"
+        return SimulationError(f"{name}: {reason}" + _last_line(log), status=status, log=log)
+
+    def _drop(self) -> int:
+        worker, self._worker = self._worker, None
+        return 0 if worker is None else worker.kill()
+
+
+def _error(reply: Reply, log: tuple[str, ...]) -> SimulationError:
+    time = None if reply.time < 0 else reply.time
+    return SimulationError(reply.text + _last_line(log), status=reply.status, time=time, log=log)
+
+
+def _last_line(log: tuple[str, ...]) -> str:
+    return f"; its last message: {log[-1]}" if log else ""
+
+
+def _how_it_ended(code: int) -> str:
+    if code >= 0:
+        return f"it ended itself with exit code {code}"
+    try:
+        return f"signal {signal.Signals(-code).name}"
+    except ValueError:
+        return f"signal {-code}"
+
+
+def _anonymous_file() -> IO[bytes]:
+    """A file without a name, in memory where the system offers that."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("falsifier-fmu"), "w+b")
+    return tempfile.TemporaryFile()
+
+
+def _floats(file: IO[bytes], size: int) -> NDArray[np.float64]:
+    return np.frombuffer(mmap.mmap(file.fileno(), size), dtype=np.float64)
+
+
+class _Registry:
+    """Nursery and workers of this process; a forked copy starts with none."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._nursery: Nursery | None = None
+        self._fmus: dict[tuple[str, str], IsolatedFmu] = {}
+        atexit.register(self.close)
+        os.register_at_fork(after_in_child=self.forget)
+
+    def nursery(self) -> Nursery:
+        with self._lock:
+            if self._nursery is None:
+                self._nursery = Nursery()
+            return self._nursery
+
+    def fmu(self, order: Order) -> IsolatedFmu:
+        key = (order.sha256, order.interface)
+        found = self._fmus.get(key)
+        if found is None:
+            owner = self.nursery()
+            with self._lock:
+                found = self._fmus.setdefault(key, IsolatedFmu(owner, order))
+        return found
+
+    def drop(self, sha256: str, interface: str) -> None:
+        with self._lock:
+            found = self._fmus.pop((sha256, interface), None)
+        if found is not None:
+            found.close()
+
+    def close(self) -> None:
+        with self._lock:
+            fmus, self._fmus = self._fmus, {}
+            owner, self._nursery = self._nursery, None
+        for fmu in fmus.values():
+            with contextlib.suppress(ModelError):
+                fmu.close()
+        if owner is not None:
+            owner.close()
+
+    def forget(self) -> None:
+        self._lock = threading.Lock()
+        for fmu in self._fmus.values():
+            fmu.forget()
+        if self._nursery is not None:
+            self._nursery.forget()
+        self._fmus, self._nursery = {}, None
+
+
+REGISTRY = _Registry()

@@ -1,0 +1,198 @@
+"""An FMU's shared library: loaded and instantiated through fmpy, called by address."""
+
+import ctypes
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from falsifier.errors import ModelError
+from falsifier.fmu import archive
+from falsifier.fmu.description import Description
+from falsifier.model import Interface
+
+_STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
+_TYPES: Mapping[int, tuple[str, ...]] = {
+    1: ("Real", "Integer", "Boolean"),
+    2: ("Real", "Integer", "Boolean"),
+    3: ("Float64", "Float32", "Boolean", *(f"{u}Int{n}" for u in ("", "U") for n in (8, 16, 32, 64))),
+}
+
+LogSink = Callable[[str], None]
+
+
+def status_name(status: int) -> str:
+    """Name of an FMI status."""
+    return _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {status}"
+
+
+class Library:
+    """One loaded library with one instance.
+
+    Args:
+        description: of the FMU.
+        folder: where the FMU was extracted.
+        interface: how it is simulated.
+        log: receives the FMU's messages, one by one.
+
+    Raises:
+        ModelError: when the library is missing, cannot be loaded or gives no instance.
+    """
+
+    def __init__(self, description: Description, folder: Path, interface: Interface, log: LogSink) -> None:
+        self.description = description
+        self.interface = interface
+        self._log = log
+        self._prefix = f"fmi{description.major}"
+        self._check_binary(folder)
+        try:
+            self._fmu = self._load(folder)
+        except Exception as error:
+            raise ModelError(f"{description.info.name}: the library cannot be loaded: {error}") from error
+        self._instantiate()
+
+    @property
+    def component(self) -> int:
+        """Address of the instance."""
+        component = self._fmu.component
+        return int(getattr(component, "value", component))
+
+    def address(self, name: str) -> int:
+        """Address of an FMI function, named without ``fmi2``; 0 when the library has none."""
+        try:
+            function = getattr(self._fmu.dll, self._symbol(name))
+        except AttributeError:
+            return 0
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+    def function(self, name: str, *argument_types: Any) -> Callable[..., int]:
+        """An FMI function that takes the instance and arguments of these types and returns a status.
+
+        Raises:
+            ModelError: when the library has none of this name.
+        """
+        address = self.address(name)
+        if not address:
+            raise ModelError(
+                f"{self.description.info.name}: the library has no function {self._symbol(name)}"
+            )
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *argument_types)
+        return prototype(address)
+
+    def getters(self) -> dict[str, int]:
+        """Addresses of the functions that read values, by type code."""
+        return {code: self.address(f"Get{code}") for code in _TYPES[self.description.major]}
+
+    def setters(self) -> dict[str, int]:
+        """Addresses of the functions that write values, by type code."""
+        return {code: self.address(f"Set{code}") for code in _TYPES[self.description.major]}
+
+    def renew(self) -> None:
+        """Replace the instance by a new one of the same library."""
+        self._free()
+        self._instantiate()
+
+    def close(self) -> None:
+        """Free the instance and unload the library."""
+        self._free()
+        self._fmu.freeLibrary()
+
+    def _symbol(self, name: str) -> str:
+        if self.description.major == 1:
+            return f"{self.description.identifiers[self.interface]}_fmi{name}"
+        return self._prefix + name
+
+    def _check_binary(self, folder: Path) -> None:
+        info = self.description.info
+        identifier = self.description.identifiers[self.interface]
+        file = archive.library_file(info.fmi_version, identifier)
+        if (folder / file).is_file():
+            return
+        has_sources = any((folder / "sources").glob("*.c"))
+        cure = (
+            "it carries C sources: compile them with `falsifier build`"
+            if has_sources
+            else "export it again for this platform"
+        )
+        raise ModelError(
+            f"{info.name}: no library for {archive.this_platform()} ({file} is missing); "
+            f"it has {', '.join(info.platforms) or 'no binaries'}; {cure}"
+        )
+
+    def _load(self, folder: Path) -> Any:
+        from fmpy import fmi1, fmi2, fmi3
+
+        classes: dict[tuple[int, Interface], Any] = {
+            (1, "co-simulation"): fmi1.FMU1Slave,
+            (1, "model-exchange"): fmi1.FMU1Model,
+            (2, "co-simulation"): fmi2.FMU2Slave,
+            (2, "model-exchange"): fmi2.FMU2Model,
+            (3, "co-simulation"): fmi3.FMU3Slave,
+            (3, "model-exchange"): fmi3.FMU3Model,
+        }
+        return classes[self.description.major, self.interface](
+            guid=self.description.token,
+            modelIdentifier=self.description.identifiers[self.interface],
+            unzipDirectory=str(folder),
+            instanceName=self.description.info.name,
+            requireFunctions=False,
+        )
+
+    def _instantiate(self) -> None:
+        here = Path.cwd()
+        try:
+            self._fmu.instantiate(**self._arguments())
+        except Exception as error:
+            raise ModelError(f"{self.description.info.name}: the FMU gives no instance: {error}") from error
+        finally:
+            os.chdir(here)
+        if not self._fmu.component:
+            raise ModelError(f"{self.description.info.name}: the FMU gives no instance")
+
+    def _arguments(self) -> dict[str, Any]:
+        if self.description.major == 3:
+            arguments: dict[str, Any] = {"logMessage": self._log_3}
+            if self.interface == "co-simulation":
+                events = self.description.event_mode
+                arguments |= {"eventModeUsed": events, "earlyReturnAllowed": events}
+            return arguments
+        return {"functions" if self.description.major == 1 else "callbacks": self._callbacks()}
+
+    def _callbacks(self) -> Any:
+        """Callbacks of FMI 1 and 2; fmpy's proxy writes out the printf-like messages."""
+        from fmpy import calloc, fmi1, fmi2, free
+
+        version: Any = fmi1 if self.description.major == 1 else fmi2
+        callbacks = getattr(version, f"{self._prefix}CallbackFunctions")()
+        callbacks.logger = getattr(version, f"{self._prefix}CallbackLoggerTYPE")(self._log_1_2)
+        callbacks.allocateMemory = getattr(version, f"{self._prefix}CallbackAllocateMemoryTYPE")(calloc)
+        callbacks.freeMemory = getattr(version, f"{self._prefix}CallbackFreeMemoryTYPE")(free)
+        try:
+            from fmpy.logging import addLoggerProxy
+        except (ImportError, OSError):
+            return callbacks
+        addLoggerProxy(ctypes.byref(callbacks))
+        return callbacks
+
+    def _log_1_2(
+        self, _component: object, _name: bytes, status: int, _category: bytes, message: bytes
+    ) -> None:
+        self._log(_line(status, message))
+
+    def _log_3(self, _environment: object, status: int, _category: bytes, message: bytes) -> None:
+        self._log(_line(status, message))
+
+    def _free(self) -> None:
+        if not self._fmu.component:
+            return
+        name = {
+            (1, "co-simulation"): "FreeSlaveInstance",
+            (1, "model-exchange"): "FreeModelInstance",
+        }.get((self.description.major, self.interface), "FreeInstance")
+        self.function(name)(self.component)
+        self._fmu.component = None
+
+
+def _line(status: int, message: bytes | None) -> str:
+    text = (message or b"").decode("utf-8", "replace").strip()
+    return f"{status_name(status)}: {text}"

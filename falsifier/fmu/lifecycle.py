@@ -1,0 +1,172 @@
+"""Start, end and reset of a simulation, in the words of FMI 1, 2 and 3."""
+
+import ctypes
+from collections.abc import Callable
+from ctypes import byref, c_bool, c_char, c_double, c_int
+from typing import Protocol
+
+from falsifier.errors import SimulationError
+from falsifier.fmu.library import Library, status_name
+from falsifier.fmu.plan import Plan
+
+Step = Callable[[], None]
+
+
+class EventInfo1(ctypes.Structure):
+    """``fmiEventInfo`` of FMI 1."""
+
+    _fields_ = (
+        ("iteration_converged", c_char),
+        ("references_changed", c_char),
+        ("states_changed", c_char),
+        ("terminate", c_char),
+        ("has_next_time", c_char),
+        ("next_time", c_double),
+    )
+
+
+class Lifecycle(Protocol):
+    """What surrounds the stepping of one simulation."""
+
+    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+        """Bring a fresh or reset instance to the state in which it can be stepped.
+
+        Raises:
+            SimulationError: when the FMU refuses.
+        """
+        ...
+
+    def terminate(self) -> None:
+        """End the simulation."""
+        ...
+
+    def reset(self) -> bool:
+        """Bring the instance back to its beginning; False where the FMU cannot."""
+        ...
+
+
+def make_lifecycle(library: Library) -> Lifecycle:
+    """Life cycle of the library's FMI version and interface."""
+    if library.description.major == 3:
+        return _Lifecycle3(library)
+    if library.description.major == 2:
+        return _Lifecycle2(library)
+    return _Slave1(library) if library.interface == "co-simulation" else _Model1(library)
+
+
+class _Calls:
+    """Calls FMI functions and turns bad statuses into errors."""
+
+    def __init__(self, library: Library) -> None:
+        self._library = library
+        self._functions: dict[str, Callable[..., int]] = {}
+
+    def __call__(self, name: str, argument_types: tuple[object, ...] = (), *arguments: object) -> None:
+        status = self.status(name, argument_types, *arguments)
+        if status > 1:
+            raise SimulationError(
+                f"{self._library.description.info.name}: {name} returned {status_name(status)} "
+                "at the start of the simulation",
+                time=0.0,
+            )
+
+    def status(self, name: str, argument_types: tuple[object, ...] = (), *arguments: object) -> int:
+        function = self._functions.get(name)
+        if function is None:
+            function = self._functions[name] = self._library.function(name, *argument_types)
+        return function(self._library.component, *arguments)
+
+    def try_reset(self, name: str) -> bool:
+        return bool(self._library.address(name)) and self.status(name) <= 1
+
+
+class _Lifecycle2:
+    def __init__(self, library: Library) -> None:
+        self._call = _Calls(library)
+
+    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+        set_parameters()
+        self._call(
+            "SetupExperiment",
+            (c_int, c_double, c_double, c_int, c_double),
+            plan.tolerance is not None,
+            plan.tolerance or 0.0,
+            0.0,
+            1,
+            plan.stop_time,
+        )
+        self._call("EnterInitializationMode")
+        set_inputs()
+        self._call("ExitInitializationMode")
+
+    def terminate(self) -> None:
+        self._call.status("Terminate")
+
+    def reset(self) -> bool:
+        return self._call.try_reset("Reset")
+
+
+class _Lifecycle3:
+    def __init__(self, library: Library) -> None:
+        self._call = _Calls(library)
+
+    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+        set_parameters()
+        self._call(
+            "EnterInitializationMode",
+            (c_bool, c_double, c_double, c_bool, c_double),
+            plan.tolerance is not None,
+            plan.tolerance or 0.0,
+            0.0,
+            1,
+            plan.stop_time,
+        )
+        set_inputs()
+        self._call("ExitInitializationMode")
+
+    def terminate(self) -> None:
+        self._call.status("Terminate")
+
+    def reset(self) -> bool:
+        return self._call.try_reset("Reset")
+
+
+class _Slave1:
+    def __init__(self, library: Library) -> None:
+        self._call = _Calls(library)
+
+    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+        set_parameters()
+        set_inputs()
+        self._call("InitializeSlave", (c_double, c_char, c_double), 0.0, b"\x01", plan.stop_time)
+
+    def terminate(self) -> None:
+        self._call.status("TerminateSlave")
+
+    def reset(self) -> bool:
+        return self._call.try_reset("ResetSlave")
+
+
+class _Model1:
+    def __init__(self, library: Library) -> None:
+        self._call = _Calls(library)
+        self.events = EventInfo1()
+
+    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+        self._call("SetTime", (c_double,), 0.0)
+        set_parameters()
+        set_inputs()
+        self._call(
+            "Initialize",
+            (c_char, c_double, ctypes.POINTER(EventInfo1)),
+            b"\x01" if plan.tolerance is not None else b"\x00",
+            plan.tolerance or 0.0,
+            byref(self.events),
+        )
+
+    def terminate(self) -> None:
+        self._call.status("Terminate")
+
+    def reset(self) -> bool:
+        # FMI 1 model exchange has no reset.
+        return False

@@ -1,0 +1,141 @@
+"""The process that FMU workers are forked from.
+
+It is started once by a process that simulates, with a clean environment and no threads; it imports and
+compiles what every worker needs, so that a new worker costs a fork. It owns the folder that FMUs are extracted
+to and removes it when its parent is gone, for whatever reason.
+"""
+
+import contextlib
+import ctypes
+import os
+import pickle
+import resource
+import shutil
+import signal
+import socket
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+from typing import NoReturn
+
+from falsifier.errors import FalsifierError, ModelError
+from falsifier.fmu import archive, worker
+from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
+from falsifier.fmu.order import Order
+from falsifier.fmu.session import warm_up
+
+START, REAP = 1, 2
+
+# Share of the machine's memory that one worker may take; beyond it, allocations fail inside the FMU.
+_MEMORY_SHARE = 0.8
+_LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
+
+
+def main(descriptor: int, root: Path) -> None:
+    """Serve the parent on a socket until it is gone; FMUs are extracted below root."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sock = socket.socket(fileno=descriptor)
+    nursery = _Nursery(sock, root)
+    try:
+        warm_up()
+        send_reply(sock, Reply())
+        nursery.serve()
+    finally:
+        nursery.close()
+
+
+class _Nursery:
+    def __init__(self, sock: socket.socket, root: Path) -> None:
+        self._sock, self._root = sock, root
+        self._scratch: dict[int, Path] = {}
+
+    def serve(self) -> None:
+        while True:
+            try:
+                kind, payload, descriptors = receive_request(self._sock)
+            except Closed:
+                return
+            if kind == START:
+                send_reply(self._sock, self._start(pickle.loads(payload), descriptors))
+            elif kind == REAP:
+                send_reply(self._sock, self._reap(int(payload)))
+
+    def close(self) -> None:
+        for pid in self._scratch:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+            with contextlib.suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+        shutil.rmtree(self._root, ignore_errors=True)
+
+    def _start(self, order: Order, descriptors: list[int]) -> Reply:
+        connection, log = descriptors
+        try:
+            folder = self._extracted(order)
+            scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
+            pid = os.fork()
+            if not pid:
+                self._sock.close()
+                os.chdir(scratch)
+                _become_worker(connection, log, order, folder)
+        except (FalsifierError, OSError) as error:
+            return Reply("unusable", str(error))
+        finally:
+            os.close(connection)
+            os.close(log)
+        self._scratch[pid] = scratch
+        return Reply(text=str(pid))
+
+    def _reap(self, pid: int) -> Reply:
+        _, status = os.waitpid(pid, 0)
+        shutil.rmtree(self._scratch.pop(pid), ignore_errors=True)
+        return Reply(text=str(os.waitstatus_to_exitcode(status)))
+
+    def _extracted(self, order: Order) -> Path:
+        folder = self._root / order.sha256[:16]
+        if not folder.is_dir():
+            if archive.file_hash(order.path) != order.sha256:
+                raise ModelError(
+                    f"{order.path}: the file has changed since the model was loaded; load it again"
+                )
+            partial = folder.with_suffix(".partial")
+            archive.extract(order.path, partial)
+            partial.rename(folder)
+        return folder
+
+
+def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoReturn:
+    """Turn this freshly forked process into a worker; it ends here."""
+    code = 1
+    try:
+        for stream in (1, 2):
+            os.dup2(log, stream)
+        _limit_resources()
+        _flush_lines()
+        with socket.socket(fileno=os.dup(connection)) as sock:
+            os.close(connection)
+            worker.serve(sock, order.description, folder, order.interface, order.reuse)
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        # No clean-up of the nursery's own in its copy.
+        os._exit(code)
+
+
+def _limit_resources() -> None:
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if sys.platform == "linux":
+        # Private writable memory: what a model allocates, not the address space that run-times reserve.
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        limit = int(memory * _MEMORY_SHARE)
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+
+
+def _flush_lines() -> None:
+    """Have C's stdout written line by line, so that a crash loses nothing that the FMU printed."""
+    libc = ctypes.CDLL(None)
+    with contextlib.suppress(AttributeError, ValueError):
+        stdout = ctypes.c_void_p.in_dll(libc, "stdout")
+        libc.setvbuf(stdout, None, _LINE_BUFFERED, 0)

@@ -1,0 +1,126 @@
+"""FMUs as models."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.errors import ModelError
+from falsifier.fmu import archive, in_process
+from falsifier.fmu.description import Description, describe
+from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
+from falsifier.fmu.order import Order
+from falsifier.fmu.plan import Plan, make_plan
+from falsifier.fmu.room import Room
+from falsifier.model import Experiment, Interface, ModelInfo, check_finite
+from falsifier.signals import Signal
+from falsifier.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class FmuModel:
+    """An FMU and how it is simulated; nothing is loaded before the first simulation.
+
+    Attributes:
+        path: of the .fmu file.
+        interface: ``co-simulation`` (the FMU brings its own solver) or ``model-exchange``.
+        isolate: simulate in a worker process; without it a crash of the FMU is a crash of this process.
+        sha256: of the file, so that equal models are equal files.
+
+    Raises:
+        ModelError: when the file is not an FMU or does not offer the interface.
+    """
+
+    path: Path
+    interface: Interface = "co-simulation"
+    isolate: bool = field(default=True, kw_only=True)
+    sha256: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", Path(self.path).absolute())
+        object.__setattr__(self, "sha256", archive.file_hash(self.path))
+        _check_interface(self)
+
+    @property
+    def info(self) -> ModelInfo:
+        """What the FMU says of itself."""
+        return self._description.info
+
+    def simulate(
+        self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
+    ) -> Trajectory:
+        """Simulate once; see falsifier.model.Model.simulate.
+
+        Inputs are set at each communication point to the signal's value there. Integer, Boolean and
+        enumeration inputs get the nearest number.
+        """
+        task = _task(self, experiment, tuple(signals), tuple(parameters))
+
+        def fill(room: Room) -> None:
+            room.parameters[:] = list(parameters.values())
+            for row, signal in zip(room.inputs, signals.values(), strict=True):
+                row[:] = signal.sample(task.points)
+
+        outputs, log = _runner(self).simulate(task.plan, fill)
+        columns = dict(zip(task.plan.outputs, outputs, strict=True))
+        if not np.isfinite(outputs).all():
+            check_finite(self.info.name, task.times, columns)
+        return Trajectory(task.times, columns, task.units, log)
+
+    def close(self) -> None:
+        """End the worker process; a later simulation starts a new one."""
+        if self.isolate:
+            REGISTRY.drop(self.sha256, self.interface)
+        else:
+            in_process.drop(self.sha256, self.interface)
+
+    @property
+    def _description(self) -> Description:
+        return describe(self.path, self.sha256)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """What all simulations of one search share in the process that asks for them."""
+
+    plan: Plan
+    points: NDArray[np.float64]
+    times: NDArray[np.float64]
+    units: Mapping[str, str]
+
+
+@lru_cache(maxsize=64)
+def _task(
+    model: FmuModel, experiment: Experiment, inputs: tuple[str, ...], parameters: tuple[str, ...]
+) -> _Task:
+    description = describe(model.path, model.sha256)
+    plan = make_plan(description, experiment, inputs, parameters)
+    times = experiment.times
+    times.flags.writeable = False
+    units = {v.name: v.unit for v in description.info.variables if v.unit and v.name in plan.outputs}
+    return _Task(plan, plan.times, times, units)
+
+
+def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
+    order = Order(model.path, model.sha256, describe(model.path, model.sha256), model.interface, None)
+    return REGISTRY.fmu(order) if model.isolate else in_process.fmu(order)
+
+
+def _check_interface(model: FmuModel) -> None:
+    info = model.info
+    if model.interface in info.interfaces:
+        return
+    if model.interface not in get_args(Interface):
+        raise ModelError(f"unknown interface {model.interface!r}; expected one of {get_args(Interface)}")
+    if not info.interfaces:
+        raise ModelError(
+            f"{model.path}: it offers neither co-simulation nor model exchange, and scheduled "
+            "execution is not supported; export it for co-simulation"
+        )
+    raise ModelError(
+        f'{model.path}: it does not offer {model.interface}; write interface = "{info.interfaces[0]}"'
+    )

@@ -1,0 +1,391 @@
+"""Compiled loops over an FMU's C functions.
+
+numba compiles the loops; small intrinsics emit calls of C functions whose addresses are plain integers, so
+that the machine code is cached on disk and serves every FMU. Intrinsics and loops share this file because
+numba's cache notices changes of the file of the cached function only.
+
+Addresses of scratch memory and of functions travel in integer tables (see ports.Ports for the tables of
+variables). Every loop returns after a bounded number of steps, so that its caller can look at the clock.
+"""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+# Why a loop stopped: `report[WHERE]`.
+DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
+STATUS, WHERE, STEP = range(3)
+
+# Rows of the table of function addresses of a co-simulation FMU.
+INSTANCE, DO_STEP, ENTER_EVENT_MODE, UPDATE_DISCRETE_STATES, ENTER_STEP_MODE, FMI_VERSION, EVENT_MODE = range(
+    7
+)
+
+# Early returns at one time before the FMU counts as stuck, and rounds of one event iteration.
+_MOST_ROUNDS = 1000
+
+_BYTE = ir.IntType(8)
+_POINTER = _BYTE.as_pointer()
+_LLVM = {"p": _POINTER, "n": ir.IntType(64), "d": ir.DoubleType(), "i": ir.IntType(32), "b": _BYTE}
+_NUMBA = {"p": types.intp, "n": types.intp, "d": types.float64, "i": types.int32, "b": types.uint8}
+
+
+def _call(arguments: str) -> Any:
+    """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char."""
+
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [_LLVM[a] for a in arguments])
+        function = builder.inttoptr(values[0], kind.as_pointer())
+        passed = [
+            builder.inttoptr(value, _POINTER) if a == "p" else value
+            for a, value in zip(arguments, values[1:], strict=True)
+        ]
+        return builder.call(function, passed)
+
+    return types.int32(types.intp, *(_NUMBA[a] for a in arguments)), emit
+
+
+def _load(kind: Any, stored: ir.Type) -> Any:
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        return builder.load(builder.inttoptr(values[0], stored.as_pointer()))
+
+    return kind(types.intp), emit
+
+
+def _store(kind: Any, stored: ir.Type) -> Any:
+    def emit(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        builder.store(values[1], builder.inttoptr(values[0], stored.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(types.intp, kind), emit
+
+
+@intrinsic
+def _values_2(_typing, f, instance, references, count, values):  # type: ignore[no-untyped-def]
+    return _call("ppnp")
+
+
+@intrinsic
+def _values_3(_typing, f, instance, references, count, values, size):  # type: ignore[no-untyped-def]
+    return _call("ppnpn")
+
+
+@intrinsic
+def _do_step_1(_typing, f, instance, time, step, new_step):  # type: ignore[no-untyped-def]
+    return _call("pddb")
+
+
+@intrinsic
+def _do_step_2(_typing, f, instance, time, step, no_return):  # type: ignore[no-untyped-def]
+    return _call("pddi")
+
+
+@intrinsic
+def _do_step_3(_typing, f, instance, time, step, no_return, event, end, early, reached):  # type: ignore[no-untyped-def]
+    return _call("pddbpppp")
+
+
+@intrinsic
+def _mode(_typing, f, instance):  # type: ignore[no-untyped-def]
+    return _call("p")
+
+
+@intrinsic
+def _update_3(_typing, f, instance, again, end, nominals, states, defined, time):  # type: ignore[no-untyped-def]
+    return _call("ppppppp")
+
+
+def _typed(kind: Any, stored: ir.Type) -> tuple[Any, Any]:
+    @intrinsic
+    def load(_typing, address):  # type: ignore[no-untyped-def]
+        return _load(kind, stored)
+
+    @intrinsic
+    def store(_typing, address, value):  # type: ignore[no-untyped-def]
+        return _store(kind, stored)
+
+    return load, store
+
+
+_load_f8, _store_f8 = _typed(types.float64, ir.DoubleType())
+_load_f4, _store_f4 = _typed(types.float32, ir.FloatType())
+_load_i1, _store_i1 = _typed(types.int8, ir.IntType(8))
+_load_u1, _store_u1 = _typed(types.uint8, ir.IntType(8))
+_load_i2, _store_i2 = _typed(types.int16, ir.IntType(16))
+_load_u2, _store_u2 = _typed(types.uint16, ir.IntType(16))
+_load_i4, _store_i4 = _typed(types.int32, ir.IntType(32))
+_load_u4, _store_u4 = _typed(types.uint32, ir.IntType(32))
+_load_i8, _store_i8 = _typed(types.int64, ir.IntType(64))
+_load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
+
+_compiled = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compiled
+def fetch(place):  # type: ignore[no-untyped-def]
+    """One variable as a number, from where its call left it."""
+    kind, address = place[0], place[1]
+    if kind == 0:
+        value = _load_f8(address)
+    elif kind == 1:
+        value = np.float64(_load_f4(address))
+    elif kind == 2:
+        value = np.float64(_load_i1(address))
+    elif kind == 3:
+        value = np.float64(_load_u1(address))
+    elif kind == 4:
+        value = np.float64(_load_i2(address))
+    elif kind == 5:
+        value = np.float64(_load_u2(address))
+    elif kind == 6:
+        value = np.float64(_load_i4(address))
+    elif kind == 7:
+        value = np.float64(_load_u4(address))
+    elif kind == 8:
+        value = np.float64(_load_i8(address))
+    else:
+        value = np.float64(_load_u8(address))
+    if place[3]:
+        # Any non-zero byte is true; a negated Boolean is its complement.
+        truth = value != 0.0
+        return 1.0 if truth == (place[2] > 0) else 0.0
+    return value * place[2]
+
+
+@_compiled
+def put(place, number):  # type: ignore[no-untyped-def]
+    """One number to where its call will take it from; anything but floating point is rounded."""
+    kind, address = place[0], place[1]
+    value = number * place[2]
+    if place[3]:
+        value = 1.0 if (number >= 0.5) == (place[2] > 0) else 0.0
+    if kind == 0:
+        _store_f8(address, value)
+    elif kind == 1:
+        _store_f4(address, np.float32(value))
+    elif kind == 2:
+        _store_i1(address, np.int8(np.rint(value)))
+    elif kind == 3:
+        _store_u1(address, np.uint8(np.rint(value)))
+    elif kind == 4:
+        _store_i2(address, np.int16(np.rint(value)))
+    elif kind == 5:
+        _store_u2(address, np.uint16(np.rint(value)))
+    elif kind == 6:
+        _store_i4(address, np.int32(np.rint(value)))
+    elif kind == 7:
+        _store_u4(address, np.uint32(np.rint(value)))
+    elif kind == 8:
+        _store_i8(address, np.int64(np.rint(value)))
+    else:
+        _store_u8(address, np.uint64(np.rint(value)))
+
+
+@_compiled
+def exchange_values(instance, version, calls):  # type: ignore[no-untyped-def]
+    """Call the get or set functions of a table; the first status above warning ends it."""
+    worst = 0
+    for g in range(calls.shape[0]):
+        if version == 3:
+            status = _values_3(calls[g, 0], instance, calls[g, 1], calls[g, 2], calls[g, 3], calls[g, 4])
+        else:
+            status = _values_2(calls[g, 0], instance, calls[g, 1], calls[g, 2], calls[g, 3])
+        worst = max(worst, status)
+        if status > 1:
+            break
+    return worst
+
+
+@_compiled
+def read_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
+    """Read all variables of a table into one column of ``rows``."""
+    status = exchange_values(instance, version, calls)
+    if status <= 1:
+        for j in range(places.shape[0]):
+            rows[j, column] = fetch(places[j])
+    return status
+
+
+@_compiled
+def write_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
+    """Set all variables of a table to one column of ``rows``."""
+    for j in range(places.shape[0]):
+        put(places[j], rows[j, column])
+    return exchange_values(instance, version, calls)
+
+
+@_compiled
+def _differs(rows, column):  # type: ignore[no-untyped-def]
+    changes = 0
+    for j in range(rows.shape[0]):
+        changes += rows[j, column] != rows[j, column - 1]
+    return changes > 0
+
+
+@_compiled
+def settle_3(functions, flags, reached):  # type: ignore[no-untyped-def]
+    """Event iteration of FMI 3 in event mode: update discrete states until nothing changes any more.
+
+    Returns the status and where it stopped.
+    """
+    for _ in range(_MOST_ROUNDS):
+        flags[0] = 0
+        # again, terminate, nominals changed, states changed, next event defined; next event time
+        a = flags.ctypes.data
+        status = _update_3(
+            functions[UPDATE_DISCRETE_STATES],
+            functions[INSTANCE],
+            a,
+            a + 1,
+            a + 2,
+            a + 3,
+            a + 4,
+            reached.ctypes.data + 8,
+        )
+        if status > 1:
+            return status, EVENT
+        if flags[1]:
+            return status, TERMINATED
+        if not flags[0]:
+            return status, DONE
+    return 0, STUCK
+
+
+@_compiled
+def _event_3(functions, flags, reached, discrete_calls):  # type: ignore[no-untyped-def]
+    """One visit to event mode: set the discrete inputs, update, return to step mode."""
+    instance = functions[INSTANCE]
+    status = _mode(functions[ENTER_EVENT_MODE], instance)
+    if status > 1:
+        return status, EVENT
+    status = exchange_values(instance, 3, discrete_calls)
+    if status > 1:
+        return status, SETTING
+    status, where = settle_3(functions, flags, reached)
+    if where != DONE:
+        return status, where
+    status = _mode(functions[ENTER_STEP_MODE], instance)
+    return status, EVENT if status > 1 else DONE
+
+
+@_compiled
+def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore[no-untyped-def]
+    """One communication step of FMI 3, in several calls where the FMU returns early.
+
+    Returns status, where it stopped and whether the FMU asked to end the simulation.
+    """
+    time, rounds = start, 0
+    a, r = flags.ctypes.data, reached.ctypes.data
+    ends = False
+    while True:
+        flags[:] = 0
+        reached[0] = end
+        status = _do_step_3(
+            functions[DO_STEP],
+            functions[INSTANCE],
+            time,
+            end - time,
+            np.uint8(1),
+            a,
+            a + 1,
+            a + 2,
+            r,
+        )
+        if status > 1:
+            return status, STEPPING, ends
+        event, ends, early = flags[0] != 0, flags[1] != 0, flags[2] != 0
+        before, time = time, (reached[0] if early else end)
+        if event and functions[EVENT_MODE] and not ends:
+            status, where = _event_3(functions, flags, reached, no_calls)
+            if where == TERMINATED:
+                return status, DONE if time >= end else TERMINATED, True
+            if where != DONE:
+                return status, where, ends
+        # What is left of a step below this is rounding, and no FMU steps that far.
+        if ends or end - time <= 1e-12 * max(1.0, abs(end)):
+            return status, DONE if end - time <= 1e-9 * max(1.0, abs(end)) else TERMINATED, ends
+        rounds = 0 if time > before else rounds + 1
+        if rounds > _MOST_ROUNDS:
+            return 0, STUCK, ends
+
+
+@_compiled
+def co_simulate(  # type: ignore[no-untyped-def]
+    functions, set_calls, set_places, event_calls, event_places, get_calls, get_places,
+    inputs, discrete, outputs, step, first, last, every, report,
+):  # fmt: skip
+    """Do the communication steps first..last-1.
+
+    Args:
+        functions: addresses and facts, int64[7].
+        set_calls: inputs that are set before each step, see Ports.
+        set_places: their places.
+        event_calls: inputs that are set in event mode only (FMI 3 with event mode).
+        event_places: their places.
+        get_calls: recorded variables.
+        get_places: their places.
+        inputs: values by input and step, shape (n, steps).
+        discrete: values of the event-mode inputs, shape (m, steps).
+        outputs: receives the recorded variables, shape (k, samples); column 0 is the caller's.
+        step: communication step in s.
+        first: first step to do.
+        last: step to stop before.
+        every: steps per column of the outputs.
+        report: receives FMI status, reason and number of completed steps, int64[3].
+    """
+    instance, version = functions[INSTANCE], functions[FMI_VERSION]
+    flags = np.zeros(8, dtype=np.uint8)
+    reached = np.zeros(2)
+    no_calls = event_calls[:0]
+    report[STATUS], report[WHERE], report[STEP] = 0, DONE, first
+    for k in range(first, last):
+        report[STEP] = k
+        if set_calls.shape[0]:
+            report[STATUS] = write_row(instance, version, set_calls, set_places, inputs, k)
+            if report[STATUS] > 1:
+                report[WHERE] = SETTING
+                return
+        if event_calls.shape[0] and k > 0 and _differs(discrete, k):
+            for j in range(event_places.shape[0]):
+                put(event_places[j], discrete[j, k])
+            report[STATUS], report[WHERE] = _event_3(functions, flags, reached, event_calls)
+            if report[WHERE] != DONE:
+                return
+        ends = False
+        if version == 3:
+            status, where, ends = _advance_3(functions, k * step, (k + 1) * step, flags, reached, no_calls)
+            report[STATUS], report[WHERE] = status, where
+            if where != DONE:
+                return
+        elif version == 2:
+            report[STATUS] = _do_step_2(functions[DO_STEP], instance, k * step, step, np.int32(1))
+        else:
+            report[STATUS] = _do_step_1(functions[DO_STEP], instance, k * step, step, np.uint8(1))
+        if report[STATUS] > 1:
+            report[WHERE] = STEPPING
+            return
+        report[STEP] = k + 1
+        if (k + 1) % every == 0:
+            column = (k + 1) // every
+            report[STATUS] = read_row(instance, version, get_calls, get_places, outputs, column)
+            if report[STATUS] > 1:
+                report[WHERE] = GETTING
+                return
+        if ends:
+            report[WHERE] = TERMINATED
+            return
+
+
+@_compiled
+def enter_step_mode(functions):  # type: ignore[no-untyped-def]
+    """Leave the event mode that an FMI 3 FMU is in after its initialisation: status and where it stopped."""
+    flags = np.zeros(8, dtype=np.uint8)
+    reached = np.zeros(2)
+    status, where = settle_3(functions, flags, reached)
+    if where == DONE:
+        status = _mode(functions[ENTER_STEP_MODE], functions[INSTANCE])
+        where = EVENT if status > 1 else DONE
+    return status, where

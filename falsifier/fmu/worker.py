@@ -1,0 +1,121 @@
+"""The process that one FMU runs in: takes requests, simulates, replies.
+
+It is forked by the nursery, has no secrets in its environment, and may die at any moment.
+"""
+
+import contextlib
+import mmap
+import os
+import pickle
+import resource
+import socket
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from falsifier.errors import FalsifierError, SimulationError
+from falsifier.fmu.channel import Closed, Reply, close_all, receive_request, send_reply
+from falsifier.fmu.description import Description
+from falsifier.fmu.order import Reuse
+from falsifier.fmu.plan import Plan
+from falsifier.fmu.room import Room
+from falsifier.fmu.session import Session
+from falsifier.model import Interface
+
+PREPARE, RUN = 1, 2
+
+# A simulation that takes longer than this is not repeated to find out whether a reset can be trusted.
+_LONGEST_TEST_SECONDS = 1.0
+# Exporters' run-times run out of thread keys after about 1000 instances in a process.
+_MOST_INSTANCES = 400
+_MOST_GROWTH_KIB = 256 << 10
+
+
+def serve(
+    sock: socket.socket, description: Description, folder: Path, interface: Interface, reuse: Reuse | None
+) -> None:
+    """Answer requests until the other end is gone or the process should be replaced.
+
+    Args:
+        sock: connection to the process that asks.
+        description: of the FMU.
+        folder: where it was extracted.
+        interface: how it is simulated.
+        reuse: how an instance may be used again; None: find out after the first simulation.
+    """
+    worker = _Worker(description, folder, interface, reuse)
+    while True:
+        try:
+            kind, payload, descriptors = receive_request(sock)
+        except Closed:
+            return
+        if kind == PREPARE:
+            send_reply(sock, worker.prepare(pickle.loads(payload), descriptors[0]))
+            close_all(descriptors)
+            continue
+        reply = worker.run()
+        send_reply(sock, reply)
+        if reply.more:
+            reply = worker.find_reuse()
+            send_reply(sock, reply)
+        if reply.leaving:
+            return
+
+
+class _Worker:
+    def __init__(
+        self, description: Description, folder: Path, interface: Interface, reuse: Reuse | None
+    ) -> None:
+        self._description, self._folder, self._interface = description, folder, interface
+        self._reuse = reuse
+        self._session: Session | None = None
+        self._instances = 0
+        self._first_size = 0
+
+    def prepare(self, plan: Plan, descriptor: int) -> Reply:
+        try:
+            memory = mmap.mmap(descriptor, 0)
+            self._plan, self._room = plan, Room.over(plan, np.frombuffer(memory, dtype=np.float64))
+            if self._session is None:
+                self._session = Session(self._description, self._folder, self._interface, _log)
+            self._session.prepare(self._plan, self._room)
+        except FalsifierError as error:
+            return Reply("unusable", str(error))
+        return Reply()
+
+    def run(self) -> Reply:
+        assert self._session is not None, "prepare comes before run"
+        self._session.reuse = self._reuse or "instance"
+        self._instances += self._session.reuse == "instance" or not self._instances
+        started = time.perf_counter()
+        try:
+            self._session.run()
+        except SimulationError as error:
+            at = -1.0 if error.time is None else error.time
+            return Reply("timeout" if error.status == "timeout" else "failed", str(error), at)
+        except FalsifierError as error:
+            return Reply("unusable", str(error))
+        if self._reuse is None and time.perf_counter() - started > _LONGEST_TEST_SECONDS:
+            self._reuse = "instance"
+        return Reply(more=self._reuse is None, leaving=self._reuse is not None and self._is_spent())
+
+    def find_reuse(self) -> Reply:
+        """Repeat the simulation after a reset and in a new instance; the first equal outcome decides."""
+        assert self._session is not None, "run comes before find_reuse"
+        self._reuse = self._session.find_reuse()
+        return Reply(text=self._reuse, leaving=self._is_spent())
+
+    def _is_spent(self) -> bool:
+        """Whether this process has done enough, or has grown too much, to go on."""
+        if self._instances >= _MOST_INSTANCES or self._reuse == "process":
+            return True
+        size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        self._first_size = self._first_size or (size if self._instances else 0)
+        return bool(self._first_size) and size > self._first_size + _MOST_GROWTH_KIB
+
+
+def _log(line: str) -> None:
+    with contextlib.suppress(OSError):
+        os.write(sys.stdout.fileno(), line.encode("utf-8", "replace") + b"\n")
