@@ -1,0 +1,99 @@
+"""Command line of the exporter."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+import tomllib
+from pathlib import Path
+
+from .emit_c import lay_out, model_c, sizes_h
+from .evaluate import Evaluator
+from .flatten import flatten
+from .instance import Scope
+from .library import absolute, load
+from .model_description import fmi2, fmi3, model_identifier
+from .package import PLATFORMS, Contents, build, c_files
+from .sort import sort, sort_initial, states_of
+from .syntax import ExportError
+
+HERE = Path(__file__).parent
+SYSTEMS = HERE / "systems.toml"
+
+
+def export(source: Path, name: str, target: Path, *, version: int, platforms: tuple[str, ...]) -> None:
+    """Turn one Modelica model into one FMU.
+
+    Args:
+        source: package directory or .mo file.
+        name: full name of the model.
+        target: the .fmu file to write.
+        version: of FMI, 2 or 3.
+        platforms: which binaries to make.
+
+    Raises:
+        ExportError: with file and line of what is wrong or not supported.
+    """
+    root = load(source)
+    model = flatten(root, name)
+    states = states_of(model)
+    system = lay_out(model, states, sort(model, states), sort_initial(model, states))
+    scope = absolute(name, root)
+    assert scope is not None
+    code = model_c(system, Evaluator(model, Scope(None, scope)))
+    description = fmi2(system, c_files(2)) if version == 2 else fmi3(system)
+    build(Contents(model_identifier(system), version, description, code, sizes_h(system)), target, platforms)
+
+
+def export_all(folder: Path, names: list[str], platforms: tuple[str, ...]) -> None:
+    """Build the FMUs of systems.toml and write SHA256SUMS."""
+    table = tomllib.loads(SYSTEMS.read_text(encoding="utf-8"))
+    for name, entry in table.items():
+        if names and name not in names:
+            continue
+        target = folder / entry["file"]
+        source = HERE.parent / entry["source"]
+        export(source, entry["model"], target, version=entry["fmi"], platforms=platforms)
+        print(f"{target}: {target.stat().st_size} bytes")
+    write_sums(folder)
+
+
+def write_sums(folder: Path) -> None:
+    """List the hashes of all FMUs of a folder in SHA256SUMS."""
+    lines = [
+        f"{hashlib.sha256(f.read_bytes()).hexdigest()}  {f.name}\n" for f in sorted(folder.glob("*.fmu"))
+    ]
+    (folder / "SHA256SUMS").write_text("".join(lines), encoding="utf-8")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Parse the command line and run."""
+    parser = argparse.ArgumentParser(prog="export_fmu.py", description="Turn Modelica models into FMUs.")
+    parser.add_argument("model", nargs="?", help="full name of a model, e.g. ArchComp.AT")
+    parser.add_argument(
+        "--source", type=Path, default=HERE.parent / "ArchComp", help="package directory or .mo file"
+    )
+    parser.add_argument("--output", type=Path, help="the .fmu file to write (default: the model's name)")
+    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI")
+    parser.add_argument("--platform", action="append", choices=sorted(PLATFORMS), help="default: all")
+    parser.add_argument(
+        "--all", type=Path, metavar="FOLDER", help="build what systems.toml lists into FOLDER"
+    )
+    parser.add_argument(
+        "--only", action="append", default=[], help="with --all: only this entry of systems.toml"
+    )
+    given = parser.parse_args(arguments)
+    platforms = tuple(given.platform or PLATFORMS)
+    try:
+        if given.all:
+            export_all(given.all, given.only, platforms)
+        elif given.model:
+            target = given.output or Path(given.model.rsplit(".", 1)[-1] + ".fmu")
+            export(given.source, given.model, target, version=given.fmi, platforms=platforms)
+        else:
+            parser.error("give a model or --all FOLDER")
+    except ExportError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0

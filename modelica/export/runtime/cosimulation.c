@@ -1,0 +1,80 @@
+/* Co-simulation: communication steps with all events inside of them. */
+#include "model.h"
+
+#define MAX_IDLE_EVENTS 10000
+
+/* Ticks at the end of a communication step act at once, with the inputs of that step: what is read there has
+ * happened. With SOLVER_REPEAT_TICKS (always at the start of the simulation) they are repeated if other inputs
+ * are set for the next step.
+ */
+static void end_of_step_events(Simulation *s, int repeatable) {
+    s->repeatable = 0;
+    if (events_next_time(&s->now) > s->now.time + TIME_TOLERANCE) return;
+    if (repeatable) {
+        s->before = s->now;
+        s->repeatable = 1;
+    }
+    events_handle(&s->now);
+}
+
+void simulation_start(Simulation *s) {
+    events_initialize(&s->now);
+    s->changed_reals = s->changed_others = 0;
+    s->before = s->now;
+    events_handle(&s->now);
+    s->repeatable = 1;
+}
+
+static void keep_settings(Model *to, const Model *from) {
+    for (int k = 0; k < MODEL_REALS; k++)
+        if (model_real_kind[k] >= KIND_TUNABLE) to->r[k] = from->r[k];
+    for (int k = 0; k < MODEL_INTS; k++)
+        if (model_int_kind[k] >= KIND_TUNABLE) to->i[k] = from->i[k];
+}
+
+static void take_inputs(Simulation *s) {
+    double z[MODEL_CROSSINGS + 1];
+    Model *m = &s->now;
+    m->current = m->rest_current = 0;
+    if (s->changed_others) model_parameters(m);
+    if (s->repeatable) {
+        keep_settings(&s->before, m);
+        s->before.current = s->before.rest_current = 0;
+        s->now = s->before;
+        model_parameters(m);
+        events_handle(m);
+    } else if (s->changed_others) {
+        events_handle(m);
+    } else if (MODEL_CROSSINGS) {
+        events_evaluate(m);
+        if (events_crossed(m, z)) events_handle(m);
+    }
+    s->changed_reals = s->changed_others = 0;
+}
+
+int simulation_step(Simulation *s, double start, double size) {
+    Model *m = &s->now;
+    double end = start + size;
+    if (fabs(start - m->time) > TIME_TOLERANCE * max_real(1, fabs(start))) {
+        model_fail(m, "the communication step does not begin where the last one has ended");
+        return 1;
+    }
+    if (s->changed_reals || s->changed_others) take_inputs(s);
+    s->repeatable = 0;
+    while (end - m->time > TIME_TOLERANCE && !m->error[0]) {
+        double next = events_next_time(m), before = m->time;
+        if (next > end - TIME_TOLERANCE) next = end;
+        int state_event = next > m->time ? integrate(m, next) : 0;
+        if (m->error[0]) break;
+        if (m->time - before > TIME_TOLERANCE) m->idle_events = 0;
+        if (state_event || end - m->time > TIME_TOLERANCE) {
+            if (++m->idle_events > MAX_IDLE_EVENTS) model_fail(m, "events follow each other without end");
+            events_handle(m);
+        }
+    }
+    if (!m->error[0]) {
+        m->time = end;
+        end_of_step_events(s, SOLVER_REPEAT_TICKS);
+    }
+    return m->error[0] != 0;
+}

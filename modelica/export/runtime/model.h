@@ -1,0 +1,145 @@
+/* The simulated model: its memory, what the generated model.c provides, what the runtime does with it.
+ *
+ * A Model holds no pointers: copying the struct copies the complete state of a simulation.
+ */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sizes.h" /* generated: MODEL_STATES, MODEL_REALS, ... */
+
+#define MODEL_CROSSINGS (MODEL_RELATIONS + 2 * MODEL_FLOORS)
+#define TIME_TOLERANCE 1e-9 /* s; instants closer than this are the same */
+
+typedef struct {
+    double time;
+    double r[MODEL_REALS + 1]; /* states, derivatives, all other Reals */
+    int i[MODEL_INTS + 1];     /* Integers and Booleans */
+    double pr[MODEL_PRE_REALS + 1]; /* values before the event */
+    int pi[MODEL_INTS + 1];
+    unsigned char w[MODEL_CONDITIONS + 1], pw[MODEL_CONDITIONS + 1]; /* when-conditions, and before the event */
+    unsigned char rel[MODEL_RELATIONS + 1];       /* relations, frozen between events */
+    unsigned char trel[MODEL_TIME_RELATIONS + 1]; /* `time >= threshold`, frozen between events */
+    double fl[MODEL_FLOORS + 1];                  /* floor values, frozen between events */
+    unsigned char tick[MODEL_TICKS + 1];          /* sample(...) is true now */
+    long long tick_count[MODEL_TICKS + 1];        /* index of the next tick: no sum of rounded intervals */
+    double reinit_value[MODEL_STATES + 1];
+    unsigned char reinit_set[MODEL_STATES + 1];
+    double step;      /* s; what the adaptive integrator would like to do next */
+    double tolerance; /* relative, adaptive integrator */
+    int current;      /* derivatives belong to the present states, inputs and time */
+    int rest_current; /* so do all other variables */
+    int idle_events;  /* events since time last moved on */
+    char error[256];  /* empty: all is well */
+} Model;
+
+/* What may be set from outside, and when. */
+enum { KIND_LOCAL = 0, KIND_START = 1, KIND_FIXED = 2, KIND_TUNABLE = 3, KIND_INPUT = 4 };
+/* How a crossing function compares with zero. */
+enum { OP_LT = 0, OP_LE = 1, OP_GT = 2, OP_GE = 3 };
+
+/* ---- generated ---- */
+extern const char model_guid[];
+extern const unsigned char model_real_kind[], model_int_kind[];
+extern const int model_pre_reals[]; /* index in r of the Reals with a value before the event; discrete ones first */
+extern const unsigned char model_crossing_op[];
+extern const double model_nominal[];
+void model_defaults(Model *m);           /* literal values of parameters and starts */
+void model_parameters(Model *m);         /* parameters that depend on others */
+void model_starts(Model *m);             /* start values that depend on parameters */
+void model_initial(Model *m);            /* the initial system */
+void model_event(Model *m);              /* everything, relations live, when clauses active */
+void model_derivatives(Model *m);        /* what the derivatives need, relations frozen */
+void model_rest(Model *m);               /* everything else that can change between events */
+void model_operands(Model *m);           /* what the crossing functions need beyond the derivatives */
+void model_crossings(Model *m, double *z);
+void model_floors(Model *m, double *values);
+void model_thresholds(Model *m, double *at);
+void model_tick_times(Model *m, int k, double *start, double *interval);
+
+/* ---- runtime ---- */
+void model_fail(Model *m, const char *message);
+
+/* events.c */
+void events_initialize(Model *m);           /* solve the initial system at the present time */
+void events_handle(Model *m);               /* ticks and time events that are due, then event iteration */
+int events_crossed(Model *m, double *z);    /* relations differ from their frozen values; fills z */
+double events_next_time(Model *m);          /* HUGE_VAL if there is none */
+void events_evaluate(Model *m);             /* make derivatives current */
+void events_evaluate_all(Model *m);         /* make all variables current */
+
+/* integrate.c */
+int integrate(Model *m, double stop); /* to `stop` or to the first state event (then 1) */
+
+/* cosimulation.c */
+typedef struct {
+    Model now;
+    Model before; /* as it was before the ticks at the end of the last communication step */
+    int repeatable, changed_reals, changed_others;
+} Simulation;
+
+void simulation_start(Simulation *s);
+int simulation_step(Simulation *s, double start, double size);
+
+/* ---- small functions for generated code ---- */
+static inline int subscript(Model *m, int index, int size, int line) {
+    if (index < 1 || index > size) {
+        char text[96];
+        (void)line;
+        text[0] = 0;
+        strcat(text, "a subscript is out of bounds, see line ");
+        size_t n = strlen(text);
+        int digits[12], k = 0, value = line;
+        do { digits[k++] = value % 10; value /= 10; } while (value);
+        while (k) text[n++] = (char)('0' + digits[--k]);
+        text[n] = 0;
+        model_fail(m, text);
+        return 0;
+    }
+    return index - 1;
+}
+static inline void same_size(Model *m, int a, int b, int line) {
+    (void)line;
+    if (a != b) model_fail(m, "arrays of different sizes in an assignment");
+}
+static inline int time_reached(const Model *m, double at) { return m->time >= at - TIME_TOLERANCE; }
+static inline double square(double x) { return x * x; }
+static inline int sign_of(double x) { return (x > 0) - (x < 0); }
+static inline double min_real(double a, double b) { return a < b ? a : b; }
+static inline double max_real(double a, double b) { return a > b ? a : b; }
+static inline int min_int(int a, int b) { return a < b ? a : b; }
+static inline int max_int(int a, int b) { return a > b ? a : b; }
+static inline double div_real(double a, double b) { return trunc(a / b); }
+static inline double mod_real(double a, double b) { return a - floor(a / b) * b; }
+static inline double rem_real(double a, double b) { return a - trunc(a / b) * b; }
+static inline int div_int(int a, int b) { return b ? a / b : 0; }
+static inline int rem_int(int a, int b) { return b ? a % b : 0; }
+static inline int mod_int(int a, int b) {
+    int r = rem_int(a, b);
+    return r && (r < 0) != (b < 0) ? r + b : r;
+}
+static inline double sum_of(const double *v, int n) {
+    double s = 0;
+    for (int k = 0; k < n; k++) s += v[k];
+    return s;
+}
+static inline double product_of(const double *v, int n) {
+    double s = 1;
+    for (int k = 0; k < n; k++) s *= v[k];
+    return s;
+}
+static inline double min_of(const double *v, int n) {
+    double s = v[0];
+    for (int k = 1; k < n; k++) s = min_real(s, v[k]);
+    return s;
+}
+static inline double max_of(const double *v, int n) {
+    double s = v[0];
+    for (int k = 1; k < n; k++) s = max_real(s, v[k]);
+    return s;
+}
+
+#endif
