@@ -50,7 +50,7 @@ protected
   Real dT(unit = "K") "Mean difference of temperature between steam and water (logarithmic)";
   Real setPoint(unit = "kPa") "Set point of the pressure";
   Real error "Measured pressure above the set point, normalised for the network";
-  Real flow(unit = "kg/s") "Cooling flow that the network adds";
+  Real correction(unit = "kg/s") "Cooling flow that the network adds";
   Real hidden[3] "Outputs of the tanh units";
   Real first[3](each start = 0, each fixed = true) "First filters of the units' outputs";
   Real second[3](each start = 0, each fixed = true) "Second filters, behind the first";
@@ -63,7 +63,7 @@ equation
   der(T) = (Q / Cp + Fcw * (Tcw - T)) / Mcw;
   der(P) = R / V * Tc * (Fs - Q / lambda);
   // Actuator and sensor
-  der(Fcw) = (min(FcwMax, max(0, Fcw0 + flow)) - Fcw) / tau;
+  der(Fcw) = (min(FcwMax, max(0, Fcw0 + correction)) - Fcw) / tau;
   der(pressure) = (P - pressure) / (tau / 2);
   // Controller; the original's disturbance of the flow, a step of height zero at 10 s, is left out
   setPoint = if time < tSet then setBefore else setAfter;
@@ -75,7 +75,7 @@ equation
     der(first[i]) = hidden[i] - pole * first[i];
     der(second[i]) = first[i] - pole * second[i];
   end for;
-  flow = (outputOffset + outputWeight[1] * hidden[1] + outputWeight[2] * hidden[2] + outputWeight[3] * hidden[3] + 1)
+  correction = (outputOffset + outputWeight[1] * hidden[1] + outputWeight[2] * hidden[2] + outputWeight[3] * hidden[3] + 1)
     * (flowMax - flowMin) / 2 + flowMin;
   annotation(experiment(StopTime = 35, Interval = 0.01, Tolerance = 1e-8));
 end SC;
