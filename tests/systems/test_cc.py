@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from tests.systems.driving import Array, Driver, evenly, golden
+from tests.systems.independent import cc
+
+GOLDEN = golden("CC")
+POSITIONS = ("y1", "y2", "y3", "y4", "y5")
+MODES = ("car2.mode", "car3.mode", "car4.mode", "car5.mode")
+STOP = GOLDEN["stop_time"]
+
+
+def drive(fmu: Driver, throttle: Array, brake: Array) -> tuple[Array, Array]:
+    inputs = {"throttle": throttle, "brake": brake}
+    rows = fmu.run(inputs, POSITIONS + MODES, stop_time=STOP, samples=len(throttle))
+    return rows[:, :5], rows[:, 5:]
+
+
+@pytest.mark.parametrize("name", GOLDEN["runs"])
+def test_golden_positions(fmu: Driver, name: str) -> None:
+    run = GOLDEN["runs"][name]
+    # The figures belong to inputs that change continuously; held for 1 ms they are as good as that.
+    times = np.linspace(0, STOP, 100001)
+    positions, modes = drive(fmu, *(evenly(run[i], STOP).sample(times) for i in ("throttle", "brake")))
+    for (time, *expected), letters in zip(run["rows"], run["modes"], strict=True):
+        k = round(time * 1000)
+        assert positions[k] == pytest.approx(expected, abs=0.02), f"t = {time}"
+        assert "".join("?KCB"[int(m)] for m in modes[k]) == letters, f"t = {time}"
+
+
+def test_independent_motion(fmu: Driver) -> None:
+    rng = np.random.default_rng(31)
+    times = np.linspace(0, STOP, 10001)
+    for run in range(20):
+        throttle, brake = (evenly(list(v), STOP).sample(times) for v in rng.random((2, 10)))
+        if run % 4 == 3:
+            throttle, brake = np.round(throttle), np.round(brake)
+        positions, modes = drive(fmu, throttle, brake)
+        expected, _ = cc.drive(throttle, brake, 0.01)
+        assert np.abs(positions - expected).max() < 1e-3
+        assert np.count_nonzero(np.diff(modes, axis=0)) > 100
+
+
+def test_many_mode_changes_are_all_taken(fmu: Driver) -> None:
+    run = GOLDEN["runs"]["Q"]
+    _, modes = drive(fmu, *(np.full(100001, run[i][0]) for i in ("throttle", "brake")))
+    changes = np.count_nonzero(np.diff(modes, axis=0), axis=0)
+    assert changes == pytest.approx(run["mode_changes"], abs=1)

@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+from falsifier.signals import Signal
+from tests.systems.driving import Driver, golden
+from tests.systems.independent import nn
+
+GOLDEN = golden("NN")
+STOP = GOLDEN["stop_time"]
+SAMPLES = 4001
+TIMES = np.linspace(0, STOP, SAMPLES)
+
+
+def signal(points: dict[str, object]) -> Signal:
+    return Signal(tuple(points["times"]), tuple(points["values"]), points["interpolation"])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", GOLDEN["runs"])
+def test_golden_positions(fmu: Driver, name: str) -> None:
+    run = GOLDEN["runs"][name]
+    reference = signal(run["Ref"]).sample(TIMES)
+    position, current = fmu.run({"Ref": reference}, ("Pos", "current"), stop_time=STOP, samples=SAMPLES).T
+    for time, expected in zip(run["times"], run["Pos"], strict=True):
+        tolerance = next(row["position"] for row in GOLDEN["tolerance"] if time <= row["until"])
+        assert position[round(time * 100)] == pytest.approx(expected, abs=tolerance), f"t = {time}"
+    if "samples_at_full_current" in run:
+        full = run["samples_at_full_current"]
+        assert np.all(current[:full] == 4)
+        assert current[full] == -1
+    if "max_Pos" in run:
+        # The figure is the maximum over 1 ms; 5 ms beside it the ball is at most this much lower.
+        assert position.max() == pytest.approx(run["max_Pos"], abs=1e-3)
+    if "max_Pos_from_2_to_3" in run:
+        assert position[200:301].max() == pytest.approx(run["max_Pos_from_2_to_3"], abs=1e-3)
+
+
+@pytest.mark.parametrize("reference", [1.0, 2.0, 3.0])
+def test_golden_start(fmu: Driver, reference: float) -> None:
+    start = GOLDEN["start"]
+    rows = fmu.run({"Ref": np.full(11, reference)}, ("NNPos", "Pos"), stop_time=0.1, samples=11)
+    assert rows[0, 0] == pytest.approx(start["NNPos_at_0"], abs=1e-6)
+    assert rows[[round(t * 100) for t in start["times"]], 0] == pytest.approx(start["NNPos"], abs=1e-4)
+    assert rows[10, 1] == pytest.approx(start["Pos_at_0_1"], abs=1e-4)
+
+
+def test_independent_motion(fmu: Driver) -> None:
+    """The loop is chaotic: positions agree at first, later only their statistics do."""
+    rng = np.random.default_rng(32)
+    references = np.empty((SAMPLES, 24))
+    for run in range(24):
+        interpolation = "pchip" if run % 2 else "constant"
+        values = rng.uniform(1, 3, 8)
+        references[:, run] = Signal.evenly(list(values), stop_time=STOP, interpolation=interpolation).sample(
+            TIMES
+        )  # type: ignore[arg-type]
+    expected, predictions = nn.positions(references)
+    outputs = [
+        fmu.run({"Ref": reference}, ("Pos", "NNPos"), stop_time=STOP, samples=SAMPLES)
+        for reference in references.T
+    ]
+    position = np.column_stack([rows[:, 0] for rows in outputs])
+    prediction = np.column_stack([rows[:, 1] for rows in outputs])
+    difference = np.abs(position - expected)
+    assert difference[:101].max() < 1e-5
+    assert difference[:301].max() < 1e-2
+    assert np.abs(prediction - predictions)[:101].max() < 1e-5
+    error, expected_error = position - references, expected - references
+    assert np.median(np.abs(error)) == pytest.approx(np.median(np.abs(expected_error)), rel=0.03)
+    assert error.std() == pytest.approx(expected_error.std(), rel=0.02)

@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+
+from falsifier.signals import Signal
+from tests.systems.driving import Array, Driver, golden
+from tests.systems.independent import pm
+
+GOLDEN = golden("PM")
+STOP = GOLDEN["stop_time"]
+TIMES = np.linspace(0, STOP, 10001)
+
+
+def count(fmu: Driver, rates: Array) -> Array:
+    rows = fmu.run({"LRL_input": rates}, ("PACE_COUNT",), stop_time=STOP, samples=len(rates))
+    return np.asarray(rows[:, 0])
+
+
+@pytest.mark.parametrize("name", GOLDEN["runs"])
+def test_golden_paces(fmu: Driver, name: str) -> None:
+    run = GOLDEN["runs"][name]
+    points = run["LRL_input"]
+    signal = Signal.evenly(points["values"], stop_time=STOP, interpolation=points["interpolation"])
+    counted = count(fmu, signal.sample(TIMES))
+    paces = TIMES[1:][np.diff(counted) > 0]
+    assert paces[: len(run["first"])] == pytest.approx(run["first"], abs=1e-9)
+    assert paces[-1] == pytest.approx(run["last"], abs=1e-9)
+    assert counted[-1] == run["count"]
+    if "count_each_second" in run:
+        assert counted[1000::1000].tolist() == run["count_each_second"]
+    assert min(15 - counted.max(), counted.max() - 8) == run["robustness"]
+
+
+@pytest.mark.parametrize(("rate", "expected"), GOLDEN["counts"].items())
+def test_golden_counts(fmu: Driver, rate: str, expected: int) -> None:
+    assert count(fmu, np.full(len(TIMES), float(rate)))[-1] == expected
+
+
+def test_periods(fmu: Driver) -> None:
+    rates = np.full(11, 70.9)
+    rows = fmu.run({"LRL_input": rates}, ("LRL", "Period"), stop_time=0.01, samples=11)
+    assert rows[-1].tolist() == [70, 857]
+
+
+def test_independent_counts(fmu: Driver) -> None:
+    rng = np.random.default_rng(34)
+    for pieces in (1, 2, 5, 10, 100) * 5:
+        signal = Signal.evenly(rng.uniform(50, 90, pieces), stop_time=STOP, interpolation="constant")
+        rates = signal.sample(TIMES)
+        assert count(fmu, rates).tolist() == pm.counts(rates).tolist()
