@@ -44,6 +44,6 @@ def test_periods(fmu: Driver) -> None:
 def test_independent_counts(fmu: Driver) -> None:
     rng = np.random.default_rng(34)
     for pieces in (1, 2, 5, 10, 100) * 5:
-        signal = Signal.evenly(rng.uniform(50, 90, pieces), stop_time=STOP, interpolation="constant")
+        signal = Signal.evenly(list(rng.uniform(50, 90, pieces)), stop_time=STOP, interpolation="constant")
         rates = signal.sample(TIMES)
         assert count(fmu, rates).tolist() == pm.counts(rates).tolist()

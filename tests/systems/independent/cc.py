@@ -54,7 +54,7 @@ def _next_modes(y, mode):  # type: ignore[no-untyped-def]
     new = mode.copy()
     for i in range(4):
         gap = y[i + 1] - y[i]
-        if mode[i] == KEEPING and gap >= 15 or mode[i] == BRAKING and gap >= 20:
+        if (mode[i] == KEEPING and gap >= 15) or (mode[i] == BRAKING and gap >= 20):
             new[i] = CHASING
         elif mode[i] == KEEPING and gap <= 5:
             new[i] = BRAKING

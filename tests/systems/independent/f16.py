@@ -1,4 +1,4 @@
-"""F-16 under its collision-avoidance autopilot, many runs at once; states and units as in Stevens and Lewis."""
+"""F-16 under its collision-avoidance autopilot, many runs at once."""
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
@@ -54,7 +54,7 @@ _DAMPING = np.array([_AERO[k] for k in ("CXq", "CYr", "CYp", "CZq", "Clr", "Clp"
 
 
 def _slope(x: Array, mode: Array) -> Array:
-    vt, alpha, beta, phi, theta, psi, p, q, r, _, _, altitude, power, int_nz, int_ps, int_nyr = x
+    vt, alpha, beta, phi, theta, psi, p, q, r, _, _, altitude, power = x[:13]
     surfaces = _surfaces(x)
     density_factor = 1 - 0.703e-5 * altitude
     sound = np.sqrt(1.4 * 1716.3 * 519 * density_factor)
@@ -129,18 +129,13 @@ def _coefficients(alpha: Array, beta: Array, surfaces: Array, rates: Array) -> t
     at = alpha / DEGREE / 5 + 2
     left = np.clip(np.floor(at).astype(int), 0, 10)
     d = _DAMPING[:, left] + (at - left) * (_DAMPING[:, left + 1] - _DAMPING[:, left])
-    cx = (
-        m["a"] @ np.array([one, alpha, e**2, e, alpha * e, a2, a3])
-        + (polyval(alpha, m["b"]) + d[0]) * qh
-    )
+    cx = m["a"] @ np.array([one, alpha, e**2, e, alpha * e, a2, a3]) + (polyval(alpha, m["b"]) + d[0]) * qh
     cy = (
         m["c"] @ np.array([beta, a, r])
         + (polyval(alpha, m["d"]) + d[2]) * ph
         + (polyval(alpha, m["e"]) + d[1]) * rh
     )
-    cz = (
-        polyval(alpha, m["f"][:5]) * (1 - b2) + m["f"][5] * e + (polyval(alpha, m["g"]) + d[3]) * qh
-    )
+    cz = polyval(alpha, m["f"][:5]) * (1 - b2) + m["f"][5] * e + (polyval(alpha, m["g"]) + d[3]) * qh
     roll_terms = [beta, alpha * beta, a2 * beta, b2, alpha * b2, a3 * beta, alpha**4 * beta, a2 * b2]
     cl = (
         m["h"] @ np.array(roll_terms)

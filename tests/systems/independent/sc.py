@@ -31,9 +31,7 @@ def outputs(steam: Array, step: float) -> dict[str, Array]:
         filters = x[4:]
         span = 5.7997431225043385 + 3.7742393716738434
         error = 2 * (measured - set_point + 3.7742393716738434) / span - 1
-        units = np.tanh(
-            data["offset"][:, None] + data["inputWeight"][:, None] * error + to_network @ filters
-        )
+        units = np.tanh(data["offset"][:, None] + data["inputWeight"][:, None] * error + to_network @ filters)
         network = data["outputWeight"] @ units - 0.33227866684137108
         command = (network + 1) / 2 * (66.879264965962932 + 30.855068745036114) - 30.855068745036114
         q = heat(water, pressure, flow)
