@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.signals import Signal
+from falsifier.stl import Monitor, parse
+from falsifier.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]
 Array = NDArray[np.float64]
@@ -114,3 +116,12 @@ def driver(system: str) -> Iterator[Driver]:
     finally:
         slave.freeInstance()
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def robustness(requirement: str, system: str, columns: Mapping[str, Array], *, stop_time: float) -> float:
+    """Robustness of a requirement of a spec file on signals over [0, stop_time]."""
+    spec = tomllib.loads((ROOT / "specs" / f"{system}.toml").read_text())
+    formula = parse(spec["requirements"][requirement]["formula"])
+    times = np.linspace(0.0, stop_time, len(next(iter(columns.values()))))
+    monitor = Monitor(formula, stop_time / (len(times) - 1), len(times))
+    return monitor.evaluate(Trajectory(times, columns)).robustness

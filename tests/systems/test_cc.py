@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tests.systems.driving import Array, Driver, evenly, golden
+from tests.systems.driving import Array, Driver, evenly, golden, robustness
 from tests.systems.independent import cc
 
 GOLDEN = golden("CC")
@@ -26,6 +26,19 @@ def test_golden_positions(fmu: Driver, name: str) -> None:
         k = round(time * 1000)
         assert positions[k] == pytest.approx(expected, abs=0.02), f"t = {time}"
         assert "".join("?KCB"[int(m)] for m in modes[k]) == letters, f"t = {time}"
+    columns = dict(zip(POSITIONS, positions.T, strict=True))
+    for requirement, expected in run["robustness"].items():
+        assert robustness(requirement, "CC", columns, stop_time=STOP) == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize("requirement", GOLDEN["falsifying"])
+def test_golden_violations(fmu: Driver, requirement: str) -> None:
+    run = GOLDEN["falsifying"][requirement]
+    times = np.linspace(0, STOP, 10001)
+    positions, _ = drive(fmu, *(evenly(run[i], STOP).sample(times) for i in ("throttle", "brake")))
+    measured = robustness(requirement, "CC", dict(zip(POSITIONS, positions.T, strict=True)), stop_time=STOP)
+    assert measured < 0
+    assert measured == pytest.approx(run["robustness"], abs=0.1)
 
 
 def test_independent_motion(fmu: Driver) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.signals import Signal
-from tests.systems.driving import Driver, golden
+from tests.systems.driving import Driver, golden, robustness
 from tests.systems.independent import nn
 
 GOLDEN = golden("NN")
@@ -34,6 +34,9 @@ def test_golden_positions(fmu: Driver, name: str) -> None:
         assert position.max() == pytest.approx(run["max_Pos"], abs=1e-3)
     if "max_Pos_from_2_to_3" in run:
         assert position[200:301].max() == pytest.approx(run["max_Pos_from_2_to_3"], abs=1e-3)
+    columns = {"Pos": position, "Ref": reference}
+    for requirement, expected in run["robustness"].items():
+        assert robustness(requirement, "NN", columns, stop_time=STOP) == pytest.approx(expected, abs=2e-3)
 
 
 @pytest.mark.parametrize("reference", [1.0, 2.0, 3.0])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.signals import Signal
-from tests.systems.driving import Array, Driver, golden
+from tests.systems.driving import Array, Driver, golden, robustness
 from tests.systems.independent import pm
 
 GOLDEN = golden("PM")
@@ -27,7 +27,7 @@ def test_golden_paces(fmu: Driver, name: str) -> None:
     assert counted[-1] == run["count"]
     if "count_each_second" in run:
         assert counted[1000::1000].tolist() == run["count_each_second"]
-    assert min(15 - counted.max(), counted.max() - 8) == run["robustness"]
+    assert robustness("PM", "PM", {"PACE_COUNT": counted}, stop_time=STOP) == run["robustness"]
 
 
 @pytest.mark.parametrize(("rate", "expected"), GOLDEN["counts"].items())
