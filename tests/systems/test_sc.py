@@ -21,7 +21,8 @@ def steam(points: dict[str, Any], times: Array) -> Array:
 @pytest.mark.parametrize("name", GOLDEN["runs"])
 def test_golden_pressures(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
-    times = np.linspace(0, STOP, 14001)
+    # The figures belong to inputs that change continuously: each is held for 2.5 ms at its value half-way.
+    times = np.linspace(0, STOP, 14001) + 0.00125
     rows = fmu.run({"Fs": steam(run["Fs"], times)}, OUTPUTS, stop_time=STOP, samples=len(times))
     columns = dict(zip(OUTPUTS, rows.T, strict=True))
     for output, start in GOLDEN["start"].items():
