@@ -1,0 +1,1 @@
+"""Systems: golden figures and independent integrations against the bundled FMUs."""

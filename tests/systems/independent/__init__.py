@@ -1,0 +1,1 @@
+"""The same equations once more, written and integrated in another way."""
