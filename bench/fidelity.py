@@ -1,0 +1,215 @@
+"""Do the bundled systems behave as the published ones? Uniform random inputs tell.
+
+Samples each requirement's search space uniformly, counts violations, and sets 1/p beside the published mean
+number of simulations until the first violation. The mean of ten such numbers has a standard error of about
+1/p / sqrt(10), so z = (published / measured - 1) * sqrt(10). Where not all ten published runs falsified within
+1500 simulations, the number of those that did is judged by its binomial probability P.
+
+    python bench/fidelity.py              # the table of bench/fidelity.md
+    python bench/fidelity.py AT CC --share 0.1
+"""
+
+import argparse
+import sys
+import time
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from falsifier.evaluation import evaluate, monitor_for
+from falsifier.problem import Problem, load_problem
+from falsifier.space import ParameterRange
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Problems that share their simulations, and how many of them.
+
+    Attributes:
+        requirements: names of bundled requirements over one search space.
+        samples: number of simulations.
+        variant: what is not as the spec says, for people; empty otherwise.
+        volume: share of the spec's search space that is sampled; no violation is known outside of it.
+    """
+
+    requirements: tuple[str, ...]
+    samples: int
+    variant: str = ""
+    volume: float = 1.0
+
+
+ROWS = {
+    "AT": [
+        Row(("AT1", "AT2", "AT51", "AT52", "AT53", "AT54", "AT6a", "AT6b", "AT6c", "AT6abc"), samples=15000)
+    ],
+    "CC": [Row(("CC1", "CC2", "CC3", "CC4", "CC5", "CCx"), samples=5000)],
+    "NN": [
+        Row(("NN", "NNb"), samples=4000),
+        Row(("NN", "NNb"), samples=4000, variant="8 held pieces"),
+        Row(("NNx",), samples=3000),
+    ],
+    "F16": [
+        Row(("F16",), samples=5000),
+        Row(
+            ("F16",),
+            samples=2000,
+            variant="roll in the top 10 %, pitch in the lowest 0.2 %",
+            volume=0.1 * 0.002,
+        ),
+    ],
+    "SC": [Row(("SC",), samples=2000)],
+    "PM": [Row(("PM",), samples=2000)],
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """Violations of one requirement.
+
+    Attributes:
+        requirement: its name.
+        row: where it was counted.
+        samples: number of simulations.
+        violations: how many of them violate it.
+        lowest: smallest robustness seen.
+    """
+
+    requirement: str
+    row: Row
+    samples: int
+    violations: int
+    lowest: float
+
+    @property
+    def probability(self) -> float:
+        """Share of the whole search space that violates."""
+        return self.violations / self.samples * self.row.volume
+
+
+def problems(row: Row) -> list[Problem]:
+    """Load the problems of a row, with its variant."""
+    loaded = [load_problem(name) for name in row.requirements]
+    if row.variant == "8 held pieces":
+        return [_held(problem) for problem in loaded]
+    if row.volume < 1:
+        return [_cornered(problem) for problem in loaded]
+    return loaded
+
+
+def _held(problem: Problem) -> Problem:
+    inputs = tuple(replace(r, interpolation="constant") for r in problem.space.inputs)
+    return replace(problem, space=replace(problem.space, inputs=inputs))
+
+
+def _cornered(problem: Problem) -> Problem:
+    def narrowed(p: ParameterRange) -> ParameterRange:
+        width = p.high - p.low
+        if p.name == "roll":
+            return replace(p, low=p.high - 0.1 * width)
+        return replace(p, high=p.low + 0.002 * width) if p.name == "pitch" else p
+
+    parameters = tuple(narrowed(p) for p in problem.space.parameters)
+    return replace(problem, space=replace(problem.space, parameters=parameters))
+
+
+def count(row: Row, samples: int, seed: int) -> list[Count]:
+    """Simulate uniform candidates and judge each by all requirements of the row."""
+    rng = np.random.default_rng(seed)
+    group = problems(row)
+    first = group[0]
+    low, high = first.space.bounds.T
+    robustness = np.empty((samples, len(group)))
+    for k in range(samples):
+        evaluation = evaluate(first, first.space.decode(rng.uniform(low, high)))
+        if evaluation.trajectory is None or evaluation.robustness is None:
+            raise SystemExit(
+                f"{first.name}: simulation {k} ended as {evaluation.status}: {evaluation.reason}"
+            )
+        robustness[k, 0] = evaluation.robustness
+        for i, problem in enumerate(group[1:], start=1):
+            robustness[k, i] = monitor_for(problem).evaluate(evaluation.trajectory).robustness
+    first.model.close()
+    return [
+        Count(p.name, row, samples, int((column < 0).sum()), float(column.min()))
+        for p, column in zip(group, robustness.T, strict=True)
+    ]
+
+
+def expected_runs(probability: float, budget: int, runs: int) -> float:
+    """Expected number of runs that falsify within the budget."""
+    return runs * (1 - (1 - probability) ** budget)
+
+
+def binomial_tail(successes: int, runs: int, share: float) -> float:
+    """Probability of a number of successes as unlikely as this one, both tails."""
+    from scipy.stats import binomtest
+
+    return float(binomtest(successes, runs, min(max(share, 0.0), 1.0)).pvalue)
+
+
+def line(found: Count, published: dict[str, Any]) -> str:
+    """One line of the table."""
+    p = found.probability
+    error = sqrt(found.violations) / found.samples * found.row.volume
+    mean = 1 / p if p else inf
+    cells = [
+        found.requirement + (f" ({found.row.variant})" if found.row.variant else ""),
+        f"{found.violations} / {found.samples}",
+        f"{p:.2g} ± {error:.1g}" if p else f"< {3 * found.row.volume / found.samples:.1g}",
+        f"{mean:.4g}" if isfinite(mean) else "never",
+        f"{found.lowest:+.4g}",
+    ]
+    uniform = published["uniform"].get(found.requirement)
+    if uniform is None:
+        return _cells([*cells, "", "", ""])
+    budget, runs = published["budget"]["uniform"], published["runs"]
+    falsified = uniform["falsified"]
+    text = f"{falsified}/{runs}" + (f", {uniform['mean']:g}" if "mean" in uniform else "")
+    expected = expected_runs(p, budget, runs)
+    if falsified == runs and p > 0:
+        z = (uniform["mean"] * p - 1) * sqrt(runs)
+        verdict = f"z = {z:+.1f}"
+    else:
+        verdict = f"P = {binomial_tail(falsified, runs, expected / runs):.2f}"
+    return _cells([*cells, text, f"{expected:.1f}/{runs}", verdict])
+
+
+def _cells(texts: Sequence[str]) -> str:
+    return "| " + " | ".join(texts) + " |"
+
+
+def table(systems: Sequence[str], share: float, seed: int) -> Iterator[str]:
+    """Lines of the table, each as soon as it is counted."""
+    published = tomllib.loads((ROOT / "specs" / "published.toml").read_text(encoding="utf-8"))
+    header = ["requirement", "violations", "p", "1/p", "lowest robustness"]
+    header += ["published: falsified runs, mean", "expected runs", "agreement"]
+    yield _cells(header)
+    yield _cells(["---"] * len(header))
+    for system in systems:
+        for row in ROWS[system]:
+            for found in count(row, max(1, round(row.samples * share)), seed):
+                yield line(found, published)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("systems", nargs="*", default=list(ROWS), help=f"some of {', '.join(ROWS)}")
+    parser.add_argument("--share", type=float, default=1.0, help="share of the samples to take")
+    parser.add_argument("--seed", type=int, default=20250601)
+    options = parser.parse_args()
+    started = time.perf_counter()
+    for text in table(options.systems, options.share, options.seed):
+        print(text, flush=True)
+    print(f"{time.perf_counter() - started:.0f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()
