@@ -2,7 +2,7 @@
 
 Samples each requirement's search space uniformly, counts violations, and sets 1/p beside the published mean
 number of simulations until the first violation. The mean of ten such numbers has a standard error of about
-1/p / sqrt(10), so z = (published / measured - 1) * sqrt(10). Where not all ten published runs falsified within
+1/p / sqrt(10), so z = (published / measured - 1) * sqrt(10). Where not all ten published runs falsified in
 1500 simulations, the number of those that did is judged by its binomial probability P.
 
     python bench/fidelity.py              # the table of bench/fidelity.md

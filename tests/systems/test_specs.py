@@ -1,0 +1,86 @@
+import tomllib
+from typing import Any
+
+import pytest
+
+from falsifier.problem import load_problem, load_problems
+from tests.systems.driving import ROOT
+
+# Requirements and coordinates of the default parameterization, then of instance 2 where there is one.
+SYSTEMS = {
+    "AT": ("AT1 AT2 AT51 AT52 AT53 AT54 AT6a AT6b AT6c AT6abc", 10, 10),
+    "CC": ("CC1 CC2 CC3 CC4 CC5 CCx", 20, 40),
+    "NN": ("NN NNb NNx", 8, 3),
+    "F16": ("F16", 3, None),
+    "SC": ("SC", 18, 20),
+    "PM": ("PM", 10, 5),
+}
+
+
+def published() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "specs" / "published.toml").read_text())
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_spec_loads(system: str) -> None:
+    names, coordinates, coordinates_of_instance_2 = SYSTEMS[system]
+    problems = load_problems(system)
+    assert [p.name for p in problems] == names.split()
+    for problem in problems:
+        assert len(problem.space.dimensions) == coordinates
+        assert problem.requirement.description.endswith(".")
+    if coordinates_of_instance_2 is not None:
+        for problem in load_problems(system, profile="instance2"):
+            assert len(problem.space.dimensions) == coordinates_of_instance_2
+            assert all(r.interpolation == "constant" and r.free is None for r in problem.space.inputs)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_fmu_speaks_for_itself(system: str) -> None:
+    info = load_problems(system)[0].info
+    assert len(info.description.split()) > 15
+    assert set(info.interfaces) == {"co-simulation", "model-exchange"}
+    for variable in (*info.inputs, *info.outputs, *info.parameters):
+        assert variable.description, variable.name
+    for variable in info.inputs:
+        assert variable.unit, variable.name
+        assert variable.low is not None and variable.high is not None, variable.name
+
+
+def test_instance_2_of_nnx_is_over_after_three_seconds() -> None:
+    assert load_problem("NNx").space.stop_time == 40
+    problem = load_problem("NNx", profile="instance2")
+    assert problem.space.stop_time == 3
+    assert [d.time for d in problem.space.dimensions] == [0, 1, 2]
+    assert problem.space.bounds.tolist() == [[1.95, 2.05]] * 3
+
+
+def test_samples_of_f16_are_those_of_its_autopilot() -> None:
+    problem = load_problem("F16")
+    assert problem.experiment.samples == 451
+    assert problem.experiment.output_interval == pytest.approx(1 / 30, rel=1e-15)
+
+
+def test_published_tables_cover_the_specs() -> None:
+    tables = published()
+    names = {name for system, (text, *_) in SYSTEMS.items() if system != "PM" for name in text.split()}
+    columns = [tables["best"], tables["uniform"], tables["llm_falsifier"]]
+    columns += [*tables["ablation"].values(), *tables["models"].values()]
+    for column in columns:
+        assert column.keys() - {"source"} == names
+        assert column["source"]
+        for name in names:
+            entry = column[name]
+            assert 0 <= entry["falsified"] <= tables["runs"]
+            assert ("mean" in entry) == (entry["falsified"] > 0)
+
+
+def test_published_ranks_follow_from_the_numbers() -> None:
+    tables = published()
+    firsts = [
+        name for name, row in tables["llm_falsifier"].items() if name != "source" and row.get("rank") == 1
+    ]
+    assert len(firsts) == 14
+    for name in firsts:
+        ours, best = tables["llm_falsifier"][name], tables["best"][name]
+        assert (-ours["falsified"], ours["mean"]) <= (-best["falsified"], best["mean"])
