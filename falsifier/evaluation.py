@@ -74,8 +74,8 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     try:
         verdict = monitor_for(problem).evaluate(trajectory)
     except MonitorError as error:
-        return Evaluation(candidate, "failed", None, str(error), None, seconds)
-    return Evaluation(candidate, "ok", verdict, "", trajectory, seconds)
+        return Evaluation(candidate, "failed", None, str(error), None, seconds, outputs.log)
+    return Evaluation(candidate, "ok", verdict, "", trajectory, seconds, outputs.log)
 
 
 def monitor_for(problem: Problem) -> Monitor:

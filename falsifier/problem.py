@@ -5,12 +5,12 @@
     problem = load_problem("specs/AT.toml:AT1", profile="instance2")
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from falsifier.errors import FormulaError, SpecError, did_you_mean
-from falsifier.model import Experiment, Model, ModelInfo, Variable
+from falsifier.model import Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.spec import (
     InputSection,
@@ -164,7 +164,7 @@ def build_problem(
     changes: ModelChanges | None = None,
 ) -> Problem:
     """Join a validated spec with its FMU; path is the spec file, for relative names and for errors."""
-    from falsifier.fmu import FmuModel
+    from falsifier.fmu import FmuModel, read_info
 
     file = str(path)
     if requirement not in spec.requirements:
@@ -179,13 +179,13 @@ def build_problem(
             f"there is no FMU {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
         )
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-    interface = next((x.interface for x in reversed(layers) if x.interface), spec.model.interface)
-    model = FmuModel(fmu, interface=interface)
+    model = FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), file))
     experiment = _experiment(spec, layers, model.info, file)
     inputs, parameters = _merged(spec, layers)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
     section = spec.requirements[requirement]
-    key = f"requirements.{requirement}.formula"
+    is_option = stl is not None or path.suffix == ".fmu"
+    key = "--stl" if is_option else f"requirements.{requirement}.formula"
     formula = parse_requirement(
         section.formula if stl is None else stl, model.info, experiment, file=file, key=key
     )
@@ -218,6 +218,16 @@ def parse_requirement(
     except FormulaError as error:
         raise SpecError(str(error), file=file, key=key) from None
     return formula
+
+
+def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
+    stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
+    offered = " and ".join(info.interfaces) or "no interface that this tool knows"
+    if stated is None and len(info.interfaces) == 1:
+        return info.interfaces[0]
+    if stated is None or stated not in info.interfaces:
+        raise SpecError(f"the FMU offers {offered}: say which", file=file, key="model.interface")
+    return stated
 
 
 def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, file: str) -> Experiment:

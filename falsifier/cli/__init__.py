@@ -38,25 +38,28 @@ class _LazyGroup(click.Group):
             formatter.write_dl([(name, text) for name, (_, text) in _COMMANDS.items()])
 
 
-@click.command(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+_HELP = """Find inputs that make an FMU violate a requirement.
+
+\b
+falsifier run AT1                                      a bundled problem
+falsifier run my.toml:REQ --budget 300                 one of your own
+falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --input u=-1:1:5
+
+Exit code 0: nothing falsified, 1: falsified, 2: wrong usage or spec, 3: simulator, language model or
+machine failed, 130: interrupted.
+"""
+
+
+@click.command(cls=_LazyGroup, help=_HELP, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="falsifier")
 def cli() -> None:
-    r"""Find inputs that make an FMU violate a requirement.
-
-    \b
-    falsifier run AT1                                      a bundled problem
-    falsifier run my.toml:REQ --budget 300                 one of your own
-    falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --input u=-1:1:5
-
-    Exit code 0: nothing falsified, 1: falsified, 2: wrong usage or spec, 3: simulator, language model or
-    machine failed, 130: interrupted.
-    """
+    """Run the command that was named."""
 
 
 def main() -> None:
     """Entry point: every error ends with its exit code, and never with the code of a falsification."""
     try:
-        sys.exit(cli.main(standalone_mode=False))
+        sys.exit(cli.main(prog_name="falsifier", standalone_mode=False))
     except click.exceptions.Exit as end:
         sys.exit(end.exit_code)
     except click.ClickException as error:

@@ -1,6 +1,7 @@
 """``falsifier info``, ``init``, ``check`` and ``schema``: everything that does not search."""
 
 import json
+import sys
 from dataclasses import asdict
 from os.path import relpath
 from pathlib import Path
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 # Rows of a table of parameters or states; models have thousands of them.
 _SHOWN_VARIABLES = 60
+# Columns of text where the width of the terminal cannot be asked.
+_PIPED_WIDTH = 160
 
 
 @click.command()
@@ -44,11 +47,11 @@ def init(*, fmu: Path, out: Path | None, force: bool) -> None:
     """Write a starter spec for an FMU; it loads as it is."""
     from falsifier.fmu import read_info
 
-    found = read_info(_existing_fmu(fmu))
+    source = _existing_fmu(fmu)
     path = out or fmu.with_suffix(".toml")
     if path.exists() and not force:
         raise SpecError(f"{path} exists already: give another --out, or --force to replace it")
-    path.write_text(starter_spec(_relative(fmu, path), found), encoding="utf-8")
+    path.write_text(starter_spec(_relative(source, path), read_info(source)), encoding="utf-8")
     load_problems(str(path))
     click.echo(f"{path} written. Put in the real ranges and the requirement, then: falsifier run {path}")
 
@@ -96,7 +99,7 @@ def _problem_line(problem: Problem) -> str:
 def _print_info(found: ModelInfo, *, everything: bool) -> None:
     from rich.console import Console
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPED_WIDTH)
     console.print(f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces)}")
     if found.description:
         console.print(found.description, markup=False)

@@ -37,9 +37,7 @@ _FUNCTIONS = {
 Node = Formula | Expression
 
 
-def compile_formula(
-    formula: Formula, *, step: float, samples: int, first: int = 0, last: int = 0
-) -> Program:
+def compile_formula(formula: Formula, *, step: float, samples: int, first: int = 0, last: int = 0) -> Program:
     """Compile a formula for trajectories of one grid.
 
     Args:

@@ -67,7 +67,9 @@ class Vacuity:
         over = _moment(self.window)
         near = f"it came nearest at {_s(self.nearest)}, missing by {_n(-self.margin)}"
         if self.only:
-            return f"vacuous: {self.implication} held {over} only because its left side was never true; {near}"
+            return (
+                f"vacuous: {self.implication} held {over} only because its left side was never true; {near}"
+            )
         return f"the left side of {self.implication} was never true {over}; {near}"
 
 

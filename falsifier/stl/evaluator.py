@@ -69,9 +69,7 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
     stacked = np.stack(used) if used else np.empty((0, count, program.samples))
     buffer, result = np.empty(program.size), np.empty(count)
     root = program.root.place.at(0)
-    status, which, position = kernels.judge_many(
-        program.rows, program.numbers, buffer, stacked, root, result
-    )
+    status, which, position = kernels.judge_many(program.rows, program.numbers, buffer, stacked, root, result)
     if status != kernels.FINE:
         raise MonitorError(f"trajectory {which}: {_complaint(program, buffer, status, position)}")
     return result

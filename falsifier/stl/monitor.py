@@ -128,9 +128,7 @@ class Monitor:
     def _reach(self, part: Formula) -> int:
         return round(part.horizon(self.step) / self.step)
 
-    def _values(
-        self, part: Formula, trajectory: Trajectory, first: int, last: int
-    ) -> NDArray[np.float64]:
+    def _values(self, part: Formula, trajectory: Trajectory, first: int, last: int) -> NDArray[np.float64]:
         program = compile_formula(part, step=self.step, samples=self.samples, first=first, last=last)
         buffer = fill(program, trajectory, np.empty(program.size))
         return program.root.over(buffer, first, last).copy()

@@ -42,7 +42,11 @@ def in_words(formula: Formula) -> str:
     At all times from 0 to 20 s, speed is at most 120.
     """
     text = _read(formula, later=False)
-    return text[0].upper() + text[1:] + "." if not formula.signals or not _starts_with_name(formula) else text + "."
+    return (
+        text[0].upper() + text[1:] + "."
+        if not formula.signals or not _starts_with_name(formula)
+        else text + "."
+    )
 
 
 def _starts_with_name(formula: Formula) -> bool:
@@ -88,7 +92,9 @@ def _part(formula: Formula, *, later: bool, within: type[Formula] | None = None)
     """Read an operand, in parentheses where its own words could run into its neighbour's."""
     text = _read(formula, later=later)
     is_plain = isinstance(formula, Predicate | within) if within else isinstance(formula, Predicate)
-    is_range = isinstance(formula, And) and "lies between" in text and " and " not in text.split(" and ", 1)[1]
+    is_range = (
+        isinstance(formula, And) and "lies between" in text and " and " not in text.split(" and ", 1)[1]
+    )
     is_negated = isinstance(formula, Not) and isinstance(formula.operand, Predicate)
     return text if is_plain or is_range or is_negated else f"({text})"
 

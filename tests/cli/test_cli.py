@@ -1,0 +1,177 @@
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from falsifier.journal import read_journal
+from falsifier.problem import bundled
+from tests.command import ROOT, falsifier
+
+
+def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
+    done = falsifier("run", "AT1", "--engine", "corners", "--json", "--out", "run", cwd=tmp_path)
+    assert done.code == 1, done.err
+    found = done.json["counterexample"]
+    assert done.json["status"] == "falsified"
+    assert found["robustness"] == pytest.approx(-0.2133, abs=1e-3)
+    assert found["critical_time"] == 20
+    assert found["predicate"] == "speed <= 120"
+    assert set(found["signals"]["throttle"]["values"]) == {100}
+    assert set(found["signals"]["brake"]["values"]) == {0}
+    run = tmp_path / "run"
+    assert {p.name for p in run.iterdir()} >= {"manifest.json", "journal.jsonl", "counterexample.json"}
+    assert (run / "counterexample.png").read_bytes().startswith(b"\x89PNG")
+    manifest = json.loads((run / "manifest.json").read_text())
+    assert len(manifest["hashes"]) == 2
+    assert manifest["request"]["seed"] == 0
+    assert "confirmed" in done.err
+    assert json.loads((run / "counterexample.json").read_text())["robustness"] == found["robustness"]
+
+
+def test_the_text_names_what_was_found_and_where_it_is(tmp_path: Path) -> None:
+    done = falsifier("run", "AT1", "--engine", "corners", "--quiet", "--out", "run", cwd=tmp_path)
+    assert done.err == ""
+    for part in (
+        "AT1: falsified after",
+        "-0.213",
+        "critical time  20 s",
+        "speed = 120.2",
+        "constant 100",
+        "run",
+    ):
+        assert part in done.out
+
+
+def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
+    done = falsifier(
+        "run", "AT1", "--engine", "uniform", "--budget", "3", "--param", "finalDrive=3", cwd=tmp_path
+    )
+    assert done.code == 0, done.err
+    assert "not falsified after 3 simulations" in done.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "AT1", "--stl", "G[0,20] (sped <= 120)"], "did you mean 'speed'"),
+        (["run", "AT1", "--engine", "corner"], "did you mean 'corners'"),
+        (["run", "AT1", "--input", "throtle=0:100:7"], "did you mean 'throttle'"),
+        (["run", "AT1", "--budget", "0"], "simulations must be positive"),
+        (["run", "AT1", "--budget", "many"], "many"),
+        (["run", "AT1", "--effort", "low"], "need --model"),
+        (["run", "gone.toml"], "no such spec file"),
+        (["run", "gone.fmu", "--stl", "G (x >= 0)"], "there is no file gone.fmu"),
+        (["run", "gone.fmu"], "--stl"),
+        (["resume", "nowhere"], "not a run directory"),
+        (["info", "gone.fmu"], "there is no file gone.fmu"),
+        (["rnu"], "rnu"),
+    ],
+)
+def test_wrong_usage_ends_with_two_and_says_what_to_do(
+    tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    done = falsifier(*arguments, cwd=tmp_path)
+    assert done.code == 2
+    assert message in done.err
+    assert "Traceback" not in done.err
+    assert done.out == ""
+
+
+def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:
+    (tmp_path / "bad.fmu").write_bytes(b"this is no archive")
+    done = falsifier("run", "bad.fmu", "--stl", "G (x >= 0)", cwd=tmp_path)
+    assert done.code == 3
+    assert "bad.fmu" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
+    done = falsifier("info", "AT.fmu", cwd=tmp_path)
+    assert done.code == 0, done.err
+    for part in (
+        "FMI 2.0",
+        "throttle",
+        "%",
+        "325",
+        "ft.lbf",
+        "Vehicle speed",
+        "co-simulation, model-exchange",
+    ):
+        assert part in done.out
+    described = falsifier("info", "AT.fmu", "--json", cwd=tmp_path).json
+    assert {v["name"] for v in described["variables"]} >= {"throttle", "brake", "speed", "rpm", "gear"}
+
+
+def test_init_writes_a_spec_that_runs(tmp_path: Path) -> None:
+    shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
+    assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0
+    again = falsifier("init", "car.fmu", cwd=tmp_path)
+    assert (again.code, "--force" in again.err) == (2, True)
+    assert falsifier("check", "car.toml", cwd=tmp_path).code == 0
+    assert falsifier("run", "car.toml", "--engine", "uniform", "--budget", "2", cwd=tmp_path).code == 0
+
+
+def test_check_names_all_requirements(tmp_path: Path) -> None:
+    done = falsifier("check", "AT", cwd=tmp_path)
+    assert done.code == 0
+    assert done.out.count(": ok") == 10
+
+
+def test_schema_describes_spec_files(tmp_path: Path) -> None:
+    schema = falsifier("schema", cwd=tmp_path).json
+    assert set(schema["properties"]) == {"model", "inputs", "parameters", "requirements", "profiles"}
+
+
+def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "from falsifier.cli import main; main()", "run", "AT1"]
+    options = ["--engine", "uniform", "--budget", "5000", "--out", "run"]
+    process = subprocess.Popen(
+        [*command, *options],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    journal = tmp_path / "run" / "journal.jsonl"
+    until = time.monotonic() + 60
+    while time.monotonic() < until and not (
+        journal.exists() and journal.read_text().count('"evaluated"') > 5
+    ):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in out
+    kept = sum(r.kind == "evaluated" for r in read_journal(tmp_path / "run"))
+    assert kept > 5
+    request = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    request["request"]["budget"]["simulations"] = kept + 2
+    (tmp_path / "run" / "manifest.json").write_text(json.dumps(request))
+    resumed = falsifier("resume", "run", cwd=tmp_path)
+    assert resumed.code == 0, resumed.err
+    assert f"{kept} evaluations from the journal" in resumed.err
+    assert f"after {kept + 2} simulations" in resumed.out
+
+
+def test_a_run_directory_is_not_overwritten(tmp_path: Path) -> None:
+    options = ("run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "run", "--quiet")
+    assert falsifier(*options, cwd=tmp_path).code == 0
+    again = falsifier(*options, cwd=tmp_path)
+    assert again.code == 2
+    assert "falsifier resume run" in again.err
+
+
+def test_help_is_fast_and_names_the_commands(tmp_path: Path) -> None:
+    falsifier("--help", cwd=tmp_path)  # compiled modules are on disk from here on
+    started = time.perf_counter()
+    done = falsifier("--help", cwd=tmp_path)
+    assert time.perf_counter() - started < 1.5  # 0.5 s on an idle machine, see bench/
+    assert done.code == 0
+    for name in ("run", "info", "check", "prompt", "resume"):
+        assert f"  {name}" in done.out
