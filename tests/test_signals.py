@@ -18,8 +18,8 @@ def test_pchip_is_scipys() -> None:
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=9), st.data())
 def test_pchip_is_scipys_at_uneven_times(values: list[float], data: st.DataObject) -> None:
     gaps = data.draw(st.lists(st.floats(0.1, 9), min_size=len(values) - 1, max_size=len(values) - 1))
-    times = np.concatenate([[0.0], np.cumsum(gaps)])
-    at = np.linspace(0, times[-1], 57)
+    times = np.concatenate([[0.0], np.cumsum(gaps)]).astype(np.float64)
+    at = np.linspace(0.0, float(times[-1]), 57)
     got = Signal(tuple(times.tolist()), tuple(values)).sample(at)
     np.testing.assert_allclose(got, PchipInterpolator(times, values)(at), atol=1e-9)
 
