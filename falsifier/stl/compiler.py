@@ -285,7 +285,7 @@ class _Compiler:
         if isinstance(node, Always | Eventually | Until):
             window = window_samples(node.window, self.step) if node.window else (0, None)
         children = tuple(self.part(child) for child in node.children)
-        return Part(node, self.places[node], window, self.samples, children)
+        return Part(node, str(node), self.places[node], window, self.samples, children)
 
     def program(self) -> Program:
         """Return what was compiled."""

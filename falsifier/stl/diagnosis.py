@@ -65,12 +65,14 @@ class Vacuity:
     def text(self) -> str:
         """The finding in words."""
         over = _moment(self.window)
-        near = f"it came nearest at {_s(self.nearest)}, missing by {_n(-self.margin)}"
+        near = f"it missed by {_n(-self.margin)}"
+        if self.window[0] < self.window[1]:
+            near = f"it came nearest at {_s(self.nearest)}, missing by {_n(-self.margin)}"
         if self.only:
             return (
-                f"vacuous: {self.implication} held {over} only because its left side was never true; {near}"
+                f"Vacuous: {self.implication} held {over} only because its left side was never true; {near}."
             )
-        return f"the left side of {self.implication} was never true {over}; {near}"
+        return f"The left side of {self.implication} was never true {over}; {near}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +100,7 @@ class Diagnosis:
     def text(self) -> str:
         """The way in words, and what was vacuous."""
         way = ", where ".join(step.text for step in self.path)
-        return ". ".join((way, *(v.text for v in self.vacuities))) + "."
+        return " ".join((f"{way}.", *(v.text for v in self.vacuities)))
 
 
 def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
@@ -113,11 +115,14 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
     way = trace(root, buffer)
     steps = []
     for here, following in zip(way, [*way[1:], way[-1]], strict=True):
+        formula, time = here.part.formula, float(times[here.sample])
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
-        text = _words(here.formula, following.formula, window, float(times[following.sample]), here.value)
-        if isinstance(here.formula, Predicate):
-            text = _judged(here.formula, here.value, trajectory.at(float(times[here.sample])))
-        steps.append(Step(here.formula, float(times[here.sample]), here.value, window, text))
+        if isinstance(formula, Predicate):
+            text = _judged(formula, here.value, trajectory.at(time))
+        else:
+            decided_at = float(times[following.sample])
+            text = _words(formula, following.part.formula, window, decided_at, here.value)
+        steps.append(Step(formula, time, here.value, window, text))
     vacuities = {
         v.implication: v for part in root.walk() for v in [_vacuity(part, buffer, times)] if v is not None
     }

@@ -184,8 +184,8 @@ def _slide(out: Floats, a: Floats, sign: float) -> None:
 @compiled
 def _smallest(a: Floats, sign: float) -> float:
     best = np.inf
-    for value in a:
-        best = min(best, sign * value)
+    for i in range(a.size):
+        best = min(best, sign * a[i])
     return best
 
 
@@ -193,8 +193,8 @@ def _smallest(a: Floats, sign: float) -> float:
 def _first_infinite(a: Floats) -> int:
     """Position of the first value that is NaN or infinite, -1 where there is none."""
     count = 0
-    for value in a:
-        count += value - value != 0.0
+    for i in range(a.size):
+        count += a[i] - a[i] != 0.0
     if count:
         for i in range(a.size):
             if not np.isfinite(a[i]):

@@ -59,9 +59,9 @@ class Monitor:
         buffer = fill(self._program, trajectory, self._take_buffer())
         way = trace(self._program.root, buffer)
         self._spare.append(buffer)
-        predicate, sample = way[-1].formula, way[-1].sample
+        decider, sample = way[-1].part, way[-1].sample
         values = {name: column.item(sample) for name, column in trajectory.columns.items()}
-        return Verdict(way[0].value, trajectory.times.item(sample), str(predicate), values)
+        return Verdict(way[0].value, trajectory.times.item(sample), decider.text, values)
 
     def diagnose(self, trajectory: Trajectory) -> Diagnosis:
         """Way from the formula to the predicate that decided its value, in words too, and vacuity.

@@ -34,6 +34,7 @@ class Part:
 
     Attributes:
         formula: the sub-formula.
+        text: its text.
         place: its samples and their offsets.
         window: of a temporal operator, in samples from where it stands; without an end it reaches to the last
             sample of all.
@@ -42,6 +43,7 @@ class Part:
     """
 
     formula: Formula
+    text: str
     place: Place
     window: tuple[int, int | None] | None
     samples: int

@@ -1,9 +1,9 @@
 """rtamt as an independent second opinion on the robustness at time 0.
 
 rtamt (D. Nickovic, T. Yamaguchi, "RTAMT: Online robustness monitors from STL", ATVA 2020) reads some texts
-silently in another way than they look, so it never sees a formula as written. It gets a text made of our tree:
-every operator in parentheses, signals under plain aliases, times counted in samples of one second. What its
-discrete-time semantics has not is rewritten:
+silently in another way than they look, so it never sees a formula as written. It gets a text made of our
+tree: every operator in parentheses, signals under plain aliases, times counted in samples of one second. What
+its discrete-time semantics has not is rewritten:
 
 - the compared expressions are columns of their own, because versions differ in the arithmetic they know;
 - its ``until`` leaves the last sample of the left operand out: ``l U r`` becomes ``l U (l and r)``;
@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from falsifier.errors import MonitorError
+from falsifier.stl.compiler import window_samples
 from falsifier.stl.expression import Expression, Number, number_text
 from falsifier.stl.formula import (
     Always,
@@ -37,7 +38,6 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.stl.compiler import window_samples
 from falsifier.trajectory import Trajectory
 
 

@@ -17,16 +17,16 @@ Floats = NDArray[np.float64]
 
 
 class Waypoint(NamedTuple):
-    """One formula on the way.
+    """One sub-formula on the way.
 
     Attributes:
-        formula: the formula.
+        part: the compiled sub-formula.
         sample: where its value was asked for.
         value: its robustness there.
         window: first and last sample that its operator looked at; None without a window.
     """
 
-    formula: Formula
+    part: Part
     sample: int
     value: float
     window: tuple[int, int] | None
@@ -43,7 +43,7 @@ def trace(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoint]:
     way: list[Waypoint] = []
     while True:
         window = part.window_at(sample)
-        way.append(Waypoint(part.formula, sample, part.at(buffer, sample), window))
+        way.append(Waypoint(part, sample, part.at(buffer, sample), window))
         if not part.children:
             return way
         part, sample = _decider(part, buffer, sample, window)

@@ -42,19 +42,8 @@ def in_words(formula: Formula) -> str:
     At all times from 0 to 20 s, speed is at most 120.
     """
     text = _read(formula, later=False)
-    return (
-        text[0].upper() + text[1:] + "."
-        if not formula.signals or not _starts_with_name(formula)
-        else text + "."
-    )
-
-
-def _starts_with_name(formula: Formula) -> bool:
-    while formula.children:
-        if not isinstance(formula, And | Or | Iff | Until | Not):
-            return False
-        formula = formula.children[0]
-    return True
+    begins_with_word = text.startswith(("at ", "if ", "it "))  # not with a signal, whose case matters
+    return f"{text[0].upper() + text[1:] if begins_with_word else text}."
 
 
 def _read(formula: Formula, *, later: bool) -> str:
@@ -66,14 +55,14 @@ def _read(formula: Formula, *, later: bool) -> str:
             return _negated(predicate)
         case Not(operand):
             return f"it is not so that {_part(operand, later=later)}"
-        case And(Predicate() as low, Predicate() as high) if _is_chain(low, high):
+        case And(Predicate() as low, Predicate() as high) if _is_range(formula):
             return f"{low.right} lies between {low.left} and {high.right}"
         case And(left, right):
             return f"{_part(left, later=later, within=And)} and {_part(right, later=later, within=And)}"
         case Or(left, right):
             return f"{_part(left, later=later, within=Or)} or {_part(right, later=later, within=Or)}"
         case Implies(left, right):
-            return f"if {_part(left, later=later)}, then {_part(right, later=later)}"
+            return f"if {_condition(left, later=later)}, then {_read(right, later=later)}"
         case Iff(left, right):
             return f"{_part(left, later=later)} exactly when {_part(right, later=later)}"
         case Always(operand, window):
@@ -88,15 +77,26 @@ def _read(formula: Formula, *, later: bool) -> str:
     raise TypeError(f"not a formula: {formula!r}")
 
 
+def _condition(formula: Formula, *, later: bool) -> str:
+    is_closed = not any(isinstance(f, Implies | Iff | Until) for f in formula.walk())
+    return _read(formula, later=later) if is_closed else _part(formula, later=later)
+
+
 def _part(formula: Formula, *, later: bool, within: type[Formula] | None = None) -> str:
-    """Read an operand, in parentheses where its own words could run into its neighbour's."""
+    """Read an operand, in parentheses where its words could run into its neighbour's."""
     text = _read(formula, later=later)
-    is_plain = isinstance(formula, Predicate | within) if within else isinstance(formula, Predicate)
-    is_range = (
-        isinstance(formula, And) and "lies between" in text and " and " not in text.split(" and ", 1)[1]
+    is_short = isinstance(formula, Predicate) or (
+        isinstance(formula, Not) and isinstance(formula.operand, Predicate)
     )
-    is_negated = isinstance(formula, Not) and isinstance(formula.operand, Predicate)
-    return text if is_plain or is_range or is_negated else f"({text})"
+    is_same = within is not None and isinstance(formula, within)
+    return text if is_short or is_same or _is_range(formula) else f"({text})"
+
+
+def _is_range(formula: Formula) -> bool:
+    match formula:
+        case And(Predicate("<=", _, middle), Predicate("<=", again, _)):
+            return middle == again
+    return False
 
 
 def _predicate(predicate: Predicate) -> str:
@@ -117,10 +117,6 @@ def _negated(predicate: Predicate) -> str:
     if is_flag(predicate):
         return f"{predicate.left} is false"
     return _predicate(Predicate(_OPPOSITE[predicate.operator], predicate.left, predicate.right))
-
-
-def _is_chain(low: Predicate, high: Predicate) -> bool:
-    return low.operator == high.operator == "<=" and low.right == high.left
 
 
 def _throughout(window: Window | None, *, later: bool) -> str:

@@ -44,20 +44,18 @@ def negative(operand: Expression) -> Expression:
     return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
 
 
-def random_formula(rng: random.Random, depth: int, *, unbounded: bool = True) -> Formula:
+def random_formula(rng: random.Random, depth: int, *, windows: bool = True) -> Formula:
     """Formula of at most this depth; operators without a window have no window inside."""
     if depth == 0 or rng.random() < 0.15:
         operator: Comparison = rng.choice(("<", "<=", ">", ">=", "==", "!="))
         return Predicate(operator, random_expression(rng, 2), random_expression(rng, 1))
     choice = rng.choice(["not", "and", "or", "->", "<->", "G", "F", "U", "X"])
-    window = random_window(rng)
-    if unbounded and choice in "GFU" and rng.random() < 0.25:
-        window = None
+    window = random_window(rng) if windows and rng.random() < 0.8 else None
 
     def below() -> Formula:
-        part = random_formula(rng, depth - 1, unbounded=unbounded)
-        while window is None and part.horizon(STEP) > 0:
-            part = random_formula(rng, depth - 1, unbounded=unbounded)
+        part = random_formula(rng, depth - 1, windows=windows)
+        while choice in "GFU" and window is None and part.horizon(STEP) > 0:
+            part = random_formula(rng, depth - 1, windows=windows)
         return part
 
     match choice:
@@ -75,7 +73,7 @@ def random_formula(rng: random.Random, depth: int, *, unbounded: bool = True) ->
     return joined(below(), below())
 
 
-def random_window(rng: random.Random) -> Window | None:
+def random_window(rng: random.Random) -> Window:
     start = rng.randint(0, 3)
     return Window(start * STEP, (start + rng.randint(0, 4)) * STEP)
 
@@ -92,9 +90,9 @@ def random_trajectory(rng: random.Random, samples: int) -> Trajectory:
     return Trajectory(np.arange(samples, dtype=np.float64) * STEP, columns)
 
 
-def random_case(seed: int, *, depth: int = 4, unbounded: bool = True) -> tuple[Formula, Trajectory]:
+def random_case(seed: int, *, depth: int = 4) -> tuple[Formula, Trajectory]:
     """Formula and a trajectory that is just long enough, or a little longer."""
     rng = random.Random(seed)
-    formula = random_formula(rng, rng.randint(0, depth), unbounded=unbounded)
+    formula = random_formula(rng, rng.randint(0, depth))
     samples = round(formula.horizon(STEP) / STEP) + 1 + rng.choice((0, 0, 1, 3))
     return formula, random_trajectory(rng, samples)

@@ -1,26 +1,345 @@
+import pickle
+import random
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
-from falsifier.stl import Monitor
+from falsifier.errors import FormulaError, MonitorError
+from falsifier.stl import Monitor, Verdict, parse
 from falsifier.trajectory import Trajectory
 from tests.stl.direct import Direct
-from tests.stl.randoms import STEP, random_case
+from tests.stl.randoms import STEP, random_case, random_trajectory
 
 
 def trajectory(step: float = 1.0, **columns: list[float]) -> Trajectory:
     n = len(next(iter(columns.values())))
-    return Trajectory(
-        np.arange(n, dtype=np.float64) * step, {name: np.array(c, dtype=float) for name, c in columns.items()}
-    )
+    times = np.arange(n, dtype=np.float64) * step
+    return Trajectory(times, {name: np.array(c, dtype=np.float64) for name, c in columns.items()})
 
 
-@pytest.mark.parametrize("block", range(10))
+def judge(text: str, t: Trajectory) -> tuple[float, float]:
+    verdict = Monitor(parse(text), t.step or 1.0, len(t)).evaluate(t)
+    return verdict.robustness, verdict.critical_time
+
+
+@pytest.mark.parametrize("block", range(8))
 def test_random_formulas_agree_with_the_direct_definition(block: int) -> None:
     for seed in range(block * 400, (block + 1) * 400):
         formula, t = random_case(seed)
         verdict = Monitor(formula, STEP, len(t)).evaluate(t)
         robustness, sample = Direct(t.columns, STEP).judge(formula)
-        assert (verdict.robustness, verdict.critical_time) == (robustness, t.times[sample]), (
-            seed,
-            str(formula),
-        )
+        found = (verdict.robustness, verdict.critical_time)
+        assert found == (robustness, t.times[sample]), (seed, str(formula))
+
+
+# -- values and critical times by hand -----------------------------------------------------------------------
+
+X = [3.0, 1.0, 4.0, 1.0, 5.0]
+Y = [2.0, 7.0, 1.0, 8.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "robustness", "critical"),
+    [
+        ("x <= 5", 2, 0),
+        ("x < 5", 2, 0),
+        ("x >= 5", -2, 0),
+        ("x == 3", 0, 0),
+        ("x != 5", 2, 0),
+        ("not (x == 5)", 2, 0),
+        ("x^2 <= 10", 1, 0),
+        ("2 <= x <= 4", 1, 0),
+        ("G (x <= 4)", -1, 4),
+        ("G[1,3] (x <= 4)", 0, 2),
+        ("G[1,3] (x >= 0)", 1, 1),  # the earlier of two smallest
+        ("F[1,3] (x <= 0)", -1, 1),  # the earlier of two largest
+        ("F (y >= 8)", 0, 3),
+        ("G[4,4] (x <= 4)", -1, 4),
+        ("X (x <= 3)", 2, 1),
+        ("X X (x <= 3)", -1, 2),
+        ("x <= 5 and y <= 4", 2, 0),
+        ("(X (x <= 3)) and (x <= 5)", 2, 1),  # the left operand on ties
+        ("(x <= 5) and (X (x <= 3))", 2, 0),
+        ("(X (x <= 3)) or (x <= 5)", 2, 1),
+        ("not (X (x <= 3)) -> (x <= 5)", 2, 1),
+        ("(x <= 5) <-> (X (x <= 3))", 2, 1),
+        ("(x <= 4) U (y >= 8)", 0, 3),  # left only where it is strictly smaller
+        ("(x <= 4) U (y >= 7.5)", 0, 2),
+        ("(x <= 9) U (y >= 7)", 1, 3),
+        ("(x <= 3) U (y >= 7)", 0, 1),
+        ("(x <= 9) U[0,2] (y >= 9)", -2, 1),
+        ("(x <= 4) U[3,4] (y >= 4)", 0, 2),
+        ("(x >= 9) U[1,2] (y >= 0)", -8, 1),
+    ],
+)
+def test_values_and_critical_times(text: str, robustness: float, critical: float) -> None:
+    assert judge(text, trajectory(x=X, y=Y)) == (robustness, critical)
+
+
+def test_until_includes_the_left_operand_at_the_end() -> None:
+    t = trajectory(left=[1.0, -1.0], right=[-1.0, 1.0])
+    assert judge("(left >= 0) U[0,1] (right >= 0)", t) == (-1.0, 0.0)
+    t = trajectory(left=[1.0, -3.0], right=[-5.0, 1.0])
+    assert judge("(left >= 0) U[0,1] (right >= 0)", t) == (-3.0, 1.0)
+
+
+def test_the_critical_time_of_a_nested_formula_is_the_inner_operators() -> None:
+    x = [5.0] * 14
+    x[6:9] = [-2.0, -1.0, -4.0]
+    assert judge("G[0,10] F[1,3] (x >= 0)", trajectory(x=x)) == (-1.0, 7.0)
+
+
+def test_operators_without_a_window_reach_to_the_end() -> None:
+    t = trajectory(x=[1.0, 2.0, 3.0, 0.0, -7.0])
+    assert judge("G (x >= 0)", t) == (-7.0, 4.0)
+    assert judge("G F (x >= 0)", t) == (-7.0, 4.0)
+    assert judge("F G (x >= 0)", t) == (-7.0, 4.0)
+    assert judge("G[0,3] F (x >= 0)", t) == (0.0, 3.0)
+    assert judge("(x >= 0) U G (x <= 0)", t) == (0.0, 3.0)
+
+
+def test_one_sample_and_constants() -> None:
+    t = trajectory(x=[2.0])
+    assert judge("G (x <= 3)", t) == (1.0, 0.0)
+    assert judge("F[0,0] (x <= 3) and (x >= 0) U (x >= 1)", t) == (1.0, 0.0)
+    assert judge("1 + 1 <= 5", trajectory(x=X)) == (3.0, 0.0)
+    assert judge("G[0,2] (min(1, 2) * x <= 2^2)", trajectory(x=[4.0, 4.0, 4.0])) == (0.0, 0.0)
+
+
+# -- the automatic transmission and the chasing cars ---------------------------------------------------------
+
+N, DT = 5001, 0.01
+
+
+def drive(**columns: np.ndarray) -> Trajectory:
+    return Trajectory(np.linspace(0.0, 50.0, N), columns)
+
+
+def test_transmission_requirements() -> None:
+    t = np.linspace(0.0, 50.0, N)
+    d = drive(speed=121.0 - 0.25 * np.abs(t - 12.5), rpm=4000.0 + 100.0 * t)
+    assert Monitor(parse("G[0,20] (speed <= 120)"), DT, N).evaluate(d) == Verdict(
+        -1.0, 12.5, "speed <= 120", {"speed": 121.0, "rpm": 5250.0}
+    )
+    at2 = Monitor(parse("G[0,10] (rpm <= 4750)"), DT, N).evaluate(d)
+    assert (at2.robustness, at2.critical_time) == (-250.0, 10.0)
+
+    quiet = drive(speed=2.0 * t, rpm=2900.0 + 0.0 * t)
+    at6 = "(G[0,30] (rpm <= 3000)) -> (G[0,{0}] (speed <= {1}))"
+    at6a, at6b, at6c = (at6.format(*bounds) for bounds in ((4, 35), (8, 50), (20, 65)))
+    for text, robustness, critical in (
+        (at6a, 27.0, 4.0),
+        (at6b, 34.0, 8.0),
+        (at6c, 25.0, 20.0),
+        (f"({at6a}) and ({at6b}) and ({at6c})", 25.0, 20.0),
+    ):
+        verdict = Monitor(parse(text), DT, N).evaluate(quiet)
+        assert (verdict.robustness, verdict.critical_time) == pytest.approx((robustness, critical))
+
+
+@pytest.mark.parametrize(("held", "robustness"), [(2.6, 0.5), (2.4, -0.5)])
+def test_a_gear_must_be_held_for_two_and_a_half_seconds(held: float, robustness: float) -> None:
+    t = np.linspace(0.0, 50.0, N)
+    gear = np.where((t >= 10.0 - 1e-9) & (t < 10.0 + held - 1e-9), 2.0, 1.0)
+    g = "(abs(gear - 2) <= 0.5)"
+    formula = parse(f"G[0,30] ((not {g} and X {g}) -> X G[0,2.5] {g})")
+    verdict = Monitor(formula, DT, N).evaluate(drive(gear=gear))
+    assert verdict.robustness == robustness
+    if robustness < 0:  # both sides of the implication give -0.5, so its left one decided: the shift itself
+        assert verdict.critical_time == pytest.approx(9.99)
+        assert verdict.predicate == "abs(gear - 2) <= 0.5"
+
+
+def test_nested_windows_of_the_chasing_cars() -> None:
+    t = np.linspace(0.0, 100.0, 10_001)
+    gap = np.where((t > 20.0 + 1e-9) & (t < 60.0 - 1e-9), 7.5, 9.0)
+    cars = Trajectory(t, {"y4": np.zeros_like(t), "y5": gap})
+    verdict = Monitor(parse("G[0,65] F[0,30] G[0,5] (y5 - y4 >= 8)"), DT, 10_001).evaluate(cars)
+    assert (verdict.robustness, verdict.critical_time) == (-0.5, 20.01)
+    assert verdict.predicate == "y5 - y4 >= 8"
+    assert verdict.values == {"y4": 0.0, "y5": 7.5}
+
+
+# -- grids and windows ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("G[0,20] (x <= 3)", ["[0,20]", "20 s", "ends at 10 s"]),
+        ("G[0,5] F[0,6] (x <= 3)", ["[0,6]", "11 s"]),
+        ("G[0,10] X (x <= 3)", ["10.1 s"]),
+        ("G (b -> F[0,5] c)", ["[0,5]", "15 s", "without a window"]),
+        ("G[0,0.25] (x <= 3)", ["0.25", "multiple", "0.1 s", "0.2 s"]),
+        ("G[0.31,1] (x <= 3)", ["0.31", "0.3 s"]),
+        ("(x <= 3) U[0,11] (y <= 3)", ["[0,11]", "11 s"]),
+        ("log(0) <= x", ["log(0)"]),
+    ],
+)
+def test_windows_that_do_not_fit_are_errors(text: str, parts: list[str]) -> None:
+    with pytest.raises(FormulaError) as caught:
+        Monitor(parse(text), step=0.1, samples=101)
+    for part in parts:
+        assert part in str(caught.value)
+
+
+def test_windows_may_end_at_the_last_sample() -> None:
+    x = list(range(101))
+    assert judge("G[0,10] (x <= 99)", trajectory(0.1, x=[float(v) for v in x])) == (-1.0, 10.0)
+
+
+@pytest.mark.parametrize(("step", "samples"), [(0.0, 3), (-1.0, 3), (float("nan"), 3), (1.0, 0)])
+def test_impossible_grids_are_errors(step: float, samples: int) -> None:
+    with pytest.raises(FormulaError, match="time grid"):
+        Monitor(parse("x <= 3"), step, samples)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.01, 1 / 3, 1 / 7, 0.05, 1e-3])
+def test_bounds_are_counted_in_steps_without_rounding_errors(step: float) -> None:
+    x = [1.0] * 13 + [-1.0] + [1.0] * 5
+    window = f"[{12 * step!r},{13 * step!r}]"
+    assert judge(f"G{window} (x >= 0)", trajectory(step, x=x))[0] == -1.0
+    assert judge(f"G[0,{12 * step!r}] (x >= 0)", trajectory(step, x=x))[0] == 1.0
+
+
+# -- what cannot be judged -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("t", "message"),
+    [
+        (trajectory(x=[1.0, float("nan"), 1.0]), "'x' is nan at 1 s"),
+        (trajectory(x=[1.0, 1.0, float("-inf")]), "'x' is -inf at 2 s"),
+        (trajectory(x=[1.0, 1.0]), "2 samples, expected 3"),
+        (trajectory(x=[]), "0 samples, expected 3"),
+        (trajectory(y=[1.0, 1.0, 1.0]), "no signal 'x'"),
+        (trajectory(0.5, x=[1.0, 1.0, 1.0]), "not uniform: sample 1 lies at 0.5 s"),
+        (Trajectory(np.array([0.0, 1.0, 1.5]), {"x": np.ones(3)}), "sample 2 lies at 1.5 s"),
+        (Trajectory(np.array([0.0, np.nan, 2.0]), {"x": np.ones(3)}), "sample 1 lies at nan s"),
+        (Trajectory(np.array([1.0, 2.0, 3.0]), {"x": np.ones(3)}), "sample 0 lies at 1 s"),
+    ],
+)
+def test_bad_trajectories_are_errors_and_never_a_number(t: Trajectory, message: str) -> None:
+    monitor = Monitor(parse("G[0,1] (x <= 3)"), 1.0, 3)
+    for ask in (monitor.evaluate, monitor.diagnose, monitor.robustness, monitor.course):
+        with pytest.raises(MonitorError, match=message):
+            ask(t)
+
+
+def test_columns_of_unequal_length_are_no_trajectory() -> None:
+    with pytest.raises(MonitorError, match="2 samples"):
+        Trajectory(np.arange(3.0), {"x": np.ones(2)})
+
+
+@pytest.mark.parametrize(
+    "text", ["sqrt(x) <= 3", "G (1/(x - 1) <= 3)", "log(x - 1) <= 3", "exp(1000*x) >= 3"]
+)
+def test_predicates_outside_their_domain_are_errors(text: str) -> None:
+    t = trajectory(x=[-1.0 if "sqrt" in text else 1.0] * 3)
+    with pytest.raises(MonitorError, match="no finite value at 0 s, where"):
+        Monitor(parse(text), 1.0, 3).evaluate(t)
+
+
+# -- sub-formulas, batches, other kinds of columns -----------------------------------------------------------
+
+
+def test_robustness_of_every_sub_formula() -> None:
+    t = trajectory(x=X, y=Y)
+    formula = parse("G[1,2] (x <= 4) -> F[0,3] (y >= 8)")
+    values = Monitor(formula, 1.0, 5).robustness(t)
+    assert {str(f): v for f, v in values.items()} == {
+        str(formula): 0.0,
+        "G[1,2] (x <= 4)": 0.0,
+        "x <= 4": 1.0,
+        "F[0,3] (y >= 8)": 0.0,
+        "y >= 8": -6.0,
+    }
+    later = Monitor(formula, 1.0, 5).robustness(t, time=3.0)
+    assert {str(f): v for f, v in later.items()} == {"x <= 4": 3.0, "y >= 8": 0.0}
+    with pytest.raises(MonitorError, match="outside"):
+        Monitor(formula, 1.0, 5).robustness(t, time=9.0)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_courses_agree_with_the_direct_definition(seed: int) -> None:
+    formula, short = random_case(20_000 + seed, depth=3)
+    t = random_trajectory(random.Random(seed), len(short) + 8)
+    monitor = Monitor(formula, STEP, len(t))
+    direct = Direct(t.columns, STEP)
+    for part in {formula, *formula.children}:
+        course = monitor.course(t, part)
+        assert len(course) == len(t) - round(part.horizon(STEP) / STEP)
+        assert course.tolist() == [direct.judge(part, k)[0] for k in range(len(course))], str(part)
+
+
+def test_a_batch_is_judged_like_its_trajectories() -> None:
+    rng = random.Random(5)
+    for seed in range(30_000, 30_040):
+        formula, t = random_case(seed)
+        monitor = Monitor(formula, STEP, len(t))
+        many = [random_trajectory(rng, len(t)) for _ in range(7)]
+        columns = {name: np.stack([one[name] for one in many]) for name in t.names}
+        assert monitor.batch(columns).tolist() == [monitor.evaluate(one).robustness for one in many]
+
+
+def test_what_a_batch_cannot_judge_is_named() -> None:
+    monitor = Monitor(parse("sqrt(x) + y <= 3"), 1.0, 3)
+    x, y = np.ones((4, 3)), np.ones((4, 3))
+    assert monitor.batch({"x": x, "y": y}).tolist() == [1.0] * 4
+    with pytest.raises(MonitorError, match="no signal 'y'"):
+        monitor.batch({"x": x})
+    with pytest.raises(MonitorError, match=r"shape \(m, 3\)"):
+        monitor.batch({"x": x, "y": np.ones((3, 3))})
+    y[2, 1] = np.nan
+    with pytest.raises(MonitorError, match="trajectory 2: signal 'y' is nan at 1 s"):
+        monitor.batch({"x": x, "y": y})
+    with pytest.raises(MonitorError, match=r"trajectory 3: .* no finite value at 0 s"):
+        monitor.batch({"x": np.array([[1.0] * 3] * 3 + [[-1.0] * 3]), "y": np.ones((4, 3))})
+
+
+def test_columns_may_be_booleans_integers_or_strided() -> None:
+    matrix = np.array([[1.0, 9.0], [2.0, 9.0], [5.0, 9.0]])
+    columns = {"b": np.array([True, False, True]), "i": np.array([1, 2, 3]), "x": matrix[:, 0]}
+    t = Trajectory(np.arange(3.0), columns)
+    verdict = Monitor(parse("G (b or i <= 3) and F (x >= 5)"), 1.0, 3).evaluate(t)
+    assert verdict.robustness == 0.0
+    assert verdict.values == {"b": 1.0, "i": 3.0, "x": 5.0}
+
+
+def test_verdicts_hold_plain_numbers() -> None:
+    verdict = Monitor(parse("G (x <= 3)"), 1.0, 5).evaluate(trajectory(x=X, y=Y))
+    assert [type(v) for v in (verdict.robustness, verdict.critical_time, *verdict.values.values())] == [
+        float
+    ] * 4
+
+
+# -- monitors as values --------------------------------------------------------------------------------------
+
+
+def test_monitors_are_equal_hashable_and_travel() -> None:
+    monitor = Monitor(parse("G[0,2] (x <= 3)"), step=1.0, samples=5)
+    again = pickle.loads(pickle.dumps(monitor))
+    assert again == monitor
+    assert hash(again) == hash(monitor)
+    assert monitor != Monitor(monitor.formula, step=1.0, samples=6)
+    assert again.evaluate(trajectory(x=X)) == monitor.evaluate(trajectory(x=X))
+
+
+def test_one_monitor_serves_many_threads() -> None:
+    monitor = Monitor(parse("G[0,900] (x <= 0) and F (x >= 1)"), 1.0, 1000)
+    trajectories = [trajectory(x=[float(i)] * 1000) for i in range(40)]
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(monitor.evaluate, trajectories * 5))
+    assert [v.robustness for v in found] == [min(-float(i), i - 1.0) for i in range(40)] * 5
+
+
+def test_formulas_and_monitors_need_no_numba_before_the_first_trajectory() -> None:
+    code = (
+        "import sys; from falsifier.stl import Monitor, parse; Monitor(parse('G[0,1] x <= 3'), 1.0, 3);"
+        "print([m for m in ('numba', 'rtamt', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

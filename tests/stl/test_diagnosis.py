@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from falsifier.stl import Diagnosis, Monitor, parse
+from falsifier.trajectory import Trajectory
+from tests.stl.randoms import STEP, random_case
+
+
+def diagnose(text: str, step: float = 1.0, **columns: list[float]) -> Diagnosis:
+    n = len(next(iter(columns.values())))
+    times = np.arange(n, dtype=np.float64) * step
+    t = Trajectory(times, {name: np.array(c, dtype=np.float64) for name, c in columns.items()})
+    return Monitor(parse(text), step, n).diagnose(t)
+
+
+def test_the_path_of_a_nested_formula_in_words() -> None:
+    gap = np.where(np.arange(501) < 123, 9.0, 7.0)
+    gap[170] = 7.1
+    found = diagnose("G[0,30] F[0,8] (y5 - y4 >= 8)", 0.1, y5=(gap + 1).tolist(), y4=[1.0] * 501)
+    assert found.text == (
+        "G over [0, 30] s was worst at 17.1 s, where F over [17.1, 25.1] s was best at 17.1 s, "
+        "where y5 - y4 = 7 >= 8 misses by 1."
+    )
+    found = diagnose("G[0,15] F[0,8] (y5 - y4 >= 8)", 0.1, y5=(gap + 1).tolist(), y4=[1.0] * 501)
+    assert found.text == (
+        "G over [0, 15] s was worst at 12.3 s, where F over [12.3, 20.3] s was best at 17 s, "
+        "where y5 - y4 = 7.1 >= 8 misses by 0.9."
+    )
+    assert [str(step.formula)[0] for step in found.path] == ["G", "F", "y"]
+    assert [step.time for step in found.path] == pytest.approx([0.0, 12.3, 17.0])
+    assert [step.window for step in found.path] == [(0.0, 15.0), pytest.approx((12.3, 20.3)), None]
+    assert found.robustness == pytest.approx(-0.9)
+    assert not found.vacuous
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x <= 3", "x = 3 <= 3 holds with nothing to spare."),
+        ("x + 1 >= y", "x + 1 = 4 >= y = 2 holds by 2."),
+        ("not (x <= 3)", "not holds, where x = 3 <= 3 holds with nothing to spare."),
+        ("not (x <= 4)", "not fails, where x = 3 <= 4 holds by 1."),
+        ("x <= 5 and y <= 3", "the right side of 'and' decided, where y = 2 <= 3 holds by 1."),
+        ("x <= 5 or y <= 3", "the left side of 'or' decided, where x = 3 <= 5 holds by 2."),
+        ("x <= 5 -> y <= 3", "the consequence of -> decided, where y = 2 <= 3 holds by 1."),
+        ("x <= 5 <-> y <= 3", "the right side of '<->' decided, where y = 2 <= 3 holds by 1."),
+        ("X (x <= 3)", "X looked at 1 s, where x = 1 <= 3 holds by 2."),
+        ("(x <= 9) U[0,1] (y >= 8)", "U over [0, 1] s was decided by its right side at 1 s, "
+         "where y = 7 >= 8 misses by 1."),
+        ("(x <= 2) U (y >= 5)", "U over [0, 1] s was decided by its left side at 0 s, "
+         "where x = 3 <= 2 misses by 1."),
+    ],
+)  # fmt: skip
+def test_each_operator_in_words(text: str, words: str) -> None:
+    assert diagnose(text, x=[3.0, 1.0], y=[2.0, 7.0]).text == words
+
+
+def test_a_condition_that_was_never_true_is_reported_as_vacuous() -> None:
+    x, y = [1.0, 2.5, 2.0, 0.0], [5.0, 5.0, 5.0, 5.0]
+    found = diagnose("G[0,3] (x >= 3 -> y <= 4)", x=x, y=y)
+    assert found.robustness == 0.5
+    assert found.vacuous
+    (finding,) = found.vacuities
+    assert (finding.window, finding.nearest, finding.margin, finding.only) == ((0.0, 3.0), 1.0, -0.5, True)
+    assert found.text.endswith(
+        "Vacuous: x >= 3 -> y <= 4 held over [0, 3] s only because its left side was never true; "
+        "it came nearest at 1 s, missing by 0.5."
+    )
+
+
+def test_a_condition_that_was_never_true_is_not_the_only_reason_where_the_consequence_held() -> None:
+    found = diagnose("G[0,1] (x >= 3 -> y <= 4)", x=[1.0, 2.0], y=[3.0, 4.0])
+    assert not found.vacuous
+    assert "The left side of x >= 3 -> y <= 4 was never true over [0, 1] s" in found.text
+
+
+def test_a_condition_that_was_true_once_is_not_vacuous() -> None:
+    assert diagnose("G[0,1] (x >= 3 -> y <= 4)", x=[3.0, 2.0], y=[3.0, 9.0]).vacuities == ()
+
+
+def test_only_the_times_at_which_an_implication_is_asked_count() -> None:
+    found = diagnose("G[1,2] (x >= 3 -> y <= 4)", x=[9.0, 1.0, 1.0, 9.0], y=[9.0] * 4)
+    assert found.vacuous
+    single = diagnose("(G[0,1] (x <= 3)) -> y <= 4", x=[1.0, 4.0], y=[9.0, 9.0])
+    assert single.vacuities[0].text == (
+        "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its left side was never true; "
+        "it missed by 1."
+    )
+
+
+def test_diagnoses_end_where_verdicts_do() -> None:
+    for seed in range(40_000, 40_300):
+        formula, t = random_case(seed)
+        monitor = Monitor(formula, STEP, len(t))
+        found, verdict = monitor.diagnose(t), monitor.evaluate(t)
+        assert (found.robustness, found.critical_time) == (verdict.robustness, verdict.critical_time)
+        assert str(found.path[-1].formula) == verdict.predicate
+        assert abs(found.path[-1].value) == pytest.approx(abs(verdict.robustness))

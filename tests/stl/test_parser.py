@@ -1,0 +1,283 @@
+import pickle
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from falsifier.errors import FormulaError
+from falsifier.stl import parse
+from falsifier.stl.expression import Arithmetic, Call, Name, Negative, Number
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Eventually,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+    is_flag,
+)
+from tests.stl.randoms import random_formula
+
+A, B, C = (Predicate(">=", Name(n), Number(0.5)) for n in "abc")
+X3 = Predicate("<=", Name("x"), Number(3.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "tree"),
+    [
+        ("a -> b -> c", Implies(A, Implies(B, C))),
+        ("a => b", Implies(A, B)),
+        ("a <-> b <=> c", Iff(Iff(A, B), C)),
+        ("a or b and c", Or(A, And(B, C))),
+        ("a | b & c", Or(A, And(B, C))),
+        ("a || b && c", Or(A, And(B, C))),
+        ("a and b and c", And(And(A, B), C)),
+        ("not a and b", And(Not(A), B)),
+        ("!a -> b", Implies(Not(A), B)),
+        ("not x <= 3", Not(X3)),
+        ("a U b U c", Until(A, Until(B, C))),
+        ("a U[0,1] b and c", And(Until(A, B, Window(0, 1)), C)),
+        ("not a U b", Until(Not(A), B)),
+        ("G[0,5] x <= 3 -> a", Implies(Always(X3, Window(0, 5)), A)),
+        ("always[0,5] a", Always(A, Window(0, 5))),
+        ("eventually a", Eventually(A)),
+        ("a until[1,2] b", Until(A, B, Window(1, 2))),
+        ("next X a", Next(Next(A))),
+        ("G F a", Always(Eventually(A))),
+        ("1 <= x <= 3", And(Predicate("<=", Number(1), Name("x")), X3)),
+        ("(((x))) <= (3)", X3),
+        ("((a))", A),
+        ("(x) + 1 <= 3", Predicate("<=", Arithmetic("+", Name("x"), Number(1)), Number(3))),
+        ("x<-3", Predicate("<", Name("x"), Number(-3))),
+        ("a\n  and b", And(A, B)),
+    ],
+)
+def test_precedence_and_spellings(text: str, tree: object) -> None:
+    assert parse(text) == tree
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("-2^2", -4.0),
+        ("(-2)^2", 4.0),
+        ("2^3^2", 512.0),
+        ("2^-1", 0.5),
+        ("8 - 4 - 2", 2.0),
+        ("8 / 4 / 2", 1.0),
+        ("1 + 2 * 3", 7.0),
+        ("--3", 3.0),
+        ("2 * -3", -6.0),
+        (".5 + 2. + 1e-1", 2.6),
+        ("max(1, min(5, 4), 2)", 4.0),
+        ("abs(-3) + sqrt(4) + exp(0) + log(1) + sin(0) + cos(0)", 7.0),
+    ],
+)
+def test_arithmetic(text: str, value: float) -> None:
+    formula = parse(f"{text} <= x")
+    assert isinstance(formula, Predicate)
+    assert float(formula.left.evaluate({})) == pytest.approx(value)
+
+
+def test_a_power_compares_the_power() -> None:
+    assert parse("x^2<=9") == Predicate("<=", Arithmetic("^", Name("x"), Number(2)), Number(9))
+
+
+@pytest.mark.parametrize(
+    ("text", "window"),
+    [
+        ("[0,500ms]", Window(0, 0.5)),
+        ("[100 ms, 2 s]", Window(0.1, 2)),
+        ("[0.5min,1h]", Window(30, 3600)),
+        ("[7min, 8min]", Window(420, 480)),
+        ("[0,250us]", Window(0, 0.00025)),
+        ("[1e1, 2E1]", Window(10, 20)),
+    ],
+)
+def test_windows_in_units(text: str, window: Window) -> None:
+    assert parse(f"G{text} b") == Always(B, window)
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("der(x)", "der(x)"),
+        ("der( a.x , 2 )", "der(a.x,2)"),
+        ("der(der(x))", "der(der(x))"),
+        ("a.b[1].c", "a.b[1].c"),
+        ("x[1, 2]", "x[1,2]"),
+        ("'front left'.v", "'front left'.v"),
+        ("car.'a, b'[1]", "car.'a, b'[1]"),
+        ('"wheel speed"', "wheel speed"),
+        ('"G"', "G"),
+        ("G.x", "G.x"),
+        ("F1", "F1"),
+        ("max", "max"),
+        ("ms", "ms"),
+        ("_x$1", "_x$1"),
+        (r'"say \"hi\" \\"', r'say "hi" \ '.strip()),
+        ("müde", "müde"),
+    ],
+)
+def test_names_as_models_have_them(text: str, name: str) -> None:
+    formula = parse(f"{text} <= 3")
+    assert formula.signals == (name,)
+    assert parse(str(formula)) == formula
+
+
+def test_a_signal_alone_is_a_boolean_one() -> None:
+    formula = parse("b")
+    assert isinstance(formula, Predicate)
+    assert formula == B
+    assert is_flag(formula)
+    assert not is_flag(X3)
+
+
+@pytest.mark.parametrize("block", range(4))
+def test_what_is_printed_parses_to_the_same_tree(block: int) -> None:
+    for seed in range(block * 500, (block + 1) * 500):
+        formula = random_formula(random.Random(seed), 5)
+        assert parse(str(formula)) == formula, seed
+
+
+def test_printed_expressions_keep_their_parentheses() -> None:
+    x, y = Name("x"), Name("y")
+    for left in (
+        Arithmetic("-", x, Arithmetic("-", y, x)),
+        Arithmetic("/", x, Arithmetic("*", y, x)),
+        Arithmetic("^", Arithmetic("^", x, y), y),
+        Arithmetic("^", x, Arithmetic("^", y, y)),
+        Arithmetic("^", Number(-2), x),
+        Arithmetic("^", Negative(x), Negative(y)),
+        Negative(Arithmetic("^", x, y)),
+        Negative(Arithmetic("+", x, y)),
+        Arithmetic("*", Negative(x), Number(-1.5e-7)),
+        Call("max", (x, Arithmetic("+", y, Number(1)), y)),
+    ):
+        formula = Predicate("<", left, y)
+        assert parse(str(formula)) == formula, str(formula)
+
+
+MISTAKES = [
+    ("", 1, "empty"),
+    ("x <= 3 y <= 3", 8, "join two formulas"),
+    ("G[0,2] (x <= 3) (y <= 100)", 17, "join two formulas"),
+    ("x <= 5%", 7, "percent"),
+    ("x <= 3 ? and y <= 3", 8, "no meaning"),
+    ("always[2,0] x <= 3", 7, "[0,2]"),
+    ("G[0,5) x <= 3", 6, "closed windows"),
+    ("G(0,5) x <= 3", 2, "closed windows"),
+    ("G[0,5 parsec] x <= 3", 7, "us, ms, s, min, h"),
+    ("G[1,5ms] b", 2, "[1ms,5ms]"),
+    ("G[-1,2] b", 3, "forward"),
+    ("G[0,inf] b", 5, "stop time"),
+    ("G[0] b", 4, "[a,b]"),
+    ("G[0,1e400] b", 5, "window"),
+    ("G[0,5]", 7, "ends too early"),
+    ("(x <= 3", 8, "position 1"),
+    ("x <= 3)", 7, "one ')' too many"),
+    ("G <= 3", 3, '"G"'),
+    ("x + U <= 3", 5, '"U"'),
+    ("x = 3", 3, "=="),
+    ("x ** 2 <= 3", 4, "x^y"),
+    ("x <= 3 AND y <= 3", 8, "and"),
+    ("x ≤ 3", 3, "<="),
+    ("1 + 2", 1, "compare it"),
+    ("x - 1", 1, "x - 1 >= 0"),
+    ("a and x - 1", 7, "compare it"),
+    ("3", 1, "compare it"),
+    ("true", 1, "not b"),
+    ("x => 3", 6, ">="),
+    ("x <= 5 ms", 8, "own unit"),
+    ("pow(x,2) <= 3", 1, "x^y"),
+    ("ln(x) <= 3", 1, "log"),
+    ("tan(x) <= 3", 1, "sin"),
+    ("x[1.5] <= 3", 2, "whole numbers"),
+    ("(x <= 3) + 1 <= 2", 1, "join formulas"),
+    ("x + not b <= 3", 5, "parenthesis missing"),
+    ("x <= G[0,5] y", 6, "parenthesis missing"),
+    ("abs(x, y) <= 3", 1, "one expression"),
+    ("min(x) <= 3", 1, "two or more"),
+    ("a and", 6, "missing"),
+    ("()", 2, "nothing between"),
+    ("[0,5] x", 1, "directly behind G"),
+    ("1e999 <= x", 1, "1e308"),
+    ("x <= 'a", 6, "second one"),
+    ("x implies y", 3, "->"),
+    ("a <= b\nand c <== d", 16, "=="),
+    ("(" * 500 + "b" + ")" * 500, 101, "split"),
+    ("b" + " and b" * 300, 1, "split"),
+]
+
+
+@pytest.mark.parametrize(("text", "position", "hint"), MISTAKES, ids=[m[0][:30] for m in MISTAKES])
+def test_what_is_not_one_formula_is_an_error_that_points_there(text: str, position: int, hint: str) -> None:
+    with pytest.raises(FormulaError) as caught:
+        parse(text)
+    first, line, caret, *_ = str(caught.value).split("\n")
+    assert f"(position {position})" in first
+    assert hint in str(caught.value)
+    start = text.rfind("\n", 0, position - 1) + 1
+    assert line[2:] == text[start:].split("\n")[0]
+    assert caret == " " * (2 + position - 1 - start) + "^"
+
+
+TEMPORAL = ["G", "F", "U", "X", "[0,1]", "[0, 1", "not"]
+LOGICAL = ["and", "or", "->", "<->", "(", ")"]
+ARITHMETIC = [
+    "x",
+    "y",
+    "b",
+    "3",
+    "-2",
+    "'q'",
+    "ms",
+    ",",
+    "<=",
+    "<",
+    "==",
+    "+",
+    "-",
+    "*",
+    "/",
+    "^",
+    "abs(",
+    "min(",
+]
+WORDS = TEMPORAL + LOGICAL + ARITHMETIC
+
+
+@given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
+@settings(max_examples=1500, deadline=None)
+def test_any_text_is_a_formula_or_an_error(text: str) -> None:
+    try:
+        formula = parse(text)
+    except FormulaError as error:
+        assert "hint: " in str(error)
+    else:
+        assert parse(str(formula)) == formula
+
+
+@given(st.text(max_size=20))
+@settings(max_examples=300, deadline=None)
+def test_any_characters_are_a_formula_or_an_error(text: str) -> None:
+    try:
+        formula = parse(text)
+    except FormulaError as error:
+        assert "hint: " in str(error)
+    else:
+        assert parse(str(formula)) == formula
+
+
+def test_the_deepest_formulas_print_hash_and_travel() -> None:
+    for text in ("b" + " and b" * 97, "not " * 97 + "b", "b -> " * 97 + "b", "x" + " + x" * 97 + " <= 1"):
+        formula = parse(text)
+        again = pickle.loads(pickle.dumps(formula))
+        assert again == formula == parse(text)
+        assert hash(again) == hash(formula)
