@@ -21,12 +21,10 @@ that stands alone is a Boolean one: ``b`` means ``b >= 0.5``. Names: see ``falsi
 """
 
 import math
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, NoReturn, cast
+from typing import NoReturn, cast
 
-from falsifier.errors import FormulaError, did_you_mean
+from falsifier.errors import did_you_mean
 from falsifier.stl.expression import (
     POWER,
     PRODUCT,
@@ -64,19 +62,12 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.stl.names import FUNCTIONS, RESERVED, scan_name, scan_word
+from falsifier.stl.lexer import Token, syntax_error, tokenize
+from falsifier.stl.names import FUNCTIONS, RESERVED
 
 MAX_DEPTH = 100
 UNITS = {"us": (1, 1_000_000), "ms": (1, 1000), "s": (1, 1), "min": (60, 1), "h": (3600, 1)}  # seconds
 
-_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
-_SPACE = re.compile(r"\s*")
-
-_SPELLINGS = {
-    "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
-    "always": "G", "eventually": "F", "until": "U", "next": "X",
-}  # fmt: skip
 _LEVELS = {
     "<->": EQUIVALENCE, "->": IMPLICATION, "or": DISJUNCTION, "and": CONJUNCTION, "U": UNTIL,
     "<": COMPARISON, "<=": COMPARISON, ">": COMPARISON, ">=": COMPARISON, "==": COMPARISON, "!=": COMPARISON,
@@ -88,26 +79,12 @@ _CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
 }  # fmt: skip
 _CLOSED = "only closed windows in seconds are understood: [a,b]"
 _HINTS = {
-    "=": "equality is ==",
-    "%": "write the plain number, without a percent sign",
-    "'": "a single quote opens a Modelica name and needs a second one",
-    '"': "a double quote opens a name and needs a second one",
-    "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
-    "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *", "~": "write not",
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
     "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
-    "pow": "write x^y", "ln": "the natural logarithm is log", "s": _CLOSED,
+    "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
 
 Node = Formula | Expression
-
-
-@dataclass(frozen=True, slots=True)
-class _Token:
-    kind: Literal["number", "name", "symbol", "end"]
-    text: str
-    position: int
-    end: int
 
 
 def parse(text: str) -> Formula:
@@ -124,40 +101,15 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.tokens = self._tokens()
+        self.tokens = tokenize(text)
         self.index = 0
         self.depth = 0
 
-    # -- tokens ------------------------------------------------------------------------------------------
-
-    def _tokens(self) -> list[_Token]:
-        tokens: list[_Token] = []
-        position = _end_of(_SPACE, self.text, 0)
-        while position < len(self.text):
-            tokens.append(self._token(position))
-            position = _end_of(_SPACE, self.text, tokens[-1].end)
-        end = len(self.text.rstrip())
-        return [*tokens, _Token("end", "the end", end, end)]
-
-    def _token(self, position: int) -> _Token:
-        text = self.text
-        if number := _NUMBER.match(text, position):
-            return _Token("number", number[0], position, number.end())
-        if word := scan_word(text, position):
-            return _Token("symbol", _SPELLINGS.get(word, word), position, position + len(word))
-        if name := scan_name(text, position):
-            return _Token("name", name[0], position, name[1])
-        if symbol := _SYMBOL.match(text, position):
-            return _Token("symbol", _SPELLINGS.get(symbol[0], symbol[0]), position, symbol.end())
-        character = text[position]
-        hint = _HINTS.get(character, "it has no meaning in a formula; names with it need double quotes")
-        self._fail(f"unexpected character {character!r}", position, hint)
-
     @property
-    def _next(self) -> _Token:
+    def _next(self) -> Token:
         return self.tokens[self.index]
 
-    def _take(self) -> _Token:
+    def _take(self) -> Token:
         token = self._next
         self.index += 1
         return token
@@ -167,12 +119,6 @@ class _Parser:
             self.index += 1
             return True
         return False
-
-    def _word(self, token: _Token) -> str:
-        return self.text[token.position : token.end]
-
-    def _shown(self, token: _Token) -> str:
-        return "the end" if token.kind == "end" else repr(self._word(token))
 
     # -- the grammar -------------------------------------------------------------------------------------
 
@@ -223,7 +169,7 @@ class _Parser:
         start = self._next.position
         return self._as_expression(self._climb(level), start)
 
-    def _chain(self, left: Expression, token: _Token) -> Formula:
+    def _chain(self, left: Expression, token: Token) -> Formula:
         right = self._expression_at(SUM)
         formula: Formula = Predicate(cast(Comparison, token.text), left, right)
         while self._next.kind == "symbol" and _LEVELS.get(self._next.text) == COMPARISON:
@@ -253,14 +199,14 @@ class _Parser:
         if token.text in ("not", "G", "F", "X"):
             if level > PREFIX:
                 self._fail(
-                    f"{self._shown(token)} opens a formula, but a number or a signal is expected here",
+                    f"{token.shown} opens a formula, but a number or a signal is expected here",
                     token.position,
                     "arithmetic and comparisons take numbers and signals; is a parenthesis missing?",
                 )
             return self._prefix(token)
         self._fail_operand(token)
 
-    def _prefix(self, token: _Token) -> Formula:
+    def _prefix(self, token: Token) -> Formula:
         if token.text == "not":
             return Not(self._formula_at(PREFIX))
         if token.text == "X":
@@ -269,7 +215,7 @@ class _Parser:
         operand = self._formula_at(PREFIX)
         return Always(operand, window) if token.text == "G" else Eventually(operand, window)
 
-    def _named(self, token: _Token) -> Name:
+    def _named(self, token: Token) -> Name:
         if self._next.kind == "symbol" and self._next.position == token.end:
             if self._next.text == "(":
                 hint = _HINTS.get(token.text) or did_you_mean(token.text, FUNCTIONS)
@@ -282,7 +228,7 @@ class _Parser:
                 )
         return Name(token.text)
 
-    def _call(self, token: _Token) -> Call:
+    def _call(self, token: Token) -> Call:
         opening = self._take()
         operands = [self._expression_at(SUM)]
         while self._accept(","):
@@ -296,10 +242,10 @@ class _Parser:
             )
         return Call(cast(Function, token.text), tuple(operands))
 
-    def _close(self, opening: _Token) -> None:
+    def _close(self, opening: Token) -> None:
         if not self._accept(")"):
             self._fail(
-                f"expected ')' before {self._shown(self._next)}",
+                f"expected ')' before {self._next.shown}",
                 self._next.position,
                 f"it closes the '(' at position {opening.position + 1}"
                 if self._next.kind in ("end", "symbol")
@@ -320,7 +266,7 @@ class _Parser:
         end_token = self._next
         end, end_unit = self._bound()
         if not self._accept("]"):
-            self._fail(f"expected ']' before {self._shown(self._next)}", self._next.position, _CLOSED)
+            self._fail(f"expected ']' before {self._next.shown}", self._next.position, _CLOSED)
         if start > 0 and bool(start_unit) != bool(end_unit):
             self._fail(
                 "one bound has a unit, the other has none",
@@ -346,7 +292,7 @@ class _Parser:
                 "-": "windows look forward: bounds are 0 or more",
                 "inf": "leave the window out to reach to the stop time",
             }.get(token.text, f"bounds are plain numbers; {_CLOSED}")
-            self._fail(f"expected a bound, not {self._shown(token)}", token.position, hint)
+            self._fail(f"expected a bound, not {token.shown}", token.position, hint)
         unit = ""
         if self._next.kind == "name":
             word = self._take()
@@ -381,8 +327,8 @@ class _Parser:
             "comparisons and arithmetic take numbers and signals; join formulas with and, or, ->, <->",
         )
 
-    def _fail_operand(self, token: _Token) -> NoReturn:
-        problem = f"expected a formula, a signal or a number, not {self._shown(token)}"
+    def _fail_operand(self, token: Token) -> NoReturn:
+        problem = f"expected a formula, a signal or a number, not {token.shown}"
         if token.kind == "end":
             problem = "the formula ends too early"
         hint = "something is missing before it"
@@ -397,12 +343,12 @@ class _Parser:
             hint = "there is nothing between the parentheses, or one parenthesis too many"
         elif token.text == "*":
             hint = "powers are written x^y"
-        elif token.kind == "symbol" and previous and self._word(previous) in RESERVED:
-            word = self._word(previous)
+        elif token.kind == "symbol" and previous and previous.written in RESERVED:
+            word = previous.written
             hint = f'{word} is a reserved word; a signal of that name is written "{word}"'
         self._fail(problem, token.position, hint)
 
-    def _fail_behind(self, token: _Token) -> NoReturn:
+    def _fail_behind(self, token: Token) -> NoReturn:
         previous = self.tokens[self.index - 1]
         hint = "join two formulas with and, or, ->; numbers and signals with + - * /"
         if token.text in _HINTS or previous.text in _HINTS:
@@ -415,7 +361,7 @@ class _Parser:
             hint = "there is one ')' too many"
         elif token.text == "[":
             hint = "windows stand directly behind G, F or U, indices directly behind a name"
-        self._fail(f"unexpected {self._shown(token)} behind a complete formula", token.position, hint)
+        self._fail(f"unexpected {token.shown} behind a complete formula", token.position, hint)
 
     def _fail_depth(self, position: int) -> NoReturn:
         self._fail(
@@ -423,20 +369,12 @@ class _Parser:
         )
 
     def _fail(self, problem: str, position: int, hint: str) -> NoReturn:
-        start = self.text.rfind("\n", 0, position) + 1
-        line = self.text[start:].split("\n", 1)[0].rstrip()
-        caret = " " * (position - start) + "^"
-        raise FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
+        raise syntax_error(self.text, problem, position, hint)
 
 
 def _seconds(bound: float, unit: str) -> float:
     numerator, denominator = UNITS[unit or "s"]
     return bound * numerator / denominator
-
-
-def _end_of(pattern: re.Pattern[str], text: str, position: int) -> int:
-    match = pattern.match(text, position)
-    return match.end() if match else position
 
 
 def _depth(formula: Formula) -> int:

@@ -1,0 +1,91 @@
+"""Text to tokens, and errors that point into the text."""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from falsifier.errors import FormulaError
+from falsifier.stl.names import scan_name, scan_word
+
+_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
+_SPACE = re.compile(r"\s*")
+_SPELLINGS = {
+    "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
+    "always": "G", "eventually": "F", "until": "U", "next": "X",
+}  # fmt: skip
+_HINTS = {
+    "=": "equality is ==",
+    "%": "write the plain number, without a percent sign",
+    "'": "a single quote opens a Modelica name and needs a second one",
+    '"': "a double quote opens a name and needs a second one",
+    "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
+    "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *", "~": "write not",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """The smallest piece of a formula's text.
+
+    Attributes:
+        kind: what it is.
+        text: the number, the name as the model has it, or the one spelling of a symbol or reserved word.
+        written: as the formula has it.
+        position: where it begins, from 0.
+    """
+
+    kind: Literal["number", "name", "symbol", "end"]
+    text: str
+    written: str
+    position: int
+
+    @property
+    def end(self) -> int:
+        """Position behind it."""
+        return self.position + len(self.written)
+
+    @property
+    def shown(self) -> str:
+        """How error messages call it."""
+        return "the end" if self.kind == "end" else repr(self.written)
+
+
+def tokenize(text: str) -> list[Token]:
+    """Tokens of a text; the last one is its end.
+
+    Raises:
+        FormulaError: pointing at a character that begins no token.
+    """
+    tokens: list[Token] = []
+    position = _behind_space(text, 0)
+    while position < len(text):
+        tokens.append(_token(text, position))
+        position = _behind_space(text, tokens[-1].end)
+    return [*tokens, Token("end", "", "", len(text.rstrip()))]
+
+
+def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaError:
+    """Error with the line that it is about, a caret under the position (counted from 0) and a hint."""
+    start = text.rfind("\n", 0, position) + 1
+    line = text[start:].split("\n", 1)[0].rstrip()
+    caret = " " * (position - start) + "^"
+    return FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
+
+
+def _token(text: str, position: int) -> Token:
+    if number := _NUMBER.match(text, position):
+        return Token("number", number[0], number[0], position)
+    if word := scan_word(text, position):
+        return Token("symbol", _SPELLINGS.get(word, word), word, position)
+    if name := scan_name(text, position):
+        return Token("name", name[0], text[position : name[1]], position)
+    if symbol := _SYMBOL.match(text, position):
+        return Token("symbol", _SPELLINGS.get(symbol[0], symbol[0]), symbol[0], position)
+    hint = _HINTS.get(text[position], "it has no meaning in a formula; names with it need double quotes")
+    raise syntax_error(text, f"unexpected character {text[position]!r}", position, hint)
+
+
+def _behind_space(text: str, position: int) -> int:
+    space = _SPACE.match(text, position)
+    return space.end() if space else position
