@@ -19,12 +19,12 @@ def compiled(function: _Function) -> _Function:
     import numba
 
     try:
-        result: _Function = numba.njit(cache=True, error_model="numpy")(function)
+        result: _Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no folder that can be written
         folder = _own_temporary_folder()
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)
-        result = numba.njit(cache=folder is not None, error_model="numpy")(function)
+        result = numba.njit(cache=folder is not None, nogil=True, error_model="numpy")(function)
     return result
 
 

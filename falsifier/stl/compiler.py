@@ -156,16 +156,18 @@ class _Compiler:
             return Place(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
         if not node.signals:
             return Place(self._emit(op.FILL, 0, 0, length=n, q=_constant(node)) - first, first, last)
-        if isinstance(node, Arithmetic):
-            offset = self._arithmetic(node, first, n)
-        elif isinstance(node, Negative):
-            offset = self._emit(op.SCALE, self.place(node.operand).at(first), 0, length=n, p=-1.0)
-        else:
-            offset = self._call(node, first, n)
+        match node:
+            case Arithmetic():
+                offset = self._arithmetic(node, first, n)
+            case Negative(operand):
+                offset = self._negated(self.place(operand).at(first), n)
+            case Call():
+                offset = self._call(node, first, n)
+            case _:
+                raise TypeError(f"not an expression: {node!r}")
         return Place(offset - first, first, last)
 
-    def _call(self, node: Expression, first: int, n: int) -> int:
-        assert isinstance(node, Call)
+    def _call(self, node: Call, first: int, n: int) -> int:
         code = _FUNCTIONS[node.function]
         offsets = [self.place(operand).at(first) for operand in node.operands]
         if len(offsets) == 1:
@@ -203,8 +205,8 @@ class _Compiler:
         if node.operator == "==":
             offset = self._negated(offset, n)
         self.checked[len(self.rows)] = node, Place(offset - first, first, first + n - 1)
-        self._emit(op.CHECK, offset, 0, length=n)
-        self.size -= n
+        self.rows.append((op.CHECK, 0, offset, 0, n, 0))
+        self.numbers.append((0.0, 0.0))
         return offset
 
     def _negated(self, offset: int, n: int) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,12 @@ class Monitor:
         way = trace(self._program.root, buffer)
         self._spare.append(buffer)
         decider, sample = way[-1].part, way[-1].sample
-        values = {name: column.item(sample) for name, column in trajectory.columns.items()}
-        return Verdict(way[0].value, trajectory.times.item(sample), decider.text, values)
+        time = trajectory.times.item(sample)
+        values = {name: float(column.item(sample)) for name, column in trajectory.columns.items()}
+        for name, value in values.items():
+            if not isfinite(value):
+                raise MonitorError(f"signal {name!r} is {value} at {time:g} s")
+        return Verdict(way[0].value, time, decider.text, values)
 
     def diagnose(self, trajectory: Trajectory) -> Diagnosis:
         """Way from the formula to the predicate that decided its value, in words too, and vacuity.

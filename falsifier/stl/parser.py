@@ -201,7 +201,7 @@ class _Parser:
                 self._fail(
                     f"{token.shown} opens a formula, but a number or a signal is expected here",
                     token.position,
-                    "arithmetic and comparisons take numbers and signals; is a parenthesis missing?",
+                    f'is a parenthesis missing? A signal of that name is written "{token.written}"',
                 )
             return self._prefix(token)
         self._fail_operand(token)
@@ -336,7 +336,7 @@ class _Parser:
         if token.text in ("true", "false"):
             problem, hint = f"{token.text} has no margin", "a Boolean signal b is written b or not b"
         elif token.text == "U":
-            hint = 'U stands between two formulas; a signal of that name is written "U"'
+            hint = f'it stands between two formulas; a signal of that name is written "{token.written}"'
         elif token.text in ("[", "]"):
             hint = "windows stand directly behind G, F or U"
         elif token.text == ")":

@@ -229,6 +229,13 @@ def test_bad_trajectories_are_errors_and_never_a_number(t: Trajectory, message: 
             ask(t)
 
 
+def test_a_verdict_holds_no_nan_of_a_signal_that_the_formula_does_not_name() -> None:
+    t = trajectory(x=[1.0, 2.0], y=[1.0, float("nan")])
+    assert judge("G (x >= 0)", t) == (1.0, 0.0)
+    with pytest.raises(MonitorError, match="'y' is nan at 1 s"):
+        judge("G (x <= 3)", t)
+
+
 def test_columns_of_unequal_length_are_no_trajectory() -> None:
     with pytest.raises(MonitorError, match="2 samples"):
         Trajectory(np.arange(3.0), {"x": np.ones(2)})
@@ -307,6 +314,7 @@ def test_columns_may_be_booleans_integers_or_strided() -> None:
     verdict = Monitor(parse("G (b or i <= 3) and F (x >= 5)"), 1.0, 3).evaluate(t)
     assert verdict.robustness == 0.0
     assert verdict.values == {"b": 1.0, "i": 3.0, "x": 5.0}
+    assert {type(v) for v in verdict.values.values()} == {float}
 
 
 def test_verdicts_hold_plain_numbers() -> None:
