@@ -1,8 +1,8 @@
 """The steps of a compiled formula; ``program`` writes them, ``kernels`` carries them out.
 
 Each row of a program is ``(code, out, a, b, length, width)``: offsets into one flat buffer, the number of
-samples to write, and for sliding windows how many samples a window reaches beyond its first. Numba's cache does
-not see a change here: change ``kernels`` with it.
+samples to write, and for sliding windows how many samples a window reaches beyond its first. Numba's cache
+does not see a change here: change ``kernels`` with it.
 """
 
 SCALE = 0  # out = p*a + q, with the row's two numbers
