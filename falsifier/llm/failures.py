@@ -1,0 +1,106 @@
+"""What can go wrong between here and a language model, sorted by what helps against it."""
+
+import os
+import re
+from collections.abc import Iterable
+
+from falsifier.errors import ChatError
+
+_TRANSIENT_STATUS = frozenset({408, 409, 425, 429})
+_FORMAT_WORDS = ("response_format", "json_schema", "json_object", "structured output", "grammar", "schema")
+_QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
+_REDACTED = "[redacted]"
+_SECRET_PATTERNS = (
+    re.compile(r"(?i)(?<=bearer )[^\s'\",}]+"),
+    re.compile(r"(?i)(?<=[?&]key=)[^\s&'\"]+"),
+    re.compile(r"(?i)(?<=api[_-]key=)[^\s&'\"]+"),
+    re.compile(r"(?<=://)[^\s/@]+(?=@)"),
+    re.compile(r"\b(?:sk|hf|gsk|xai|AIza|pplx|nvapi)[-_][\w*-]{8,}"),
+)
+_SECRET_NAMES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
+# Shorter values are words that happen to be set, and redacting them would garble messages.
+_SHORTEST_SECRET = 6
+
+
+class TransientChatError(ChatError):
+    """A failure that may be gone the next time: rate limit, timeout, lost connection, overloaded server.
+
+    Attributes:
+        retry_after: seconds that the server asked to wait, or None.
+    """
+
+    def __init__(self, message: str, *, retry_after: float | None = None) -> None:
+        self.retry_after = retry_after
+        super().__init__(message)
+
+
+class FormatUnsupportedError(ChatError):
+    """The server does not accept this way of asking for JSON."""
+
+
+def redact(text: str, secrets: Iterable[str] = ()) -> str:
+    """Text without keys: the given ones, those in the environment, and what looks like one."""
+    environment = (v for k, v in os.environ.items() if k.upper().endswith(_SECRET_NAMES))
+    for secret in sorted({*secrets, *environment}, key=len, reverse=True):
+        if len(secret) >= _SHORTEST_SECRET:
+            text = text.replace(secret, _REDACTED)
+    for pattern in _SECRET_PATTERNS:
+        text = pattern.sub(_REDACTED, text)
+    return text
+
+
+def classify(
+    error: Exception,
+    *,
+    model: str,
+    api_base: str | None,
+    key_variables: tuple[str, ...],
+    secrets: Iterable[str],
+) -> ChatError:
+    """Error of this package for whatever a request raised; its text holds no secret."""
+    status = _status(error)
+    detail = redact(f"{type(error).__name__}: {error}", secrets).strip()
+    lowered = detail.lower()
+    where = f" at {redact(api_base, secrets)}" if api_base else ""
+    keys = " or ".join(key_variables) or "the API key"
+    if status in (401, 403):
+        return ChatError(f"{model}{where}: the provider refused the key; check {keys}. {detail}")
+    if status == 404:
+        return ChatError(
+            f"{model}{where}: there is no such model or address; check the model's name, --api-base and "
+            f"whether the account behind {keys} may use it. {detail}"
+        )
+    if "contentpolicy" in lowered or "content_policy" in lowered or "content management policy" in lowered:
+        return ChatError(
+            f"{model}{where}: the provider's content filter refused the prompt; try another model or "
+            f"--anonymous. {detail}"
+        )
+    if "contextwindow" in lowered or "context_length" in lowered or "maximum context" in lowered:
+        return ChatError(f"{model}{where}: the prompt is too long; lower its token limit. {detail}")
+    if status == 429 and any(word in lowered for word in _QUOTA_WORDS):
+        return ChatError(f"{model}{where}: the account behind {keys} has no quota left. {detail}")
+    if status in (400, 422, 501) and any(word in lowered for word in _FORMAT_WORDS):
+        return FormatUnsupportedError(f"{model}{where}: {detail}")
+    if status in _TRANSIENT_STATUS or (status or 0) >= 500 or _is_connection(error):
+        return TransientChatError(f"{model}{where}: {detail}", retry_after=_retry_after(error))
+    return ChatError(f"{model}{where}: {detail}")
+
+
+def _status(error: Exception) -> int | None:
+    status = getattr(error, "status_code", None)
+    return int(status) if isinstance(status, int | str) and str(status).isdigit() else None
+
+
+def _is_connection(error: Exception) -> bool:
+    # An answer without choices comes back from the client library as a bare IndexError.
+    return isinstance(error, ConnectionError | TimeoutError | IndexError)
+
+
+def _retry_after(error: Exception) -> float | None:
+    for holder in (getattr(error, "response", None), error):
+        headers = getattr(holder, "headers", None) or getattr(holder, "litellm_response_headers", None) or {}
+        try:
+            return max(0.0, float(headers["retry-after"]))
+        except (KeyError, TypeError, ValueError):
+            continue
+    return None

@@ -1,0 +1,18 @@
+"""Prompts: what is told to a model, as typed blocks, and how it reads."""
+
+from falsifier.llm.prompts.blocks import Prompt
+from falsifier.llm.prompts.build import build_prompt
+from falsifier.llm.prompts.render import render
+from falsifier.llm.prompts.variants import DEFAULT_VARIANT, VARIANTS, Variant, variant_named
+from falsifier.llm.prompts.view import View
+
+__all__ = [
+    "DEFAULT_VARIANT",
+    "VARIANTS",
+    "Prompt",
+    "Variant",
+    "View",
+    "build_prompt",
+    "render",
+    "variant_named",
+]

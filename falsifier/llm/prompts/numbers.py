@@ -1,0 +1,85 @@
+"""Numbers as prompts write them: enough digits, no more, and bounds that can be typed back."""
+
+from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from math import floor, isfinite, log10
+
+# Digits of the largest magnitude that a column of numbers shows.
+_COLUMN_DIGITS = 4
+_BOUND_DIGITS = 10
+
+
+def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
+    """Decimals that show a number of this magnitude with so many digits.
+
+    >>> decimals_for(119.6), decimals_for(0.05)
+    (1, 5)
+    """
+    if not isfinite(scale) or scale == 0:
+        return 0
+    return max(0, digits - 1 - floor(log10(abs(scale))))
+
+
+def plain(value: float, decimals: int) -> str:
+    """Number with at most so many decimals, without trailing zeros.
+
+    >>> plain(8.3333, 2), plain(50.0, 2), plain(-0.0001, 2)
+    ('8.33', '50', '0')
+    """
+    text = f"{value:.{decimals}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def signed(value: float, digits: int = 3) -> str:
+    """Robustness with its sign.
+
+    >>> signed(0.41874), signed(-12.0), signed(0.0)
+    ('+0.419', '-12', '0')
+    """
+    return f"{value:+.{digits}g}" if value else "0"
+
+
+def bounds(low: float, high: float) -> tuple[str, str]:
+    """Bounds as text, rounded inward where they are rounded, so that a printed bound lies in the range.
+
+    >>> bounds(0.0, 100.0), bounds(-1.25663706143591, 1 / 3)
+    (('0', '100'), ('-1.256637061', '0.3333333333'))
+    """
+    return _bound(low, ROUND_CEILING), _bound(high, ROUND_FLOOR)
+
+
+def _bound(value: float, rounding: str) -> str:
+    rounded = Context(prec=_BOUND_DIGITS, rounding=rounding).create_decimal(Decimal(repr(value)))
+    return number(float(rounded))
+
+
+def number(value: float) -> str:
+    """Shortest text of a number with at most ten digits.
+
+    >>> number(100.0), number(0.1 + 0.2)
+    ('100', '0.3')
+    """
+    return f"{value:.{_BOUND_DIGITS}g}"
+
+
+def runs(values: Sequence[float]) -> str:
+    """Numbers in order, long repetitions as run lengths.
+
+    >>> runs([100.0, 100.0, 0.0]), runs([0.0] * 187 + [1.0])
+    ('[100, 100, 0]', '["0 x 187", 1]')
+    """
+    shortest_run = 4
+    parts: list[str] = []
+    start = 0
+    while start < len(values):
+        end = start
+        while end < len(values) and values[end] == values[start]:
+            end += 1
+        text = number(values[start])
+        length = end - start
+        is_long = length >= shortest_run and len(values) > 3 * shortest_run
+        parts += [f'"{text} x {length}"'] if is_long else [text] * length
+        start = end
+    return f"[{', '.join(parts)}]"

@@ -1,0 +1,37 @@
+"""What a language model may know of a problem: everything but the model itself."""
+
+from dataclasses import dataclass
+
+from falsifier.model import Experiment, ModelInfo
+from falsifier.problem import Problem, Requirement
+from falsifier.space import SearchSpace
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A problem without what simulates it.
+
+    Attributes:
+        info: names, units and descriptions.
+        requirement: what must hold.
+        space: what may be varied.
+        experiment: stop time and output grid.
+    """
+
+    info: ModelInfo
+    requirement: Requirement
+    space: SearchSpace
+    experiment: Experiment
+
+    @classmethod
+    def of(cls, problem: Problem) -> "View":
+        """View of a problem."""
+        return cls(problem.info, problem.requirement, problem.space, problem.experiment)
+
+    def unit(self, name: str) -> str:
+        """Unit of a signal, empty where unknown."""
+        return self.info[name].unit if name in self.info else ""
+
+    def description(self, name: str) -> str:
+        """Description of a signal, empty where there is none."""
+        return self.info[name].description if name in self.info else ""

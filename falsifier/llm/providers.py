@@ -1,0 +1,93 @@
+"""What is known of each provider before anything is sent: its key, where it runs, what it takes."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from falsifier.errors import ChatError
+from falsifier.llm.modes import MODES, Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Provider:
+    """One provider, by the first part of a model's name.
+
+    Attributes:
+        keys: environment variables that may hold its key, the usual one first; empty: none is needed.
+        local: runs on the user's own machine, so that a price of zero is true.
+        openai_client: served through the OpenAI client, which retries unasked unless told not to.
+        effort: how reasoning effort is passed: ``native``, or ``allowed`` where the client library must be
+            told to let it through.
+    """
+
+    keys: tuple[str, ...] = ()
+    local: bool = False
+    openai_client: bool = False
+    effort: str = "native"
+
+
+PROVIDERS: Mapping[str, Provider] = MappingProxyType(
+    {
+        "openai": Provider(("OPENAI_API_KEY",), openai_client=True),
+        "azure": Provider(("AZURE_API_KEY",), openai_client=True),
+        "anthropic": Provider(("ANTHROPIC_API_KEY",)),
+        "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY")),
+        "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), effort="allowed"),
+        "mistral": Provider(("MISTRAL_API_KEY",)),
+        "groq": Provider(("GROQ_API_KEY",)),
+        "deepseek": Provider(("DEEPSEEK_API_KEY",)),
+        "openrouter": Provider(("OPENROUTER_API_KEY",)),
+        "together_ai": Provider(("TOGETHERAI_API_KEY", "TOGETHER_API_KEY")),
+        "xai": Provider(("XAI_API_KEY",)),
+        "ollama": Provider(local=True),
+        "ollama_chat": Provider(local=True),
+        "lm_studio": Provider(local=True, openai_client=True, effort="allowed"),
+        "hosted_vllm": Provider(),
+        "llamafile": Provider(local=True, openai_client=True),
+    }
+)
+
+# Sent where an OpenAI-compatible server needs no key but its client insists on one.
+NO_KEY = "none"
+
+
+def provider_of(model: str) -> str:
+    """First part of a model's name."""
+    return model.split("/", 1)[0]
+
+
+def known(model: str) -> Provider:
+    """What is known of a model's provider; nothing special for an unlisted one."""
+    return PROVIDERS.get(provider_of(model), Provider())
+
+
+def find_key(model: str, *, api_base: str | None = None) -> str | None:
+    """Key for a model from the environment.
+
+    Returns:
+        The key; a placeholder for the user's own server without one; None where none is needed.
+
+    Raises:
+        ChatError: naming the variable to set.
+    """
+    provider = known(model)
+    for variable in provider.keys:
+        if value := os.environ.get(variable, "").strip():
+            return value
+    if provider.openai_client and (api_base is not None or provider.local):
+        return NO_KEY
+    if provider.keys and api_base is None:
+        variables = " or ".join(provider.keys)
+        raise ChatError(f"{model}: no key: set {variables} in the environment")
+    return None
+
+
+def first_mode(model: str) -> Mode:
+    """How to ask this model for JSON at first.
+
+    gpt-oss under Ollama and LM Studio answers with nothing or with garbled text when it is held to a grammar
+    (ollama#11691, ollama#12470, lmstudio-bug-tracker#1555).
+    """
+    grammar_is_broken = provider_of(model) in ("ollama", "ollama_chat", "lm_studio") and "gpt-oss" in model
+    return "prompt" if grammar_is_broken else MODES[0]

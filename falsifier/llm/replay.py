@@ -1,0 +1,62 @@
+"""Recorded conversations, played again: resumed runs pay for nothing twice, notebooks need no key."""
+
+import threading
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from falsifier.errors import ChatError
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange
+
+
+class RecordedChat:
+    """Answers with recorded replies in their order, then asks an inner chat.
+
+    Args:
+        exchanges: what was recorded, in order.
+        inner: who answers after that; None: nobody.
+    """
+
+    def __init__(self, exchanges: Iterable[Exchange], inner: Chat | None = None) -> None:
+        self._exchanges = list(exchanges)
+        self._inner = inner
+        self._played = 0
+        self._lock = threading.Lock()
+
+    @property
+    def model(self) -> str:
+        """Name of the model that is asked, or was recorded."""
+        if self._inner is not None:
+            return self._inner.model
+        return self._exchanges[0].model if self._exchanges else "recorded"
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """See Chat."""
+        return {} if self._inner is None else self._inner.parameters
+
+    @property
+    def remaining(self) -> int:
+        """Recorded replies that were not played yet."""
+        return len(self._exchanges) - self._played
+
+    def complete(self, request: ChatRequest) -> ChatReply:
+        """Return the next recorded reply.
+
+        Raises:
+            ChatError: when the recording has ended and nobody is there to ask.
+        """
+        with self._lock:
+            recorded = self._exchanges[self._played] if self.remaining else None
+            self._played += recorded is not None
+        if recorded is not None:
+            if recorded.reply is None:
+                raise ChatError(recorded.problem or "no answer came")
+            return recorded.reply
+        if self._inner is None:
+            raise ChatError(f"the recording of {self.model} ends after {len(self._exchanges)} replies")
+        return self._inner.complete(request)
+
+    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
+        """See Chat."""
+        if self._inner is not None:
+            self._inner.accepted(request, reply)

@@ -1,0 +1,268 @@
+"""Replies of a language model: the form that is asked for, and the candidates that are read from it.
+
+Two forms are understood: JSON with signals by name and a rationale, which is what prompts ask for, and the
+numbers of a point in order between ``<point>`` and ``</point>``.
+"""
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from falsifier.errors import CandidateError, did_you_mean
+from falsifier.llm.conversation import RejectedReply
+from falsifier.signals import INTERPOLATIONS, Interpolation, Signal
+from falsifier.space import Candidate, InputRange, SearchSpace
+
+_POINT = re.compile(r"<point>(.*?)</point>", re.DOTALL | re.IGNORECASE)
+_THOUGHT = re.compile(r"<think>.*?</think>", re.DOTALL | re.IGNORECASE)
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*")
+_LONGEST_RUN = 100_000
+_LONGEST_RATIONALE = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class ReplyForm:
+    """What a reply must hold.
+
+    Attributes:
+        space: what candidates must fit.
+        named: signals and parameters by name; else one list of numbers in the order of the dimensions.
+        free: whether a free parameterization may be used where the space allows it.
+        count: how many candidates.
+    """
+
+    space: SearchSpace
+    named: bool = True
+    free: bool = False
+    count: int = 1
+
+    @property
+    def is_free(self) -> bool:
+        """Whether any input's control points may be chosen."""
+        return self.free and any(r.free for r in self.space.inputs)
+
+    def schema(self) -> dict[str, Any]:
+        """JSON Schema within the subset that strict servers take: all required, nothing more, no maps."""
+        candidate = self._named_schema() if self.named else _object(rationale=_TEXT, point=_NUMBERS)
+        return candidate if self.count == 1 else _object(candidates={"type": "array", "items": candidate})
+
+    def _named_schema(self) -> dict[str, Any]:
+        parts: dict[str, Any] = {"rationale": _TEXT}
+        if self.space.inputs:
+            name = {"type": "string", "enum": [r.name for r in self.space.inputs]}
+            signal = _object(name=name, values=_NUMBERS)
+            if self.is_free:
+                signal = _object(
+                    name=name,
+                    interpolation={"type": "string", "enum": list(INTERPOLATIONS)},
+                    times=_NUMBERS,
+                    values=_RUNS,
+                )
+            parts["signals"] = {"type": "array", "items": signal}
+        if self.space.parameters:
+            name = {"type": "string", "enum": [p.name for p in self.space.parameters]}
+            parts["parameters"] = {"type": "array", "items": _object(name=name, value={"type": "number"})}
+        return _object(**parts)
+
+    def read(self, text: str, *, origin: str = "") -> list[Candidate]:
+        """Candidates of a reply.
+
+        Raises:
+            RejectedReply: telling what is wrong with it.
+        """
+        text = _THOUGHT.sub("", text)
+        replies = [_validated(found) for found in _candidate_objects(text)]
+        if replies:
+            candidates = [self._candidate(reply, origin) for reply in replies]
+        else:
+            candidates = [self._decoded(found, "", origin) for found in _points(text)]
+        if not candidates:
+            raise RejectedReply("it holds neither a JSON object with a candidate nor <point> ... </point>")
+        return candidates
+
+    def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:
+        if reply.point is not None:
+            return self._decoded(_unrolled(reply.point), reply.rationale, origin)
+        signals = {}
+        for signal in reply.signals:
+            if signal.name in signals:
+                raise RejectedReply(f"input {signal.name!r} is given twice")
+            signals[signal.name] = self._signal(signal)
+        parameters = {p.name: p.value for p in reply.parameters}
+        return self._admitted(Candidate(signals, parameters, origin, reply.rationale[:_LONGEST_RATIONALE]))
+
+    def _signal(self, reply: "SignalReply") -> Signal:
+        ranges = {r.name: r for r in self.space.inputs}
+        if reply.name not in ranges:
+            raise RejectedReply(f"unknown input {reply.name!r}; {did_you_mean(reply.name, ranges)}")
+        chosen = ranges[reply.name]
+        values = _unrolled(reply.values)
+        times = reply.times or ()
+        interpolation = reply.interpolation or chosen.interpolation
+        if not values:
+            raise RejectedReply(f"input {reply.name!r} has no values")
+        try:
+            if times:
+                return Signal(tuple(times), tuple(values), interpolation, chosen.hold)
+            return Signal.evenly(
+                values, stop_time=self.space.stop_time, interpolation=interpolation, hold=chosen.hold
+            )
+        except ValueError as error:
+            raise RejectedReply(f"input {reply.name!r}: {error}") from None
+
+    def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:
+        try:
+            return self.space.decode(numbers, origin=origin, rationale=rationale[:_LONGEST_RATIONALE])
+        except CandidateError as error:
+            raise RejectedReply(str(error)) from None
+
+    def _admitted(self, candidate: Candidate) -> Candidate:
+        try:
+            if not self.free:
+                for r in self.space.inputs:
+                    _check_fixed(r, candidate.signals.get(r.name))
+            return self.space.admit(candidate)
+        except CandidateError as error:
+            raise RejectedReply(str(error)) from None
+
+
+def _check_fixed(r: InputRange, signal: Signal | None) -> None:
+    if signal is not None and len(signal.values) != r.control_points:
+        raise CandidateError(
+            f"input {r.name!r}: expected {r.control_points} values, got {len(signal.values)}"
+        )
+
+
+_TEXT = {"type": "string"}
+_NUMBERS = {"type": "array", "items": {"type": "number"}}
+_RUNS = {"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "string"}]}}
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+class _Reply(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SignalReply(_Reply):
+    """One signal, as a model writes it."""
+
+    name: str
+    values: list[float | str]
+    times: list[float] | None = None
+    interpolation: Interpolation | None = None
+
+
+class ParameterReply(_Reply):
+    """One parameter, as a model writes it."""
+
+    name: str
+    value: float
+
+
+def _signals_by_name(found: Any) -> Any:
+    """Take ``{name: values}`` and time/value pairs for the listed form."""
+    if isinstance(found, dict):
+        found = [{"name": k, **(v if isinstance(v, dict) else {"values": v})} for k, v in found.items()]
+    return [_pairs_apart(s) for s in found] if isinstance(found, list) else found
+
+
+def _pairs_apart(signal: Any) -> Any:
+    if not isinstance(signal, dict):
+        return signal
+    values = signal.get("values", signal.get("points"))
+    if not isinstance(values, list):
+        return {**signal, "values": [values]} if isinstance(values, int | float) else signal
+    if values and all(isinstance(pair, list) and len(pair) == 2 for pair in values):
+        rest = {k: v for k, v in signal.items() if k not in ("points", "times", "values")}
+        return {**rest, "times": [t for t, _ in values], "values": [v for _, v in values]}
+    return signal
+
+
+def _parameters_by_name(found: Any) -> Any:
+    return [{"name": k, "value": v} for k, v in found.items()] if isinstance(found, dict) else found
+
+
+class CandidateReply(BaseModel):
+    """One candidate, as a model writes it; a superfluous remark is no reason to pay for another reply."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+    rationale: str = ""
+    signals: Annotated[list[SignalReply], BeforeValidator(_signals_by_name)] = Field(default_factory=list)
+    parameters: Annotated[list[ParameterReply], BeforeValidator(_parameters_by_name)] = Field(
+        default_factory=list
+    )
+    point: list[float | str] | None = None
+
+
+def _validated(found: dict[str, Any]) -> CandidateReply:
+    try:
+        return CandidateReply.model_validate(found)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise RejectedReply(f"{where}: {first['msg']}") from None
+
+
+def _candidate_objects(text: str) -> list[dict[str, Any]]:
+    """Candidates of the last JSON object that holds any: reasoning may show drafts before it."""
+    for found in reversed(list(_json_objects(text))):
+        several = found.get("candidates")
+        if isinstance(several, list) and several and all(isinstance(c, dict) for c in several):
+            return several
+        if {"signals", "parameters", "point"} & found.keys():
+            return [found]
+    return []
+
+
+def _json_objects(text: str) -> Iterator[dict[str, Any]]:
+    decoder = json.JSONDecoder()
+    start = text.find("{")
+    while start >= 0:
+        try:
+            found, end = decoder.raw_decode(text, start)
+        except (json.JSONDecodeError, RecursionError):
+            end = start + 1
+        else:
+            if isinstance(found, dict):
+                yield found
+        start = text.find("{", end)
+
+
+def _points(text: str) -> Iterator[list[float]]:
+    for match in _POINT.finditer(text):
+        words = [w for w in re.split(r"[\s,;()\[\]]+", match[1]) if w]
+        wrong = [w for w in words if not _NUMBER.fullmatch(w)]
+        if wrong:
+            raise RejectedReply(f"between <point> and </point> only numbers are expected, got {wrong[0]!r}")
+        yield [float(w) for w in words]
+
+
+def _unrolled(values: list[float | str]) -> list[float]:
+    """Numbers, with run lengths such as ``"0 x 187"`` written out."""
+    numbers: list[float] = []
+    for value in values:
+        if not isinstance(value, str):
+            numbers.append(float(value))
+        elif run := _RUN.fullmatch(value):
+            if len(numbers) + int(run[2]) > _LONGEST_RUN:
+                raise RejectedReply(f"{value!r} makes the signal longer than {_LONGEST_RUN} values")
+            numbers.extend([float(run[1])] * int(run[2]))
+        elif _NUMBER.fullmatch(value.strip()):
+            numbers.append(float(value))
+        else:
+            raise RejectedReply(f"{value!r} is neither a number nor a run such as '0 x 187'")
+    return numbers

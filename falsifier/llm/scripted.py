@@ -1,0 +1,66 @@
+"""A model that plays a script, for tests, tutorials and dry runs."""
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from falsifier.errors import ChatError
+from falsifier.llm.messages import ChatReply, ChatRequest, Usage
+
+Line = str | ChatReply | Exception
+Script = Iterable[Line] | Callable[[ChatRequest], Line]
+
+
+@dataclass
+class ScriptedChat:
+    """Answers from a list, an iterator or a function; an exception in the script is raised.
+
+    Attributes:
+        script: replies in order, or a function of the request.
+        model: the name that it bears.
+        requests: what it was asked, in order.
+    """
+
+    script: Script
+    model: str = "scripted"
+    requests: list[ChatRequest] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._lines: Iterator[Line] | None = None if callable(self.script) else iter(self.script)
+        self._lock = threading.Lock()
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Nothing: nothing is sent."""
+        return {}
+
+    def complete(self, request: ChatRequest) -> ChatReply:
+        """Return the next line of the script.
+
+        Raises:
+            ChatError: when the script has ended.
+        """
+        with self._lock:
+            self.requests.append(request)
+            line = self._next(request)
+        if isinstance(line, Exception):
+            raise line
+        if isinstance(line, ChatReply):
+            return line
+        return ChatReply(text=line, usage=Usage(cost=0.0), source="script")
+
+    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
+        """Keep nothing."""
+
+    def _next(self, request: ChatRequest) -> Line:
+        if callable(self.script):
+            return self.script(request)
+        assert self._lines is not None
+        try:
+            return next(self._lines)
+        except StopIteration:
+            asked = len(self.requests)
+            raise ChatError(
+                f"the script of {self.model!r} has {asked - 1} replies, {asked} are asked for"
+            ) from None

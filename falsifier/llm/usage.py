@@ -1,0 +1,64 @@
+"""What a request cost, in tokens and in money; an unknown price is None and never zero."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from falsifier.llm.messages import ChatRequest, Usage
+
+# Rule of thumb for text in English; only used where a provider sends no counts.
+_CHARACTERS_PER_TOKEN = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Price:
+    """What a model costs.
+
+    Attributes:
+        prompt: US dollars for 1000 tokens sent.
+        completion: US dollars for 1000 tokens received.
+    """
+
+    prompt: float
+    completion: float
+
+    def cost(self, prompt_tokens: int, completion_tokens: int) -> float:
+        """US dollars of one request."""
+        return (self.prompt * prompt_tokens + self.completion * completion_tokens) / 1000
+
+    def __str__(self) -> str:
+        return f"{self.prompt:.4g} US dollars per 1000 tokens sent, {self.completion:.4g} received"
+
+
+def estimate_tokens(text: str) -> int:
+    """About how many tokens a text has."""
+    return -(-len(text) // _CHARACTERS_PER_TOKEN)
+
+
+def usage_of(
+    response_usage: Any, *, request: ChatRequest, text: str, price: Price | None, reported_cost: float | None
+) -> Usage:
+    """Usage of one answered request.
+
+    Args:
+        response_usage: as the provider sent it, by OpenAI's field names; None or zeros: it sent nothing.
+        request: what was asked.
+        text: what was answered.
+        price: the user's own price, which goes before anything reported.
+        reported_cost: US dollars as the client library works them out; None where the price is unknown.
+    """
+    prompt = int(getattr(response_usage, "prompt_tokens", None) or 0)
+    completion = int(getattr(response_usage, "completion_tokens", None) or 0)
+    details = getattr(response_usage, "completion_tokens_details", None)
+    reasoning = int(getattr(details, "reasoning_tokens", None) or 0)
+    estimated = prompt == 0 and completion == 0
+    if estimated:
+        prompt = sum(estimate_tokens(m.content) for m in request.messages)
+        completion = estimate_tokens(text)
+    cost = price.cost(prompt, completion) if price is not None else None if estimated else reported_cost
+    return Usage(
+        prompt_tokens=prompt,
+        completion_tokens=completion,
+        reasoning_tokens=reasoning,
+        cost=cost,
+        estimated=estimated,
+    )
