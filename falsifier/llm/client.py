@@ -1,21 +1,20 @@
-"""The one door to litellm: one request, sent once, answered or failed with one of our own errors."""
+"""One request to a model behind litellm: sent once, answered, or failed with one of our own errors."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from time import perf_counter
 from typing import Any
 
-from falsifier.errors import ChatError
 from falsifier.llm.failures import classify, redact
+from falsifier.llm.library import dropped_parameters, load_litellm
 from falsifier.llm.messages import ChatReply, ChatRequest
 from falsifier.llm.modes import MODES, Mode
-from falsifier.llm.providers import find_key, known, provider_of
+from falsifier.llm.providers import find_key, known
 from falsifier.llm.usage import Price, usage_of
 
 # Reasoning models may think for minutes; seconds.
 DEFAULT_TIMEOUT = 600.0
+_SECRET_OPTIONS = frozenset({"api_key", "extra_headers", "headers"})
 
 
 @dataclass(frozen=True)
@@ -64,24 +63,29 @@ class LiteLLMChat:
                 model=self.model,
                 messages=[m.model_dump() for m in request.messages],
                 api_base=self.api_base,
-                api_key=key,
                 timeout=self.timeout,
                 drop_params=True,
-                **arguments,
+                **{"api_key": key, **arguments},
             )
             return self._reply(request, response, arguments, perf_counter() - started)
         except Exception as error:  # litellm raises its own, its clients' and bare built-in errors alike
-            variables = known(self.model).keys
             raise classify(
                 error,
                 model=self.model,
                 api_base=self.api_base,
-                key_variables=variables,
-                secrets=(key or "",),
+                key_variables=known(self.model).keys,
+                secrets=(key or "", *self._secret_options()),
             ) from None
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Keep nothing."""
+
+    def _secret_options(self) -> list[str]:
+        found: list[str] = []
+        for name in _SECRET_OPTIONS & self.options.keys():
+            value = self.options[name]
+            found += [str(v) for v in value.values()] if isinstance(value, Mapping) else [str(value)]
+        return found
 
     def _arguments(self, request: ChatRequest) -> dict[str, Any]:
         provider = known(self.model)
@@ -108,7 +112,7 @@ class LiteLLMChat:
     ) -> ChatReply:
         choice = response.choices[0]
         text = choice.message.content or getattr(choice.message, "refusal", None) or ""
-        refused = not choice.message.content and bool(text)
+        refused = bool(text) and not choice.message.content
         reported = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         return ChatReply(
             text=text,
@@ -126,54 +130,18 @@ class LiteLLMChat:
         )
 
     def _believed(self, cost: float | None) -> float | None:
-        """Reported cost where it can be true: a server of the user's own bears a known name at no price."""
+        """Reported cost where it can be true: another server under a known name has prices of its own."""
         if known(self.model).local:
             return cost
         return cost if cost and self.api_base is None else None
 
     def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """What was sent beside the messages; parameters that this model does not take are named."""
-        taken = set(supported_parameters(self.model)) | set(arguments.get("allowed_openai_params", ()))
-        wanted = [k for k in arguments if k in _STANDARD and k not in taken]
-        effective = {k: v for k, v in self.parameters.items() if k not in wanted}
-        if "reasoning_effort" in wanted:
-            effective.pop("effort", None)
-        response_format = arguments.get("response_format")
-        effective["mode"] = response_format["type"] if response_format else "prompt"
-        return {**effective, "dropped": wanted} if wanted else effective
-
-
-_SECRET_OPTIONS = frozenset({"api_key", "extra_headers", "headers"})
-_STANDARD = frozenset(
-    {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
-     "frequency_penalty", "response_format"}
-)  # fmt: skip
-
-
-@cache
-def load_litellm() -> Any:
-    """Import litellm, which takes seconds, without its network access, its .env file and its prints.
-
-    Raises:
-        ChatError: when it is not installed.
-    """
-    os.environ["LITELLM_LOCAL_MODEL_COST_MAP"] = "True"  # or it fetches a price list from the network
-    os.environ["LITELLM_MODE"] = "PRODUCTION"  # or it reads a .env file
-    try:
-        import litellm
-    except ImportError as error:
-        raise ChatError(f"litellm cannot be imported ({error}): pip install litellm") from None
-    litellm.suppress_debug_info = True
-    litellm.telemetry = False
-    return litellm
-
-
-@cache
-def supported_parameters(model: str) -> tuple[str, ...]:
-    """Parameters that litellm passes on for this model."""
-    litellm = load_litellm()
-    try:
-        found = litellm.get_supported_openai_params(model=model, custom_llm_provider=provider_of(model))
-    except Exception:  # an unlisted model; then nothing is known to be dropped
-        return tuple(_STANDARD)
-    return tuple(found or _STANDARD)
+        """What was sent beside the messages; ``dropped`` names what this model does not take."""
+        dropped = dropped_parameters(self.model, arguments)
+        own_names = {"reasoning_effort": "effort"}
+        omitted = {own_names.get(name, name) for name in dropped}
+        effective = {k: v for k, v in self.parameters.items() if k not in omitted}
+        effective["mode"] = arguments.get("response_format", {}).get("type", "prompt")
+        if "max_tokens" in effective:
+            effective["max_tokens"] = arguments["max_tokens"]
+        return {**effective, "dropped": sorted(omitted)} if omitted else effective

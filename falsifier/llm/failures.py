@@ -20,6 +20,7 @@ _SECRET_PATTERNS = (
 _SECRET_NAMES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
 # Shorter values are words that happen to be set, and redacting them would garble messages.
 _SHORTEST_SECRET = 6
+_LONGEST_DETAIL = 600
 
 
 class TransientChatError(ChatError):
@@ -59,7 +60,7 @@ def classify(
 ) -> ChatError:
     """Error of this package for whatever a request raised; its text holds no secret."""
     status = _status(error)
-    detail = redact(f"{type(error).__name__}: {error}", secrets).strip()
+    detail = _first_lines(redact(f"{type(error).__name__}: {error}", secrets))
     lowered = detail.lower()
     where = f" at {redact(api_base, secrets)}" if api_base else ""
     keys = " or ".join(key_variables) or "the API key"
@@ -84,6 +85,12 @@ def classify(
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or _is_connection(error):
         return TransientChatError(f"{model}{where}: {detail}", retry_after=_retry_after(error))
     return ChatError(f"{model}{where}: {detail}")
+
+
+def _first_lines(text: str) -> str:
+    """Beginning of a message, without the stack that the client library may append."""
+    text = text.split("Traceback (most recent call last)")[0].strip()
+    return text if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
 
 
 def _status(error: Exception) -> int | None:

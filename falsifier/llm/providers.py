@@ -72,15 +72,19 @@ def find_key(model: str, *, api_base: str | None = None) -> str | None:
         ChatError: naming the variable to set.
     """
     provider = known(model)
-    for variable in provider.keys:
-        if value := os.environ.get(variable, "").strip():
-            return value
+    if variable := key_variable(model):
+        return os.environ[variable].strip()
     if provider.openai_client and (api_base is not None or provider.local):
         return NO_KEY
     if provider.keys and api_base is None:
         variables = " or ".join(provider.keys)
         raise ChatError(f"{model}: no key: set {variables} in the environment")
     return None
+
+
+def key_variable(model: str) -> str:
+    """Environment variable that holds a key for this model; empty where none does."""
+    return next((name for name in known(model).keys if os.environ.get(name, "").strip()), "")
 
 
 def first_mode(model: str) -> Mode:

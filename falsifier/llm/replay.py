@@ -51,7 +51,7 @@ class RecordedChat:
         if recorded is not None:
             if recorded.reply is None:
                 raise ChatError(recorded.problem or "no answer came")
-            return recorded.reply
+            return recorded.reply.model_copy(update={"source": "recording"})
         if self._inner is None:
             raise ChatError(f"the recording of {self.model} ends after {len(self._exchanges)} replies")
         return self._inner.complete(request)

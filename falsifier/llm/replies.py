@@ -7,7 +7,7 @@ numbers of a point in order between ``<point>`` and ``</point>``.
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReply
 from falsifier.signals import INTERPOLATIONS, Interpolation, Signal
-from falsifier.space import Candidate, InputRange, SearchSpace
+from falsifier.space import Candidate, SearchSpace
 
 _POINT = re.compile(r"<point>(.*?)</point>", re.DOTALL | re.IGNORECASE)
 _THOUGHT = re.compile(r"<think>.*?</think>", re.DOTALL | re.IGNORECASE)
@@ -96,6 +96,12 @@ class ReplyForm:
         parameters = {p.name: p.value for p in reply.parameters}
         return self._admitted(Candidate(signals, parameters, origin, reply.rationale[:_LONGEST_RATIONALE]))
 
+    def _allowed(self) -> SearchSpace:
+        """Search space with only those freedoms that the reply was offered."""
+        if self.free:
+            return self.space
+        return replace(self.space, inputs=tuple(replace(r, free=None) for r in self.space.inputs))
+
     def _signal(self, reply: "SignalReply") -> Signal:
         ranges = {r.name: r for r in self.space.inputs}
         if reply.name not in ranges:
@@ -123,19 +129,9 @@ class ReplyForm:
 
     def _admitted(self, candidate: Candidate) -> Candidate:
         try:
-            if not self.free:
-                for r in self.space.inputs:
-                    _check_fixed(r, candidate.signals.get(r.name))
-            return self.space.admit(candidate)
+            return self._allowed().admit(candidate)
         except CandidateError as error:
             raise RejectedReply(str(error)) from None
-
-
-def _check_fixed(r: InputRange, signal: Signal | None) -> None:
-    if signal is not None and len(signal.values) != r.control_points:
-        raise CandidateError(
-            f"input {r.name!r}: expected {r.control_points} values, got {len(signal.values)}"
-        )
 
 
 _TEXT = {"type": "string"}

@@ -1,0 +1,117 @@
+"""From a model's name to a chat that is patient, adapts to the server and never pays twice."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from falsifier.llm.cache import CachedChat
+from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
+from falsifier.llm.ladder import LadderChat
+from falsifier.llm.library import check_name, listed_price
+from falsifier.llm.messages import Chat, ChatRequest, Message, Usage
+from falsifier.llm.modes import Mode
+from falsifier.llm.providers import find_key, first_mode, key_variable
+from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.usage import Price
+
+_HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word ready."),))
+
+
+def preflight(model: str, *, api_base: str | None = None) -> None:
+    """Check a model's name and key without sending anything.
+
+    Raises:
+        ChatError: naming what to set or to change.
+    """
+    check_name(model)
+    find_key(model, api_base=api_base)
+
+
+def connect(
+    model: str,
+    *,
+    effort: str | None = None,
+    api_base: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    price: Price | None = None,
+    timeout: float = DEFAULT_TIMEOUT,
+    mode: Mode | None = None,
+    gate: Gate | None = None,
+    cache: Path | None = None,
+) -> Chat:
+    """Chat with a model; nothing is sent yet.
+
+    Args:
+        model: PROVIDER/MODEL as litellm names it.
+        effort: reasoning effort, ``low``, ``medium`` or ``high``.
+        api_base: address of the server, where it is not the provider's own.
+        options: further parameters of litellm's ``completion``.
+        price: what the model costs; None: litellm's table.
+        timeout: seconds to wait for one answer.
+        mode: how to ask for JSON at first; None: what the provider is known to take.
+        gate: shared by all runs on the same account; None: one of its own.
+        cache: directory of kept replies; None: nothing is kept.
+
+    Raises:
+        ChatError: for an unknown provider or a missing key.
+    """
+    preflight(model, api_base=api_base)
+    client = LiteLLMChat(
+        model=model,
+        effort=effort,
+        api_base=api_base,
+        options=dict(options or {}),
+        timeout=timeout,
+        price=price,
+        mode=mode or first_mode(model),
+    )
+    chat: Chat = RetryingChat(LadderChat(client), gate or Gate())
+    return chat if cache is None else CachedChat(chat, cache)
+
+
+@dataclass(frozen=True, slots=True)
+class ModelCheck:
+    """What one small round trip showed.
+
+    Attributes:
+        model: its name.
+        key: environment variable that held the key; empty where none is needed.
+        price: what it costs; None where that is unknown.
+        reply: what it answered.
+        usage: tokens and money of the round trip.
+        seconds: how long it took.
+    """
+
+    model: str
+    key: str
+    price: Price | None
+    reply: str
+    usage: Usage
+    seconds: float
+
+
+def check_model(
+    model: str,
+    *,
+    effort: str | None = None,
+    api_base: str | None = None,
+    price: Price | None = None,
+    timeout: float = 60.0,
+) -> ModelCheck:
+    """Check name and key, and ask the model for one word.
+
+    Raises:
+        ChatError: naming what is wrong.
+    """
+    chat = connect(model, effort=effort, api_base=api_base, price=price, timeout=timeout)
+    reply = chat.complete(_HELLO)
+    listed = listed_price(model) if api_base is None else None
+    return ModelCheck(
+        model=model,
+        key=key_variable(model),
+        price=price or listed,
+        reply=reply.text.strip(),
+        usage=reply.usage,
+        seconds=reply.seconds,
+    )

@@ -1,0 +1,93 @@
+"""litellm, imported here and nowhere else, and only when a model is used."""
+
+import os
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from falsifier.errors import ChatError, did_you_mean
+from falsifier.llm.providers import PROVIDERS, known, provider_of
+from falsifier.llm.usage import Price
+
+# What litellm would do unasked when it is imported or first used, and how it is told not to.
+_ENVIRONMENT = {
+    "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # fetch a price list
+    "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",  # fetch a list of headers
+    "LITELLM_MODE": "PRODUCTION",  # read a .env file
+}
+# Parameters that litellm drops for models which do not take them.
+_DROPPABLE = frozenset(
+    {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
+     "frequency_penalty"}
+)  # fmt: skip
+
+
+@cache
+def load_litellm() -> Any:
+    """Import litellm, which takes seconds, without its network access, its .env file and its prints.
+
+    Raises:
+        ChatError: when it is not installed.
+    """
+    os.environ.update(_ENVIRONMENT)
+    try:
+        import litellm
+    except ImportError as error:
+        raise ChatError(f"litellm cannot be imported ({error}): pip install litellm") from None
+    litellm.suppress_debug_info = True
+    return litellm
+
+
+def check_name(model: str) -> None:
+    """Refuse a name whose provider nobody knows; listed providers need no import for that.
+
+    Raises:
+        ChatError: with the form that is expected.
+    """
+    if "/" in model and provider_of(model) in PROVIDERS and model.split("/", 1)[1]:
+        return
+    try:
+        load_litellm().get_llm_provider(model)
+    except ChatError:
+        raise
+    except Exception:  # litellm raises several kinds for names that it does not know
+        hint = did_you_mean(provider_of(model), PROVIDERS)
+        raise ChatError(
+            f"{model!r} names no known provider: expected PROVIDER/MODEL such as openai/gpt-5-mini; {hint}"
+        ) from None
+
+
+def listed_price(model: str) -> Price | None:
+    """Price of a model in litellm's table; None where it is not listed, or falsely listed as free."""
+    try:
+        info = load_litellm().get_model_info(model)
+    except ChatError:
+        raise
+    except Exception:  # not in the table
+        return None
+    prompt, completion = info.get("input_cost_per_token"), info.get("output_cost_per_token")
+    if prompt is None or completion is None or (not prompt and not completion and not known(model).local):
+        return None
+    return Price(1000 * prompt, 1000 * completion)
+
+
+def dropped_parameters(model: str, arguments: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of those arguments that litellm leaves out because the model does not take them."""
+    allowed = set(arguments.get("allowed_openai_params", ()))
+    stated = {k: v for k, v in arguments.items() if k in _DROPPABLE and k not in allowed}
+    effort = {k: v for k, v in stated.items() if k == "reasoning_effort"}
+    return tuple(name for name in stated if not _takes(model, {**effort, name: stated[name]}))
+
+
+def _takes(model: str, arguments: Mapping[str, Any]) -> bool:
+    litellm = load_litellm()
+    try:
+        name, provider, *_ = litellm.get_llm_provider(model)
+        litellm.utils.get_optional_params(
+            model=name, custom_llm_provider=provider, drop_params=False, **arguments
+        )
+    except litellm.UnsupportedParamsError:
+        return False
+    except Exception:  # nothing can be said, and the request itself will tell
+        return True
+    return True
