@@ -8,6 +8,7 @@ A :class:`Signal` is the one form in which every proposer, every file and every 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from math import isfinite
 from typing import Literal, get_args
@@ -79,14 +80,31 @@ class Signal:
         if len(self.times) == 1:
             return np.full(at.shape, self.values[0])
         knots, values = np.asarray(self.times), np.asarray(self.values)
-        at = np.clip(at, knots[0], knots[-1])
         if self.interpolation == "linear":
             return np.asarray(np.interp(at, knots, values))
         if self.interpolation == "constant":
             return np.asarray(values[np.searchsorted(knots, at + _TIME_ROUNDING, side="right") - 1])
-        from scipy.interpolate import PchipInterpolator
+        return _evaluate(_pchip(self.times, self.values), at)
 
-        return np.asarray(PchipInterpolator(knots, values)(at))
+    def pieces(self, stop_time: float) -> NDArray[np.float64]:
+        """The signal on [0, stop_time] as cubic pieces, for solvers that evaluate it at times of their own.
+
+        Returns:
+            One row per piece, shape (n, 5): its start time s in s, and the coefficients of 1, (t - s),
+            (t - s)**2 and (t - s)**3. The last piece has no end.
+        """
+        if self.hold is not None and len(self.times) > 1:
+            starts = np.arange(int(stop_time / self.hold + _TIME_ROUNDING) + 1, dtype=np.float64)
+            starts *= self.hold
+            return _constant_pieces(starts, self.sample(starts))
+        knots, values = np.asarray(self.times), np.asarray(self.values)
+        if self.interpolation == "constant" or len(knots) == 1:
+            return _constant_pieces(knots, values)
+        if self.interpolation == "linear":
+            table = _constant_pieces(knots, values)
+            table[:-1, 2] = np.diff(values) / np.diff(knots)
+            return table
+        return _pchip(self.times, self.values).copy()
 
     def held(self, hold: float | None) -> "Signal":
         """Return the same signal sampled and held with this period in s."""
@@ -114,3 +132,61 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
         raise ValueError(f"a signal needs at least one control point, got {count}")
     pieces = count if interpolation == "constant" else max(count - 1, 1)
     return tuple(stop_time * i / pieces for i in range(count))
+
+
+@lru_cache(maxsize=256)
+def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.float64]:
+    """Pieces (see Signal.pieces) of the monotone cubic interpolant, the last one constant.
+
+    Slopes after Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304, at the ends after Moler,
+    Numerical Computing with MATLAB (2004), 3.6: equal to scipy's PchipInterpolator.
+    """
+    knots, heights = np.asarray(times), np.asarray(values)
+    steps = np.diff(knots)
+    secants = np.diff(heights) / steps
+    slopes = np.empty(len(knots))
+    if len(knots) == 2:
+        slopes[:] = secants[0]
+    else:
+        left, right = secants[:-1], secants[1:]
+        w_left, w_right = steps[:-1] + 2.0 * steps[1:], 2.0 * steps[:-1] + steps[1:]
+        same = left * right > 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            harmonic = (w_left + w_right) / (w_left / left + w_right / right)
+        slopes[1:-1] = np.where(same, harmonic, 0.0)
+        slopes[0] = _end_slope(steps[0], steps[1], secants[0], secants[1])
+        slopes[-1] = _end_slope(steps[-1], steps[-2], secants[-1], secants[-2])
+    table = _constant_pieces(knots, heights)
+    table[:-1, 2] = slopes[:-1]
+    table[:-1, 3] = (3.0 * secants - 2.0 * slopes[:-1] - slopes[1:]) / steps
+    table[:-1, 4] = (slopes[:-1] + slopes[1:] - 2.0 * secants) / steps**2
+    table.flags.writeable = False
+    return table
+
+
+def _end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
+    """Three-point slope at an end, limited so that the curve keeps its shape."""
+    slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
+    if slope * secant <= 0.0:
+        return 0.0
+    if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant):
+        return 3.0 * secant
+    return slope
+
+
+def _constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    table = np.zeros((len(starts), 5))
+    table[:, 0], table[:, 1] = starts, values
+    return table
+
+
+def _evaluate(table: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of pieces at times from 0, shape as at."""
+    order = np.searchsorted(table[1:, 0], at, side="right")
+    start, c0, c1, c2, c3 = table.T
+    dt = at - start[order]
+    value = c3[order]
+    for c in (c2, c1, c0):
+        value *= dt
+        value += c[order]
+    return np.asarray(value)

@@ -74,6 +74,9 @@ class Description:
         identifiers: file name of the library without suffix, by interface.
         slots: where each scalar variable lives, by name.
         arrays: start values of all elements by value reference, for arrays only.
+        states: number of continuous states (FMI 1 and 2; FMI 3 tells it at run time).
+        indicators: number of event indicators (FMI 1 and 2).
+        clocks: names of the clocks that a simulator would have to tick.
         event_mode: whether a co-simulation FMU can be driven in event mode (FMI 3).
         needs_tool: names of interfaces that need the exporting tool to be installed.
     """
@@ -83,6 +86,9 @@ class Description:
     identifiers: Mapping[Interface, str]
     slots: Mapping[str, Slot]
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+    states: int = 0
+    indicators: int = 0
+    clocks: tuple[str, ...] = ()
     event_mode: bool = False
     needs_tool: tuple[Interface, ...] = ()
 
@@ -171,6 +177,7 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         slots[variable.name] = slot
     experiment = _child(root, "DefaultExperiment")
     co_simulation = root.find("CoSimulation")
+    clocks = root.findall("ModelVariables/Clock")
     info = ModelInfo(
         name=root.attrib["modelName"],
         description=root.get("description", ""),
@@ -189,9 +196,18 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         identifiers=identifiers,
         slots=slots,
         arrays=arrays,
+        states=_number_of_states(root, major),
+        indicators=int(root.get("numberOfEventIndicators", "0")),
+        clocks=tuple(c.attrib["name"] for c in clocks if c.get("causality") == "input"),
         event_mode=co_simulation is not None and _flag(co_simulation.get("hasEventMode")),
         needs_tool=needs_tool,
     )
+
+
+def _number_of_states(root: Element, major: int) -> int:
+    if major == 1:
+        return int(root.get("numberOfContinuousStates", "0"))
+    return len(root.findall("ModelStructure/Derivatives/Unknown"))
 
 
 def _interfaces(root: Element, major: int) -> tuple[dict[Interface, str], tuple[Interface, ...]]:

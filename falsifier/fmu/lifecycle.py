@@ -1,9 +1,9 @@
 """Start, end and reset of a simulation, in the words of FMI 1, 2 and 3."""
 
 import ctypes
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from ctypes import byref, c_bool, c_char, c_double, c_int
-from typing import Protocol
 
 from falsifier.errors import SimulationError
 from falsifier.fmu.library import Library, status_name
@@ -25,24 +25,33 @@ class EventInfo1(ctypes.Structure):
     )
 
 
-class Lifecycle(Protocol):
-    """What surrounds the stepping of one simulation."""
+class Lifecycle(ABC):
+    """What surrounds the stepping of one simulation.
 
+    Attributes:
+        first_events: what FMI 1 model exchange says at its initialisation; None where event mode tells it.
+    """
+
+    first_events: EventInfo1 | None = None
+
+    def __init__(self, library: Library) -> None:
+        self._call = _Calls(library)
+
+    @abstractmethod
     def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
         """Bring a fresh or reset instance to the state in which it can be stepped.
 
         Raises:
             SimulationError: when the FMU refuses.
         """
-        ...
 
     def terminate(self) -> None:
         """End the simulation."""
-        ...
+        self._call.status("Terminate")
 
     def reset(self) -> bool:
         """Bring the instance back to its beginning; False where the FMU cannot."""
-        ...
+        return self._call.try_reset("Reset")
 
 
 def make_lifecycle(library: Library) -> Lifecycle:
@@ -80,10 +89,7 @@ class _Calls:
         return bool(self._library.address(name)) and self.status(name) <= 1
 
 
-class _Lifecycle2:
-    def __init__(self, library: Library) -> None:
-        self._call = _Calls(library)
-
+class _Lifecycle2(Lifecycle):
     def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
         set_parameters()
         self._call(
@@ -99,17 +105,8 @@ class _Lifecycle2:
         set_inputs()
         self._call("ExitInitializationMode")
 
-    def terminate(self) -> None:
-        self._call.status("Terminate")
 
-    def reset(self) -> bool:
-        return self._call.try_reset("Reset")
-
-
-class _Lifecycle3:
-    def __init__(self, library: Library) -> None:
-        self._call = _Calls(library)
-
+class _Lifecycle3(Lifecycle):
     def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
         set_parameters()
         self._call(
@@ -124,17 +121,8 @@ class _Lifecycle3:
         set_inputs()
         self._call("ExitInitializationMode")
 
-    def terminate(self) -> None:
-        self._call.status("Terminate")
 
-    def reset(self) -> bool:
-        return self._call.try_reset("Reset")
-
-
-class _Slave1:
-    def __init__(self, library: Library) -> None:
-        self._call = _Calls(library)
-
+class _Slave1(Lifecycle):
     def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
         set_parameters()
         set_inputs()
@@ -147,10 +135,10 @@ class _Slave1:
         return self._call.try_reset("ResetSlave")
 
 
-class _Model1:
+class _Model1(Lifecycle):
     def __init__(self, library: Library) -> None:
-        self._call = _Calls(library)
-        self.events = EventInfo1()
+        super().__init__(library)
+        self.first_events = self._events = EventInfo1()
 
     def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
         self._call("SetTime", (c_double,), 0.0)
@@ -161,7 +149,7 @@ class _Model1:
             (c_char, c_double, ctypes.POINTER(EventInfo1)),
             b"\x01" if plan.tolerance is not None else b"\x00",
             plan.tolerance or 0.0,
-            byref(self.events),
+            byref(self._events),
         )
 
     def terminate(self) -> None:

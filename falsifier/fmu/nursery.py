@@ -1,8 +1,8 @@
 """The process that FMU workers are forked from.
 
-It is started once by a process that simulates, with a clean environment and no threads. It imports and compiles
-what every worker needs, so that a new worker costs a fork. It owns the folder that FMUs are extracted to and
-removes it when its parent is gone, for whatever reason.
+It is started once by a process that simulates, with a clean environment and no threads. It imports and
+compiles what every worker needs, so that a new worker costs a fork. It owns the folder that FMUs are extracted
+to and removes it when its parent is gone, for whatever reason.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ import socket
 import sys
 import tempfile
 import traceback
+from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
@@ -23,7 +24,7 @@ from falsifier.errors import FalsifierError, ModelError
 from falsifier.fmu import archive, worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
 from falsifier.fmu.order import Order
-from falsifier.fmu.session import warm_up
+from falsifier.fmu.stepper import warm_up
 
 START, REAP = 1, 2
 
@@ -73,6 +74,8 @@ class _Nursery:
         connection, log = descriptors
         try:
             folder = self._extracted(order)
+            if order.interface == "model-exchange":
+                _load_solver()
             scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
             pid = os.fork()
             if not pid:
@@ -103,6 +106,14 @@ class _Nursery:
             archive.extract(order.path, partial)
             partial.rename(folder)
         return folder
+
+
+@cache
+def _load_solver() -> None:
+    """Compile the solver before the first fork that needs it: not within a simulation's time limit."""
+    from falsifier.fmu import model_exchange
+
+    model_exchange.warm_up()
 
 
 def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoReturn:

@@ -25,6 +25,7 @@ class Plan:
         stop_time: end in s.
         samples: number of points of the output grid.
         every: communication steps per output interval (co-simulation).
+        pieces: room for this many pieces of each input (model exchange), 0 for co-simulation.
         max_step: largest step of the solver in s (model exchange).
         tolerance: relative tolerance, None for the model's own.
         time_limit: wall-clock seconds for one simulation.
@@ -36,6 +37,7 @@ class Plan:
     stop_time: float
     samples: int
     every: int
+    pieces: int
     max_step: float
     tolerance: float | None
     time_limit: float
@@ -46,13 +48,23 @@ class Plan:
         return (self.samples - 1) * self.every
 
     @property
+    def width(self) -> int:
+        """Numbers per input: a value per communication step, or the pieces of a piecewise cubic."""
+        return 5 * self.pieces if self.pieces else self.steps
+
+    @property
     def times(self) -> NDArray[np.float64]:
         """Communication points in s at which inputs are set, shape (steps,)."""
         return np.arange(self.steps, dtype=np.float64) * np.float64(self.stop_time / self.steps)
 
 
 def make_plan(
-    description: Description, experiment: Experiment, inputs: Iterable[str], parameters: Iterable[str]
+    description: Description,
+    experiment: Experiment,
+    inputs: Iterable[str],
+    parameters: Iterable[str],
+    *,
+    pieces: int = 0,
 ) -> Plan:
     """Look up and check everything that the simulations of a search have in common.
 
@@ -67,6 +79,7 @@ def make_plan(
         stop_time=experiment.stop_time,
         samples=experiment.samples,
         every=_steps_per_output(experiment),
+        pieces=pieces,
         max_step=experiment.step_size or experiment.output_interval,
         tolerance=experiment.tolerance,
         time_limit=experiment.time_limit,

@@ -14,7 +14,8 @@ class Room:
 
     Attributes:
         parameters: values to set, shape (parameters,).
-        inputs: values by input and communication step, shape (inputs, steps).
+        inputs: values by input and communication step, shape (inputs, steps), or the pieces of
+            each input as a piecewise cubic, shape (inputs, 5 * pieces).
         outputs: recorded values by output and sample, shape (outputs, samples).
     """
 
@@ -25,17 +26,17 @@ class Room:
     @staticmethod
     def size(plan: Plan) -> int:
         """Number of float64 that a plan needs."""
-        rows = len(plan.inputs) * plan.steps + len(plan.outputs) * plan.samples
+        rows = len(plan.inputs) * plan.width + len(plan.outputs) * plan.samples
         return len(plan.parameters) + rows
 
     @classmethod
     def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
         """Lay a plan's arrays over a flat array of at least ``size`` float64."""
         a = len(plan.parameters)
-        b = a + len(plan.inputs) * plan.steps
+        b = a + len(plan.inputs) * plan.width
         c = b + len(plan.outputs) * plan.samples
         return cls(
             memory[:a],
-            memory[a:b].reshape(len(plan.inputs), plan.steps),
+            memory[a:b].reshape(len(plan.inputs), plan.width),
             memory[b:c].reshape(len(plan.outputs), plan.samples),
         )

@@ -58,12 +58,22 @@ class FmuModel:
         Inputs are set at each communication point to the signal's value there. Integer, Boolean and
         enumeration inputs get the nearest number.
         """
-        task = _task(self, experiment, tuple(signals), tuple(parameters))
+        if self.interface == "co-simulation":
+            task = _task(self, experiment, tuple(signals), tuple(parameters), 0)
+            rows = [signal.sample(task.points) for signal in signals.values()]
+        else:
+            tables = self._pieces(signals, experiment)
+            most = max(map(len, tables), default=1)
+            # Room for a power of two, so that few plans serve candidates with any number of control points.
+            task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (most - 1).bit_length())
+            rows = [table.ravel() for table in tables]
 
         def fill(room: Room) -> None:
             room.parameters[:] = list(parameters.values())
-            for row, signal in zip(room.inputs, signals.values(), strict=True):
-                row[:] = signal.sample(task.points)
+            for row, numbers in zip(room.inputs, rows, strict=True):
+                row[: len(numbers)] = numbers
+                # Pieces that are not there start at inf.
+                row[len(numbers) :] = np.inf
 
         outputs, log = _runner(self).simulate(task.plan, fill)
         columns = dict(zip(task.plan.outputs, outputs, strict=True))
@@ -77,6 +87,18 @@ class FmuModel:
             REGISTRY.drop(self.sha256, self.interface)
         else:
             in_process.drop(self.sha256, self.interface)
+
+    def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
+        """Inputs as piecewise cubics; numbers that cannot vary continuously are held on the output grid."""
+        kinds = {v.name: v for v in self.info.inputs}
+        tables = []
+        for name, signal in signals.items():
+            variable = kinds.get(name)
+            if variable is not None and (variable.kind != "real" or variable.variability != "continuous"):
+                tables.append(_held_pieces(signal, experiment.times, whole=variable.kind != "real"))
+            else:
+                tables.append(signal.pieces(experiment.stop_time))
+        return tables
 
     @property
     def _description(self) -> Description:
@@ -95,14 +117,28 @@ class _Task:
 
 @lru_cache(maxsize=64)
 def _task(
-    model: FmuModel, experiment: Experiment, inputs: tuple[str, ...], parameters: tuple[str, ...]
+    model: FmuModel,
+    experiment: Experiment,
+    inputs: tuple[str, ...],
+    parameters: tuple[str, ...],
+    pieces: int,
 ) -> _Task:
     description = describe(model.path, model.sha256)
-    plan = make_plan(description, experiment, inputs, parameters)
+    plan = make_plan(description, experiment, inputs, parameters, pieces=pieces)
     times = experiment.times
     times.flags.writeable = False
     units = {v.name: v.unit for v in description.info.variables if v.unit and v.name in plan.outputs}
     return _Task(plan, plan.times, times, units)
+
+
+def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:
+    """Constant pieces that begin where the sampled signal changes."""
+    values = signal.sample(times)
+    values = np.rint(values) if whole else values
+    changes = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
+    table = np.zeros((len(changes), 5))
+    table[:, 0], table[:, 1] = times[changes], values[changes]
+    return table
 
 
 def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
@@ -111,7 +147,13 @@ def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
 
 
 def _check_interface(model: FmuModel) -> None:
-    info = model.info
+    description = describe(model.path, model.sha256)
+    info = description.info
+    if description.clocks:
+        raise ModelError(
+            f"{model.path}: its clocks {', '.join(description.clocks)} would have to be ticked from outside, "
+            "which is not supported; export the model without input clocks"
+        )
     if model.interface in info.interfaces:
         return
     if model.interface not in get_args(Interface):

@@ -33,7 +33,7 @@ _LLVM = {"p": _POINTER, "n": ir.IntType(64), "d": ir.DoubleType(), "i": ir.IntTy
 _NUMBA = {"p": types.intp, "n": types.intp, "d": types.float64, "i": types.int32, "b": types.uint8}
 
 
-def _call(arguments: str) -> Any:
+def call_signature(arguments: str) -> Any:
     """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char."""
 
     def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
@@ -65,37 +65,38 @@ def _store(kind: Any, stored: ir.Type) -> Any:
 
 @intrinsic
 def _values_2(_typing, f, instance, references, count, values):  # type: ignore[no-untyped-def]
-    return _call("ppnp")
+    return call_signature("ppnp")
 
 
 @intrinsic
 def _values_3(_typing, f, instance, references, count, values, size):  # type: ignore[no-untyped-def]
-    return _call("ppnpn")
+    return call_signature("ppnpn")
 
 
 @intrinsic
 def _do_step_1(_typing, f, instance, time, step, new_step):  # type: ignore[no-untyped-def]
-    return _call("pddb")
+    return call_signature("pddb")
 
 
 @intrinsic
 def _do_step_2(_typing, f, instance, time, step, no_return):  # type: ignore[no-untyped-def]
-    return _call("pddi")
+    return call_signature("pddi")
 
 
 @intrinsic
 def _do_step_3(_typing, f, instance, time, step, no_return, event, end, early, reached):  # type: ignore[no-untyped-def]
-    return _call("pddbpppp")
+    return call_signature("pddbpppp")
 
 
 @intrinsic
-def _mode(_typing, f, instance):  # type: ignore[no-untyped-def]
-    return _call("p")
+def call_mode(_typing, f, instance):  # type: ignore[no-untyped-def]
+    """Call a function that takes the instance alone."""
+    return call_signature("p")
 
 
 @intrinsic
 def _update_3(_typing, f, instance, again, end, nominals, states, defined, time):  # type: ignore[no-untyped-def]
-    return _call("ppppppp")
+    return call_signature("ppppppp")
 
 
 def _typed(kind: Any, stored: ir.Type) -> tuple[Any, Any]:
@@ -121,10 +122,10 @@ _load_u4, _store_u4 = _typed(types.uint32, ir.IntType(32))
 _load_i8, _store_i8 = _typed(types.int64, ir.IntType(64))
 _load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
 
-_compiled = njit(cache=True, nogil=True, error_model="numpy")
+compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
-@_compiled
+@compiled
 def fetch(place):  # type: ignore[no-untyped-def]
     """One variable as a number, from where its call left it."""
     kind, address = place[0], place[1]
@@ -155,7 +156,7 @@ def fetch(place):  # type: ignore[no-untyped-def]
     return value * place[2]
 
 
-@_compiled
+@compiled
 def put(place, number):  # type: ignore[no-untyped-def]
     """One number to where its call will take it from; anything but floating point is rounded."""
     kind, address = place[0], place[1]
@@ -184,7 +185,7 @@ def put(place, number):  # type: ignore[no-untyped-def]
         _store_u8(address, np.uint64(np.rint(value)))
 
 
-@_compiled
+@compiled
 def exchange_values(instance, version, calls):  # type: ignore[no-untyped-def]
     """Call the get or set functions of a table; the first status above warning ends it."""
     worst = 0
@@ -199,7 +200,7 @@ def exchange_values(instance, version, calls):  # type: ignore[no-untyped-def]
     return worst
 
 
-@_compiled
+@compiled
 def read_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
     """Read all variables of a table into one column of ``rows``."""
     status = exchange_values(instance, version, calls)
@@ -209,7 +210,7 @@ def read_row(instance, version, calls, places, rows, column):  # type: ignore[no
     return status
 
 
-@_compiled
+@compiled
 def write_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
     """Set all variables of a table to one column of ``rows``."""
     for j in range(places.shape[0]):
@@ -217,7 +218,7 @@ def write_row(instance, version, calls, places, rows, column):  # type: ignore[n
     return exchange_values(instance, version, calls)
 
 
-@_compiled
+@compiled
 def _differs(rows, column):  # type: ignore[no-untyped-def]
     changes = 0
     for j in range(rows.shape[0]):
@@ -225,7 +226,7 @@ def _differs(rows, column):  # type: ignore[no-untyped-def]
     return changes > 0
 
 
-@_compiled
+@compiled
 def settle_3(functions, flags, reached):  # type: ignore[no-untyped-def]
     """Event iteration of FMI 3 in event mode: update discrete states until nothing changes any more.
 
@@ -254,11 +255,11 @@ def settle_3(functions, flags, reached):  # type: ignore[no-untyped-def]
     return 0, STUCK
 
 
-@_compiled
+@compiled
 def _event_3(functions, flags, reached, discrete_calls):  # type: ignore[no-untyped-def]
     """One visit to event mode: set the discrete inputs, update, return to step mode."""
     instance = functions[INSTANCE]
-    status = _mode(functions[ENTER_EVENT_MODE], instance)
+    status = call_mode(functions[ENTER_EVENT_MODE], instance)
     if status > 1:
         return status, EVENT
     status = exchange_values(instance, 3, discrete_calls)
@@ -267,11 +268,11 @@ def _event_3(functions, flags, reached, discrete_calls):  # type: ignore[no-unty
     status, where = settle_3(functions, flags, reached)
     if where != DONE:
         return status, where
-    status = _mode(functions[ENTER_STEP_MODE], instance)
+    status = call_mode(functions[ENTER_STEP_MODE], instance)
     return status, EVENT if status > 1 else DONE
 
 
-@_compiled
+@compiled
 def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore[no-untyped-def]
     """One communication step of FMI 3, in several calls where the FMU returns early.
 
@@ -312,7 +313,7 @@ def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore
             return 0, STUCK, ends
 
 
-@_compiled
+@compiled
 def co_simulate(  # type: ignore[no-untyped-def]
     functions, set_calls, set_places, event_calls, event_places, get_calls, get_places,
     inputs, discrete, outputs, step, first, last, every, report,
@@ -379,13 +380,13 @@ def co_simulate(  # type: ignore[no-untyped-def]
             return
 
 
-@_compiled
+@compiled
 def enter_step_mode(functions):  # type: ignore[no-untyped-def]
     """Leave the event mode that an FMI 3 FMU is in after its initialisation: status and where it stopped."""
     flags = np.zeros(8, dtype=np.uint8)
     reached = np.zeros(2)
     status, where = settle_3(functions, flags, reached)
     if where == DONE:
-        status = _mode(functions[ENTER_STEP_MODE], functions[INSTANCE])
+        status = call_mode(functions[ENTER_STEP_MODE], functions[INSTANCE])
         where = EVENT if status > 1 else DONE
     return status, where

@@ -1,0 +1,354 @@
+"""A model-exchange FMU as a differential equation: inputs, derivatives, event indicators, event iteration.
+
+numba's cache does not notice changes in stepping.py, whose functions are compiled into these: after changing
+them, remove ``__pycache__``.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from falsifier.fmu.ports import Table
+from falsifier.fmu.stepping import (
+    DONE,
+    EVENT,
+    SETTING,
+    STEPPING,
+    STUCK,
+    TERMINATED,
+    call_mode,
+    call_signature,
+    compiled,
+    exchange_values,
+    put,
+)
+
+# Rows of the table of function addresses.
+INSTANCE, VERSION, SET_TIME, SET_STATES, GET_STATES, GET_DERIVATIVES, GET_INDICATORS = range(7)
+COMPLETED_STEP, ENTER_EVENT_MODE, UPDATE, ENTER_CONTINUOUS = range(7, 11)
+
+# Rows of Memory.clock (s) and of Memory.counts.
+TIME, NEXT_STEP, NEXT_EVENT = range(3)
+COLUMN, IMPLICIT, STIFF_HITS, OTHER_HITS, EVENTS, JACOBIAN_KNOWN, INDICATORS_KNOWN = range(7)
+
+# Columns of a piece of an input: start time in s, then coefficients of 1, dt, dt**2, dt**3.
+START, C0, C1, C2, C3 = range(5)
+
+_MOST_ROUNDS = 1000
+Floats = NDArray[np.float64]
+
+
+class Model(NamedTuple):
+    """What does not change during a run.
+
+    Attributes:
+        functions: addresses and facts, int64[11].
+        set_calls: continuous inputs, see ports.Ports.
+        set_places: their places.
+        event_calls: inputs that change at events only.
+        event_places: their places.
+        get_calls: recorded variables.
+        get_places: their places.
+        pieces: continuous inputs as piecewise cubics, shape (inputs, pieces, 5); unused pieces start at inf.
+        event_pieces: the same for the inputs that change at events only.
+        weights: absolute tolerance of each state, shape (states,).
+        tolerance: relative tolerance.
+        stop_time: end in s.
+        max_step: largest step in s.
+    """
+
+    functions: Table
+    set_calls: Table
+    set_places: Table
+    event_calls: Table
+    event_places: Table
+    get_calls: Table
+    get_places: Table
+    pieces: NDArray[np.float64]
+    event_pieces: NDArray[np.float64]
+    weights: Floats
+    tolerance: float
+    stop_time: float
+    max_step: float
+
+
+class Memory(NamedTuple):
+    """What changes during a run.
+
+    Attributes:
+        clock: time, proposed step and next time event in s.
+        counts: column to record next, method and counters.
+        piece: current piece of each continuous input, then of each event-mode input.
+        x: states.
+        new_x: states at the end of a tried step.
+        stages: derivatives at the stages of a step, shape (7, states).
+        work: scratch, shape (4, states).
+        jacobian: derivative of the derivatives by the states.
+        factors: triangular factors of the implicit step's matrix.
+        pivots: rows swapped in these.
+        z: event indicators.
+        new_z: event indicators at a trial point.
+        events: structures that the FMU fills, uint8[64].
+    """
+
+    clock: Floats
+    counts: Table
+    piece: Table
+    x: Floats
+    new_x: Floats
+    stages: NDArray[np.float64]
+    work: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+    factors: NDArray[np.float64]
+    pivots: Table
+    z: Floats
+    new_z: Floats
+    events: NDArray[np.uint8]
+
+
+def make_memory(states: int, indicators: int, inputs: int) -> Memory:
+    """Memory of a run that starts at time 0."""
+    return Memory(
+        clock=np.array([0.0, 0.0, np.inf]),
+        counts=np.zeros(7, dtype=np.int64),
+        piece=np.zeros(inputs, dtype=np.int64),
+        x=np.zeros(states),
+        new_x=np.zeros(states),
+        stages=np.zeros((7, states)),
+        work=np.zeros((4, states)),
+        jacobian=np.zeros((states, states)),
+        factors=np.zeros((states, states)),
+        pivots=np.zeros(states, dtype=np.int64),
+        z=np.zeros(indicators),
+        new_z=np.zeros(indicators),
+        events=np.zeros(64, dtype=np.uint8),
+    )
+
+
+@intrinsic
+def _set_time(_typing, f, instance, time):  # type: ignore[no-untyped-def]
+    return call_signature("pd")
+
+
+@intrinsic
+def _vector(_typing, f, instance, values, count):  # type: ignore[no-untyped-def]
+    return call_signature("ppn")
+
+
+@intrinsic
+def _completed_1(_typing, f, instance, event):  # type: ignore[no-untyped-def]
+    return call_signature("pp")
+
+
+@intrinsic
+def _completed_2(_typing, f, instance, no_return, event, end):  # type: ignore[no-untyped-def]
+    return call_signature("pipp")
+
+
+@intrinsic
+def _completed_3(_typing, f, instance, no_return, event, end):  # type: ignore[no-untyped-def]
+    return call_signature("pbpp")
+
+
+@intrinsic
+def _update_1(_typing, f, instance, intermediate, info):  # type: ignore[no-untyped-def]
+    return call_signature("pbp")
+
+
+@intrinsic
+def _update_2(_typing, f, instance, info):  # type: ignore[no-untyped-def]
+    return call_signature("pp")
+
+
+@intrinsic
+def _update_3(_typing, f, instance, again, end, nominals, states, defined, time):  # type: ignore[no-untyped-def]
+    return call_signature("ppppppp")
+
+
+@compiled
+def rounding(time):  # type: ignore[no-untyped-def]
+    """Times closer than this are one time; s."""
+    return 1e-11 * max(1.0, abs(time))
+
+
+@compiled
+def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
+    """One input at a time within (or at the end of) its piece p."""
+    dt = time - pieces[j, p, START]
+    return ((pieces[j, p, C3] * dt + pieces[j, p, C2]) * dt + pieces[j, p, C1]) * dt + pieces[j, p, C0]
+
+
+@compiled
+def derive(m, s, time, x, derivatives):  # type: ignore[no-untyped-def]
+    """Derivatives at a time within the current pieces of the inputs; returns the FMI status."""
+    f, n = m.functions, x.shape[0]
+    status = _set_time(f[SET_TIME], f[INSTANCE], time)
+    if status <= 1 and n:
+        status = _vector(f[SET_STATES], f[INSTANCE], x.ctypes.data, n)
+    if status <= 1 and m.set_calls.shape[0]:
+        for j in range(m.set_places.shape[0]):
+            put(m.set_places[j], value_at(m.pieces, j, s.piece[j], time))
+        status = exchange_values(f[INSTANCE], f[VERSION], m.set_calls)
+    if status <= 1 and n:
+        status = _vector(f[GET_DERIVATIVES], f[INSTANCE], derivatives.ctypes.data, n)
+        for i in range(n):
+            if not np.isfinite(derivatives[i]):
+                # A step into a region where the model is not defined is tried again shorter, like a discard.
+                return max(status, 2)
+    return status
+
+
+@compiled
+def get_indicators(m, z):  # type: ignore[no-untyped-def]
+    """Event indicators where the FMU is now; returns the FMI status."""
+    if not z.shape[0]:
+        return 0
+    return _vector(m.functions[GET_INDICATORS], m.functions[INSTANCE], z.ctypes.data, z.shape[0])
+
+
+@compiled
+def complete_step(m, s):  # type: ignore[no-untyped-def]
+    """Tell the FMU that a step was accepted: status, whether it wants an event, whether it ends."""
+    f = m.functions
+    s.events[:8] = 0
+    a = s.events.ctypes.data
+    if f[VERSION] == 1:
+        status = _completed_1(f[COMPLETED_STEP], f[INSTANCE], a)
+    elif f[VERSION] == 2:
+        status = _completed_2(f[COMPLETED_STEP], f[INSTANCE], np.int32(1), a, a + 4)
+    else:
+        status = _completed_3(f[COMPLETED_STEP], f[INSTANCE], np.uint8(1), a, a + 4)
+    return status, s.events[0] != 0, s.events[4] != 0
+
+
+@compiled
+def _update(m, s):  # type: ignore[no-untyped-def]
+    """One round of event iteration, which sets the next time event: status, again, end, states changed."""
+    f = m.functions
+    s.events[:] = 0
+    a = s.events.ctypes.data
+    times = s.events.view(np.float64)
+    if f[VERSION] == 1:
+        status = _update_1(f[UPDATE], f[INSTANCE], np.uint8(0), a)
+        again, end, changed, defined = s.events[0] == 0, s.events[3] != 0, s.events[2] != 0, s.events[4] != 0
+        next_time = times[1]
+    elif f[VERSION] == 2:
+        status = _update_2(f[UPDATE], f[INSTANCE], a)
+        again, end, changed, defined = (
+            s.events[0] != 0,
+            s.events[4] != 0,
+            s.events[12] != 0,
+            s.events[16] != 0,
+        )
+        next_time = times[3]
+    else:
+        status = _update_3(f[UPDATE], f[INSTANCE], a, a + 1, a + 2, a + 3, a + 4, a + 24)
+        again, end, changed, defined = s.events[0] != 0, s.events[1] != 0, s.events[3] != 0, s.events[4] != 0
+        next_time = times[3]
+    s.clock[NEXT_EVENT] = next_time if defined else np.inf
+    return status, again, end, changed
+
+
+@compiled
+def settle(m, s):  # type: ignore[no-untyped-def]
+    """Event iteration until nothing changes; then continuous time again. Status and where it stopped."""
+    f = m.functions
+    any_change = False
+    for _ in range(_MOST_ROUNDS):
+        status, again, end, changed = _update(m, s)
+        if status > 1:
+            return status, EVENT
+        if end:
+            return status, TERMINATED
+        any_change = any_change or changed
+        if not again:
+            break
+    else:
+        return 0, STUCK
+    if f[VERSION] > 1:
+        status = call_mode(f[ENTER_CONTINUOUS], f[INSTANCE])
+        if status > 1:
+            return status, EVENT
+    if any_change and s.x.shape[0]:
+        status = _vector(f[GET_STATES], f[INSTANCE], s.x.ctypes.data, s.x.shape[0])
+        if status > 1:
+            return status, EVENT
+    return refresh(m, s)
+
+
+@compiled
+def refresh(m, s):  # type: ignore[no-untyped-def]
+    """Derivatives and indicators at the current time and state. Status and where it stopped."""
+    status = derive(m, s, s.clock[TIME], s.x, s.stages[0])
+    if status > 1:
+        return status, STEPPING
+    status = get_indicators(m, s.z)
+    s.counts[JACOBIAN_KNOWN] = 0
+    return status, EVENT if status > 1 else DONE
+
+
+@compiled
+def handle_event(m, s):  # type: ignore[no-untyped-def]
+    """Visit event mode at the current time and state. Status and where it stopped."""
+    f = m.functions
+    if f[VERSION] > 1:
+        status = call_mode(f[ENTER_EVENT_MODE], f[INSTANCE])
+        if status > 1:
+            return status, EVENT
+    status = set_event_inputs(m, s)
+    if status > 1:
+        return status, SETTING
+    return settle(m, s)
+
+
+@compiled
+def set_event_inputs(m, s):  # type: ignore[no-untyped-def]
+    """Set all inputs to their values at the current time; returns the FMI status."""
+    f, time = m.functions, s.clock[TIME]
+    for j in range(m.set_places.shape[0]):
+        put(m.set_places[j], value_at(m.pieces, j, s.piece[j], time))
+    status = exchange_values(f[INSTANCE], f[VERSION], m.set_calls)
+    first = m.set_places.shape[0]
+    for j in range(m.event_places.shape[0]):
+        put(m.event_places[j], m.event_pieces[j, s.piece[first + j], C0])
+    return max(status, exchange_values(f[INSTANCE], f[VERSION], m.event_calls))
+
+
+@compiled
+def next_break(m, s):  # type: ignore[no-untyped-def]
+    """Start in s of the next piece of any input."""
+    nearest = np.inf
+    n = m.pieces.shape[0]
+    for j in range(n + m.event_pieces.shape[0]):
+        p = s.piece[j] + 1
+        if j < n:
+            if p < m.pieces.shape[1]:
+                nearest = min(nearest, m.pieces[j, p, START])
+        elif p < m.event_pieces.shape[1]:
+            nearest = min(nearest, m.event_pieces[j - n, p, START])
+    return nearest
+
+
+@compiled
+def enter_pieces(m, s):  # type: ignore[no-untyped-def]
+    """Go on to the pieces that begin by now; whether an input jumps there."""
+    time, n = s.clock[TIME], m.pieces.shape[0]
+    jumps = False
+    for j in range(n):
+        while s.piece[j] + 1 < m.pieces.shape[1] and m.pieces[j, s.piece[j] + 1, START] <= time + rounding(
+            time
+        ):
+            before = value_at(m.pieces, j, s.piece[j], m.pieces[j, s.piece[j] + 1, START])
+            s.piece[j] += 1
+            after = m.pieces[j, s.piece[j], C0]
+            jumps = jumps or abs(after - before) > 1e-9 * max(abs(after), abs(before))
+    for j in range(m.event_pieces.shape[0]):
+        k = n + j
+        while s.piece[k] + 1 < m.event_pieces.shape[1] and m.event_pieces[
+            j, s.piece[k] + 1, START
+        ] <= time + rounding(time):
+            s.piece[k] += 1
+            jumps = True
+    return jumps

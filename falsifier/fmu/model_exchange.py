@@ -1,0 +1,167 @@
+"""Model exchange: the FMU is a differential equation and is solved here."""
+
+import ctypes
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.errors import ModelError
+from falsifier.fmu import continuous, exchange
+from falsifier.fmu.continuous import Memory, Model, make_memory
+from falsifier.fmu.description import Description
+from falsifier.fmu.library import Library
+from falsifier.fmu.lifecycle import Lifecycle
+from falsifier.fmu.plan import Plan
+from falsifier.fmu.ports import make_ports
+from falsifier.fmu.room import Room
+from falsifier.fmu.stepper import Stepper, check_range
+
+_STEPS_PER_CLOCK_LOOK = 2000
+_DEFAULT_TOLERANCE = 1e-6
+# Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7).
+_ABSOLUTE_SHARE = 0.01
+
+_NAMES = {
+    1: (
+        "SetTime", "SetContinuousStates", "GetContinuousStates", "GetDerivatives", "GetEventIndicators",
+        "CompletedIntegratorStep", "", "EventUpdate", "",
+    ),
+    2: (
+        "SetTime", "SetContinuousStates", "GetContinuousStates", "GetDerivatives", "GetEventIndicators",
+        "CompletedIntegratorStep", "EnterEventMode", "NewDiscreteStates", "EnterContinuousTimeMode",
+    ),
+    3: (
+        "SetTime", "SetContinuousStates", "GetContinuousStates", "GetContinuousStateDerivatives",
+        "GetEventIndicators", "CompletedIntegratorStep", "EnterEventMode", "UpdateDiscreteStates",
+        "EnterContinuousTimeMode",
+    ),
+}  # fmt: skip
+
+
+def warm_up() -> None:
+    """Compile the solver, or load it from the cache, without an FMU."""
+    from numba import typeof
+
+    table, places = np.zeros((0, 5), dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
+    functions, pieces = np.zeros(11, dtype=np.int64), np.zeros((0, 1, 5))
+    model = Model(
+        functions, table, places, table, places, table, places, pieces, pieces, np.zeros(0), 1e-6, 1.0, 1.0
+    )
+    memory = make_memory(0, 0, 0)
+    for function in (continuous.settle, continuous.refresh):
+        function.compile((typeof(model), typeof(memory)))
+    # A run that has no column left to record calls nothing.
+    exchange.advance(model, memory, np.zeros((0, 0)), 1)
+
+
+class ModelExchange(Stepper):
+    """Solves one model-exchange FMU through a plan."""
+
+    def __init__(
+        self, description: Description, library: Library, plan: Plan, room: Room, lifecycle: Lifecycle
+    ) -> None:
+        super().__init__(description, library, plan, room)
+        self._lifecycle = lifecycle
+        kinds = {v.name: v for v in description.info.variables}
+        held = np.array(
+            [kinds[n].variability != "continuous" or kinds[n].kind != "real" for n in plan.inputs], dtype=bool
+        )
+        self._held_rows, self._other_rows = np.flatnonzero(held), np.flatnonzero(~held)
+        self._inputs = make_ports(description, [plan.inputs[k] for k in self._other_rows], self._setters)
+        self._held_inputs = make_ports(description, [plan.inputs[k] for k in self._held_rows], self._setters)
+        addresses = [library.address(name) if name else 0 for name in _NAMES[description.major]]
+        self._functions = np.array([0, description.major, *addresses], dtype=np.int64)
+        self._states, self._indicators = self._sizes(description)
+        self._tolerance = plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE
+
+    def set_first_inputs(self) -> None:
+        """Set the inputs at time 0."""
+        for ports, rows in ((self._inputs, self._other_rows), (self._held_inputs, self._held_rows)):
+            pieces = self._pieces(rows)
+            values = np.where(np.isfinite(pieces[:, :, continuous.START]), pieces[:, :, continuous.C0], 0.0)
+            check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
+            self._write(ports, values, "inputs")
+
+    def advance(self, deadline: float) -> None:
+        """Solve to the stop time; see Stepper.advance."""
+        self._functions[continuous.INSTANCE] = self._library.component
+        memory = make_memory(self._states, self._indicators, len(self._plan.inputs))
+        model = self._model()
+        self._begin(model, memory)
+        self._read_first()
+        memory.counts[continuous.COLUMN] = 1
+        memory.clock[continuous.NEXT_STEP] = model.max_step
+        while True:
+            status, where = exchange.advance(model, memory, self._room.outputs, _STEPS_PER_CLOCK_LOOK)
+            reached = float(memory.clock[continuous.TIME])
+            if where == exchange.PAUSED:
+                self._watch_clock(deadline, reached)
+                continue
+            self._check(status, where, reached)
+            return
+
+    def _model(self) -> Model:
+        nominals = np.ones(self._states)
+        self._vector("GetNominalContinuousStates", "GetNominalsOfContinuousStates", nominals)
+        return Model(
+            functions=self._functions,
+            set_calls=self._inputs.calls,
+            set_places=self._inputs.places,
+            event_calls=self._held_inputs.calls,
+            event_places=self._held_inputs.places,
+            get_calls=self._outputs.calls,
+            get_places=self._outputs.places,
+            pieces=self._pieces(self._other_rows),
+            event_pieces=self._pieces(self._held_rows),
+            weights=_ABSOLUTE_SHARE * self._tolerance * np.where(nominals > 0.0, nominals, 1.0),
+            tolerance=float(self._tolerance),
+            stop_time=float(self._plan.stop_time),
+            max_step=float(self._plan.max_step),
+        )
+
+    def _begin(self, model: Model, memory: Memory) -> None:
+        """From initialisation to continuous time, through the events at time 0."""
+        self._vector("GetContinuousStates", "GetContinuousStates", memory.x)
+        info = self._lifecycle.first_events
+        if info is None or info.iteration_converged == b"\x00":
+            status, where = continuous.settle(model, memory)
+        else:
+            if info.terminate != b"\x00":
+                self._check(0, self._loops.TERMINATED, 0.0)
+            has_next = info.has_next_time != b"\x00"
+            memory.clock[continuous.NEXT_EVENT] = info.next_time if has_next else np.inf
+            status, where = continuous.refresh(model, memory)
+        self._check(status, where, 0.0)
+        if info is None:
+            # After event mode the FMU may have new states, whether it says so or not.
+            self._vector("GetContinuousStates", "GetContinuousStates", memory.x)
+            status, where = continuous.refresh(model, memory)
+            self._check(status, where, 0.0)
+
+    def _vector(self, name_1: str, name: str, values: NDArray[np.float64]) -> None:
+        """Have the FMU fill a vector with one value per state."""
+        if not values.size:
+            return
+        function = self._library.function(
+            name_1 if self._library.description.major == 1 else name, ctypes.c_void_p, ctypes.c_size_t
+        )
+        status = function(self._library.component, values.ctypes.data, values.size)
+        self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
+
+    def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        return self._room.inputs[rows].reshape(len(rows), self._plan.pieces, 5)
+
+    def _sizes(self, description: Description) -> tuple[int, int]:
+        """Number of states and of event indicators."""
+        if description.major < 3:
+            return description.states, description.indicators
+        sizes = []
+        for name in ("GetNumberOfContinuousStates", "GetNumberOfEventIndicators"):
+            size = ctypes.c_size_t()
+            if (
+                self._library.function(name, ctypes.c_void_p)(self._library.component, ctypes.addressof(size))
+                > 1
+            ):
+                raise ModelError(f"{self._name}: {name} failed")
+            sizes.append(size.value)
+        return sizes[0], sizes[1]

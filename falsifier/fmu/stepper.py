@@ -1,0 +1,153 @@
+"""What stepping a co-simulation and a model-exchange FMU through a plan have in common."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.errors import SimulationError
+from falsifier.fmu.description import Description
+from falsifier.fmu.library import Library, status_name
+from falsifier.fmu.plan import Plan
+from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.room import Room
+
+
+class Stepper(ABC):
+    """Takes an initialised FMU through a plan, from the inputs in a room to the outputs in it.
+
+    Args:
+        description: of the FMU.
+        library: with the instance.
+        plan: what is simulated.
+        room: where inputs and outputs lie.
+    """
+
+    def __init__(self, description: Description, library: Library, plan: Plan, room: Room) -> None:
+        self._loops = loops()
+        self._name = description.info.name
+        self._library, self._plan, self._room = library, plan, room
+        self._setters = library.setters()
+        self._parameters = make_ports(description, plan.parameters, self._setters)
+        self._outputs = make_ports(description, plan.outputs, library.getters())
+
+    def set_parameters(self) -> None:
+        """Set the plan's parameters and start values."""
+        names, values = self._plan.parameters, self._room.parameters[:, np.newaxis]
+        check_range(self._name, names, self._parameters, values)
+        self._write(self._parameters, values, "parameters")
+
+    @abstractmethod
+    def set_first_inputs(self) -> None:
+        """Set the inputs at time 0."""
+
+    @abstractmethod
+    def advance(self, deadline: float) -> None:
+        """Simulate to the stop time and record the outputs.
+
+        Args:
+            deadline: value of time.perf_counter() at which to give up.
+
+        Raises:
+            SimulationError: when a step fails, or the clock passes the deadline.
+        """
+
+    def _read_first(self) -> None:
+        """Record the outputs at time 0."""
+        status = self._loops.read_row(
+            self._library.component,
+            self._library.description.major,
+            self._outputs.calls,
+            self._outputs.places,
+            self._room.outputs,
+            0,
+        )
+        self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
+
+    def _write(self, ports: Ports, rows: NDArray[np.float64], what: str) -> None:
+        """Set variables to the first column of their rows."""
+        if not rows.shape[0]:
+            return
+        status = self._loops.write_row(
+            self._library.component, self._library.description.major, ports.calls, ports.places, rows, 0
+        )
+        if status > 1:
+            raise SimulationError(
+                f"{self._name}: setting the {what} returned {status_name(status)}", time=0.0
+            )
+
+    def _check(self, status: int, where: int, reached: float) -> None:
+        loops = self._loops
+        if where == loops.DONE:
+            return
+        if where == loops.TERMINATED:
+            what = "the FMU ended the simulation"
+        elif where == loops.STUCK:
+            what = "the FMU makes no progress: events follow each other without end"
+        else:
+            doing = {
+                loops.SETTING: "setting the inputs",
+                loops.STEPPING: "the step",
+                loops.GETTING: "reading the outputs",
+            }.get(where, "the event iteration")
+            what = f"{doing} returned {status_name(status)}"
+        raise SimulationError(
+            f"{self._name}: {what} at t = {reached:g} s, before the stop time {self._plan.stop_time:g} s",
+            time=reached,
+        )
+
+    def _watch_clock(self, deadline: float, reached: float) -> None:
+        if time.perf_counter() > deadline:
+            limit = self._plan.time_limit
+            raise SimulationError(
+                f"{self._name}: stopped at t = {reached:g} s after {limit:g} s, the time limit",
+                status="timeout",
+                time=reached,
+            )
+
+
+def check_range(model: str, names: Sequence[str], ports: Ports, rows: NDArray[np.float64]) -> None:
+    """Refuse values that do not fit a variable's type.
+
+    Raises:
+        SimulationError: naming the variable and what its type takes.
+    """
+    for name, (low, high), row in zip(names, ports.limits, rows, strict=True):
+        if not np.isinf(low) and not (low - 0.5 <= row.min() and row.max() <= high + 0.5):
+            raise SimulationError(
+                f"{model}: values from {row.min():g} to {row.max():g} do not fit {name!r}, "
+                f"whose type takes {low:g} to {high:g}",
+                time=0.0,
+            )
+
+
+def loops() -> Any:
+    """The compiled loops, or the plain ones where numba is not installed."""
+    try:
+        from falsifier.fmu import stepping
+    except ImportError:
+        from falsifier.fmu import plain
+
+        return plain
+    return stepping
+
+
+def warm_up() -> None:
+    """Load what every simulation needs, so that processes forked from this one find it ready."""
+    import fmpy.fmi1
+    import fmpy.fmi2
+    import fmpy.fmi3
+    import fmpy.logging  # noqa: F401
+
+    compiled = loops()
+    calls, places = np.zeros((0, 5), dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
+    rows, report = np.zeros((0, 1)), np.zeros(3, dtype=np.int64)
+    functions = np.zeros(7, dtype=np.int64)
+    compiled.write_row(0, 2, calls, places, rows, 0)
+    compiled.read_row(0, 2, calls, places, rows, 0)
+    compiled.co_simulate(
+        functions, calls, places, calls, places, calls, places, rows, rows, rows, 1.0, 0, 0, 1, report
+    )
