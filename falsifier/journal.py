@@ -13,11 +13,11 @@ cut off by a crash is dropped when the journal is opened again.
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -27,6 +27,9 @@ from falsifier.evaluation import Evaluation, Status
 from falsifier.space import Candidate
 from falsifier.stl.verdict import Verdict
 from falsifier.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from falsifier.llm.messages import Exchange
 
 # Longest time in s that lines may wait in the operating system's cache before they are forced to disk;
 # replies of a language model cost money and never wait.
@@ -214,6 +217,14 @@ def write_manifest(directory: Path, manifest: dict[str, Any]) -> None:
         file.flush()
         os.fsync(file.fileno())
     partial.replace(directory / "manifest.json")
+
+
+def answered_exchanges(records: Iterable[Record]) -> list["Exchange"]:
+    """Recorded exchanges that were answered; one without an answer was not paid for and is asked again."""
+    from falsifier.llm.messages import Exchange
+
+    recorded = (Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord))
+    return [exchange for exchange in recorded if exchange.reply is not None]
 
 
 def recorded_evaluations(directory: Path, records: list[Record]) -> list[Evaluation]:

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,6 +23,7 @@ from falsifier.execution import local_executor
 from falsifier.journal import (
     Journal,
     Record,
+    answered_exchanges,
     open_journal,
     read_journal,
     read_manifest,
@@ -31,6 +32,11 @@ from falsifier.journal import (
 from falsifier.model import Interface
 from falsifier.problem import Problem, load_problem
 
+if TYPE_CHECKING:
+    from falsifier.llm.messages import Chat
+
+# Engines that ask a language model.
+_MODEL_ENGINES = ("llm", "hybrid")
 _RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
 
 
@@ -86,6 +92,7 @@ class ModelRequest(_Strict):
     effort: Literal["low", "medium", "high"] | None = None
     api_base: str | None = None
     variant: str | None = None
+    cache: bool = True
 
 
 class RunRequest(_Strict):
@@ -120,19 +127,19 @@ def execute(
     with ExitStack() as stack:
         journal: Journal | None = None
         records: Sequence[Record] = ()
-        if directory is not None:
-            if not resume and (directory / "manifest.json").exists():
+        if directory is not None and resume:
+            journal = stack.enter_context(open_journal(directory))
+            _check_unchanged(directory, problem)
+            records = read_journal(directory)
+        build = proposer_builder(request, problem, records)
+        if directory is not None and not resume:  # only now: a wrong engine or a missing key leaves no folder
+            if (directory / "manifest.json").exists():
                 raise JournalError(
                     f"{directory} already holds a run: choose another --out, or continue it with "
                     f"'falsifier resume {directory}'"
                 )
             journal = stack.enter_context(open_journal(directory))
-            if resume:
-                _check_unchanged(directory, problem)
-                records = read_journal(directory)
-            else:
-                write_manifest(directory, manifest(request, problem))
-        build = proposer_builder(request, problem, records)
+            write_manifest(directory, manifest(request, problem))
         executor = stack.enter_context(local_executor(request.jobs))
         stack.callback(problem.model.close)
         return search(
@@ -181,8 +188,36 @@ def proposer_builder(request: RunRequest, problem: Problem, records: Sequence[Re
 
     if request.model is None:
         engine = request.engine or DEFAULT_ENGINE
-        return lambda _: make_proposer(engine, problem, seed=request.seed)
-    raise SpecError("language models are not wired yet")
+        if engine in _MODEL_ENGINES:
+            raise SpecError(f"the engine {engine!r} needs a language model: add --model NAME")
+        proposer = make_proposer(engine, problem, seed=request.seed)
+        return lambda _: proposer
+    if (request.engine or "llm") not in _MODEL_ENGINES:
+        raise SpecError(
+            f"the engine {request.engine!r} asks no language model: leave out --model, or leave out --engine"
+        )
+    from falsifier.proposers.llm import make_llm_proposer
+
+    variant, sample = request.model.variant, request.seed
+    chat = _chat(request.model, records)
+    return lambda on_exchange: make_llm_proposer(
+        problem, chat, variant=variant, on_exchange=on_exchange, sample=sample
+    )
+
+
+def _chat(model: ModelRequest, records: Sequence[Record]) -> "Chat":
+    """Return the chat that first plays the journal's replies, so that none is paid for twice.
+
+    Raises:
+        ChatError: for an unknown provider or a missing key.
+    """
+    from falsifier.llm.cache import default_cache_directory
+    from falsifier.llm.connect import connect
+    from falsifier.llm.replay import RecordedChat
+
+    cache = default_cache_directory() if model.cache else None
+    chat = connect(model.name, effort=model.effort, api_base=model.api_base, cache=cache)
+    return RecordedChat(answered_exchanges(records), chat)
 
 
 def _check_unchanged(directory: Path, problem: Problem) -> None:

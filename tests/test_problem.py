@@ -93,7 +93,11 @@ def test_problems_travel_between_processes(folder: Path) -> None:
             '"co-simulation"\noutput_interval = 0.03',
             r"model\.output_interval: .*whole intervals",
         ),
-        ('interface = "co-simulation"', "", r"model\.interface: the FMU offers co-simulation and .*say which"),
+        (
+            'interface = "co-simulation"',
+            "",
+            r"model\.interface: the FMU offers co-simulation and .*say which",
+        ),
     ],
 )
 def test_errors_name_file_key_and_cure(folder: Path, old: str, new: str, message: str) -> None:

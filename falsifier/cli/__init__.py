@@ -18,6 +18,7 @@ _COMMANDS = {
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
     "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files."),
     "prompt": ("falsifier.cli.model", "Print what would be sent to a language model; send nothing."),
+    "models": ("falsifier.cli.model", "Check a language model: its name, its key and one small round trip."),
 }
 
 

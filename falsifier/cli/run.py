@@ -26,6 +26,7 @@ _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 1
 @click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
 @click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
 @click.option("--variant", metavar="MP1..", help="Prompt variant.")
+@click.option("--no-cache", is_flag=True, help="Ask the model anew where its reply is already on disk.")
 @click.option("--budget", type=int, default=100, show_default=True, help="Most simulations.")
 @click.option("--seconds", type=float, help="Most wall-clock seconds.")
 @click.option("--max-tokens", type=int, help="Most tokens of the language model.")
@@ -57,6 +58,7 @@ def run(
     language = {name: options.pop(name) for name in ("effort", "api_base", "variant")}
     if model is None and any(value is not None for value in language.values()):
         raise click.UsageError("--effort, --api-base and --variant need --model NAME")
+    language["cache"] = not options.pop("no_cache")
     request = RunRequest(
         problem=problem_request(options),
         engine=engine,

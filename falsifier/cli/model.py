@@ -1,0 +1,52 @@
+"""``falsifier prompt`` and ``falsifier models``: what a language model is sent, and whether it answers."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from falsifier.cli.options import json_option, problem_options, problem_request
+
+
+@click.command()
+@problem_options
+@click.option("--variant", metavar="MP1..", help="Prompt variant; default: the one that runs use.")
+@click.option(
+    "--run", "directory", type=click.Path(path_type=Path), help="Show the prompt behind this run's samples."
+)
+@click.option("--samples", type=int, help="With --run: only its first samples.")
+@json_option
+def prompt(
+    *, variant: str | None, directory: Path | None, samples: int | None, as_json: bool, **options: Any
+) -> None:
+    """Print exactly what would be sent next; send nothing."""
+    from falsifier.journal import read_journal, recorded_evaluations
+    from falsifier.proposers.llm import preview
+
+    if samples is not None and directory is None:
+        raise click.UsageError("--samples needs --run DIR")
+    problem = problem_request(options).load()
+    evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
+    messages = preview(problem, variant=variant, evaluations=evaluations[:samples])
+    if as_json:
+        click.echo(json.dumps([message.model_dump() for message in messages], indent=2))
+        return
+    click.echo("\n\n".join(f"--- {message.role} ---\n{message.content}" for message in messages))
+
+
+@click.command()
+@click.argument("model")
+@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
+@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
+def models(*, model: str, api_base: str | None, effort: str | None) -> None:
+    """Check MODEL: its name, its key and one small round trip, and say what it costs."""
+    from falsifier.llm.connect import check_model
+
+    found = check_model(model, api_base=api_base, effort=effort)
+    price = "unknown" if found.price is None else str(found.price)
+    key = f"key from {found.key}" if found.key else "no key needed"
+    click.echo(
+        f"{found.model}: answers ({found.reply!r} after {found.seconds:.1f} s, {found.usage.tokens} tokens); "
+        f"{key}; price {price}"
+    )
