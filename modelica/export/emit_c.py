@@ -421,7 +421,7 @@ def sizes_h(system: System) -> str:
         "SOLVER_STEP": repr(float(solver.get("step", system.model.interval or 0.01))) if fixed else "0.0",
         "SOLVER_TOLERANCE": repr(float(system.model.tolerance or 1e-6)),
         "SOLVER_MAX_STEP": repr(float(solver["maxStep"])) if "maxStep" in solver else "HUGE_VAL",
-        "SOLVER_CHECKS": int(solver.get("checks", 1)),
+        "SOLVER_CHECKS": int(solver.get("checks", 1 if fixed else 4)),
         "SOLVER_REPEAT_TICKS": int(bool(solver.get("repeatLastTick", False))),
     }
     return "".join(f"#define {name} {value}\n" for name, value in sizes.items())

@@ -86,7 +86,8 @@ def _equal(left: Tensor, right: Tensor, place: Place, model: FlatModel) -> None:
         if (a.type == "Boolean") != (b.type == "Boolean"):
             raise ExportError(place, f"'=' between {a.type} and {b.type}")
         for one, other in ((a, b), (b, a)):
-            if isinstance(one, Var) and one.type == "Integer" and other.type == "Real":
+            real = other.type == "Real" and not isinstance(other, (Var, Der))
+            if isinstance(one, Var) and one.type == "Integer" and real:
                 raise ExportError(place, f"the Integer '{one.name}' cannot take a Real; use integer(...)")
         model.equations.append(Equation(a, b, place))
 

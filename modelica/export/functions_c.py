@@ -320,17 +320,18 @@ class FunctionWriter:
             kind = "Integer"
         return Value(operation_text(operator.lstrip("."), [arg.text for arg in args], kind, types), kind)
 
-    def array(self, expr: ArrayOf) -> Value:
+    def array(self, expr: ArrayOf, wanted: Type | None = None) -> Value:
         """An array literal."""
         rows = [self.value(item) for item in expr.elements]
-        if rows and rows[0].dims:
+        if not rows or any(row.dims for row in rows):
             raise ExportError(
-                expr.place, "a matrix literal inside of a function needs to be a constant of the function"
+                expr.place, "inside of a function an empty array or a matrix needs to be a constant of the function"
             )
         kind: Type = "Real" if any(row.type == "Real" for row in rows) else rows[0].type
-        return Value(
-            f"(const {C_TYPES[kind]}[]){{{', '.join(row.text for row in rows)}}}", kind, (str(len(rows)),)
-        )
+        if wanted == "Real" and kind == "Integer":
+            kind = wanted
+        texts = ", ".join(row.text for row in rows)
+        return Value(f"(const {C_TYPES[kind]}[]){{{texts}}}", kind, (str(len(rows)),))
 
     def whole(self, name: str, place: Place) -> Value:
         """A variable of the function without subscripts."""
@@ -403,7 +404,7 @@ class FunctionWriter:
             if not item.dimensions:
                 texts.append(self.converted(source, _type_of(item)))
                 continue
-            value = self.value(source)
+            value = self.array(source, _type_of(item)) if isinstance(source, ArrayOf) else self.value(source)
             if value.type != _type_of(item) or len(value.dims) != len(item.dimensions):
                 raise ExportError(
                     call.place, f"the argument '{item.name}' of '{call.name}' has another type or size"

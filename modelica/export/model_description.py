@@ -239,26 +239,8 @@ def fmi3(system: System) -> str:
     _experiment(root, system)
     variables = SubElement(root, "ModelVariables")
     time = len(system.reals) + len(system.ints)
-    SubElement(
-        variables,
-        "Float64",
-        {
-            "name": "time",
-            "valueReference": str(time),
-            "causality": "independent",
-            "variability": "continuous",
-            "description": "Simulation time",
-            "unit": "s",
-        }
-        if _has_unit(shown, "s")
-        else {
-            "name": "time",
-            "valueReference": str(time),
-            "causality": "independent",
-            "variability": "continuous",
-            "description": "Simulation time",
-        },
-    )
+    attributes = {"name": "time", "valueReference": str(time), "causality": "independent"}
+    SubElement(variables, "Float64", attributes | {"variability": "continuous", "description": "Simulation time in s"})
     references = {entry.name: entry.reference for entry in shown}
     names = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
     for entry in shown:
@@ -274,6 +256,11 @@ def fmi3(system: System) -> str:
         if entry.derivative_of:
             attributes["derivative"] = str(references[entry.derivative_of])
         SubElement(variables, names[entry.type], attributes)
+    indicators = [str(time + 1 + k) for k in range(system.crossings)]
+    for k, reference in enumerate(indicators):
+        attributes = {"name": f"_indicator_{k + 1}", "valueReference": reference, "causality": "local"}
+        attributes |= {"variability": "continuous", "initial": "calculated"}
+        SubElement(variables, "Float64", attributes | {"description": "Changes its sign at a state event"})
     structure = SubElement(root, "ModelStructure")
     tags = {
         "Outputs": "Output",
@@ -283,13 +270,9 @@ def fmi3(system: System) -> str:
     for group, chosen in _structure(shown, system).items():
         for entry in chosen:
             SubElement(structure, tags[group], valueReference=str(entry.reference))
-    for k in range(system.crossings):
-        SubElement(structure, "EventIndicator", valueReference=str(time + 1 + k))
+    for indicator in indicators:
+        SubElement(structure, "EventIndicator", valueReference=indicator)
     return _text(root)
-
-
-def _has_unit(shown: list[Entry], name: str) -> bool:
-    return any(entry.variable and entry.variable.unit == name for entry in shown)
 
 
 def _text(root: Element) -> str:

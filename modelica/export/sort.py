@@ -202,7 +202,8 @@ def _candidates(item: Equation, free: set[str]) -> dict[str, Scalar]:
     found: dict[str, Scalar] = {}
     for one, other in ((item.left, item.right), (item.right, item.left)):
         name = _bare(one)
-        if name in free and name not in names_in(other):
+        fits = one.type == other.type or one.type == "Real"
+        if name in free and fits and name not in names_in(other):
             found.setdefault(name, other)
     if item.discrete:
         return found

@@ -30,17 +30,24 @@ int events_crossed(Model *m, double *z) {
     return crossed;
 }
 
-static void freeze_relations(Model *m) {
+/* Returns whether a relation has changed. */
+static int freeze_relations(Model *m) {
+    int changed = 0;
     double z[MODEL_CROSSINGS + 1], at[MODEL_TIME_RELATIONS + 1];
     if (MODEL_CROSSINGS) {
         model_floors(m, m->fl);
         model_crossings(m, z);
-        for (int k = 0; k < MODEL_RELATIONS; k++) m->rel[k] = (unsigned char)holds(model_crossing_op[k], z[k]);
+        for (int k = 0; k < MODEL_RELATIONS; k++) {
+            unsigned char now = (unsigned char)holds(model_crossing_op[k], z[k]);
+            changed |= m->rel[k] != now;
+            m->rel[k] = now;
+        }
     }
     if (MODEL_TIME_RELATIONS) {
         model_thresholds(m, at);
         for (int k = 0; k < MODEL_TIME_RELATIONS; k++) m->trel[k] = (unsigned char)time_reached(m, at[k]);
     }
+    return changed;
 }
 
 static void remember(Model *m) {
@@ -77,9 +84,10 @@ static void iterate(Model *m) {
         remember(m);
         model_event(m);
         memset(m->tick, 0, sizeof m->tick);
-        freeze_relations(m);
-        changed = discrete_changed(m);
-        changed |= apply_reinits(m);
+        m->after_event |= freeze_relations(m);
+        int jump = apply_reinits(m);
+        m->after_event |= jump;
+        changed = discrete_changed(m) || jump;
     }
     memcpy(m->pw, m->w, sizeof m->w);
     m->current = m->rest_current = 1;
@@ -96,7 +104,7 @@ void events_initialize(Model *m) {
     model_starts(m);
     remember(m);
     model_initial(m);
-    freeze_relations(m);
+    (void)freeze_relations(m);
     memcpy(m->pw, m->w, sizeof m->w);
     for (int k = 0; k < MODEL_TICKS; k++) {
         double start, interval;

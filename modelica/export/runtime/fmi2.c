@@ -121,21 +121,8 @@ API(fmi2Status) F(fmi2SetString)(void *c, const fmi2ValueReference vr[], size_t 
     return n ? (fmi2Status)instance_error(c, "this FMU has no String variables") : RESULT_OK;
 }
 
-API(fmi2Status) F(fmi2GetFMUstate)(void *p, void **state) {
-    Instance *c = p;
-    if (!*state) *state = malloc(sizeof(State));
-    if (!*state) return instance_error(c, "no memory for the FMU state");
-    memcpy(*state, &c->state, sizeof(State));
-    return RESULT_OK;
-}
-API(fmi2Status) F(fmi2SetFMUstate)(void *p, void *state) {
-    Instance *c = p;
-    if (!state) return instance_error(c, "fmi2SetFMUstate: there is no state");
-    memcpy(&c->state, state, sizeof(State));
-    free(c->preview);
-    c->preview = NULL;
-    return RESULT_OK;
-}
+API(fmi2Status) F(fmi2GetFMUstate)(void *c, void **state) { return (fmi2Status)instance_save(c, state); }
+API(fmi2Status) F(fmi2SetFMUstate)(void *c, void *state) { return (fmi2Status)instance_restore(c, state); }
 API(fmi2Status) F(fmi2FreeFMUstate)(void *c, void **state) {
     (void)c;
     free(*state);
@@ -148,16 +135,10 @@ API(fmi2Status) F(fmi2SerializedFMUstateSize)(void *c, void *state, size_t *size
     return RESULT_OK;
 }
 API(fmi2Status) F(fmi2SerializeFMUstate)(void *c, void *state, fmi2Byte bytes[], size_t size) {
-    if (size < sizeof(State)) return instance_error(c, "fmi2SerializeFMUstate: the buffer is too small");
-    memcpy(bytes, state, sizeof(State));
-    return RESULT_OK;
+    return (fmi2Status)instance_serialize(c, state, bytes, size);
 }
 API(fmi2Status) F(fmi2DeSerializeFMUstate)(void *c, const fmi2Byte bytes[], size_t size, void **state) {
-    if (size != sizeof(State)) return instance_error(c, "fmi2DeSerializeFMUstate: these are not the bytes of a state of this FMU");
-    if (!*state) *state = malloc(sizeof(State));
-    if (!*state) return instance_error(c, "no memory for the FMU state");
-    memcpy(*state, bytes, sizeof(State));
-    return RESULT_OK;
+    return (fmi2Status)instance_deserialize(c, bytes, size, state);
 }
 API(fmi2Status) F(fmi2GetDirectionalDerivative)(void *c, const fmi2ValueReference u[], size_t nu, const fmi2ValueReference k[],
                                                 size_t nk, const fmi2Real dk[], fmi2Real du[]) {

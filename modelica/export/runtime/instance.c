@@ -6,6 +6,7 @@
 /* Value references: Reals by their place, then Integers and Booleans, then the time (FMI 3). */
 #define VR_INTS ((unsigned)MODEL_REALS)
 #define VR_TIME ((unsigned)(MODEL_REALS + MODEL_INTS))
+#define VR_INDICATORS (VR_TIME + 1) /* event indicators (FMI 3) */
 
 Instance *instance_new(const char *name, const char *guid, int cosimulation) {
     if (!guid || strcmp(guid, model_guid)) return NULL;
@@ -88,11 +89,18 @@ static void forget_preview(Instance *c) {
     c->preview = NULL;
 }
 
+static double indicator(Model *m, unsigned k) {
+    double z[MODEL_CROSSINGS + 1];
+    events_crossed(m, z);
+    return z[k];
+}
+
 Result instance_get_reals(Instance *c, const unsigned *vr, size_t n, double *values) {
     Model *m = readable(c);
     for (size_t k = 0; k < n; k++) {
-        if (vr[k] == VR_TIME) values[k] = c->state.phase < PHASE_EVENT ? c->state.start_time : m->time;
-        else if (vr[k] < VR_INTS) values[k] = m->r[vr[k]];
+        if (vr[k] < VR_INTS) values[k] = m->r[vr[k]];
+        else if (vr[k] == VR_TIME) values[k] = c->state.phase < PHASE_EVENT ? c->state.start_time : m->time;
+        else if (vr[k] > VR_TIME && vr[k] < VR_INDICATORS + MODEL_CROSSINGS) values[k] = indicator(m, vr[k] - VR_INDICATORS);
         else return instance_error(c, "get: there is no Real with this value reference");
     }
     return instance_result(c);
@@ -134,6 +142,36 @@ Result instance_set_int(Instance *c, unsigned vr, int value) {
     s->changed_others = 1;
     s->now.current = s->now.rest_current = 0;
     forget_preview(c);
+    return RESULT_OK;
+}
+
+/* ---- FMU state ---- */
+
+Result instance_save(Instance *c, void **state) {
+    if (!*state) *state = malloc(sizeof(State));
+    if (!*state) return instance_error(c, "no memory for the FMU state");
+    memcpy(*state, &c->state, sizeof(State));
+    return RESULT_OK;
+}
+
+Result instance_restore(Instance *c, const void *state) {
+    if (!state) return instance_error(c, "there is no FMU state to set");
+    memcpy(&c->state, state, sizeof(State));
+    forget_preview(c);
+    return RESULT_OK;
+}
+
+Result instance_serialize(Instance *c, const void *state, void *bytes, size_t size) {
+    if (!state || size < sizeof(State)) return instance_error(c, "serialize: the buffer is too small");
+    memcpy(bytes, state, sizeof(State));
+    return RESULT_OK;
+}
+
+Result instance_deserialize(Instance *c, const void *bytes, size_t size, void **state) {
+    if (size != sizeof(State)) return instance_error(c, "deserialize: these bytes are not a state of this FMU");
+    if (!*state) *state = malloc(sizeof(State));
+    if (!*state) return instance_error(c, "no memory for the FMU state");
+    memcpy(*state, bytes, sizeof(State));
     return RESULT_OK;
 }
 

@@ -41,6 +41,11 @@ Result instance_set_reals(Instance *c, const unsigned *vr, size_t n, const doubl
 Result instance_get_int(Instance *c, unsigned vr, int *value);
 Result instance_set_int(Instance *c, unsigned vr, int value);
 
+Result instance_save(Instance *c, void **state);
+Result instance_restore(Instance *c, const void *state);
+Result instance_serialize(Instance *c, const void *state, void *bytes, size_t size);
+Result instance_deserialize(Instance *c, const void *bytes, size_t size, void **state);
+
 Result instance_set_time(Instance *c, double time);
 Result instance_set_states(Instance *c, const double *x, size_t n);
 Result instance_get_states(Instance *c, double *x, size_t n);

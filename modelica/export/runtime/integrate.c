@@ -119,15 +119,22 @@ static void locate(Model *m, Step *s, double lo, double hi, double *z_lo, double
     m->rest_current = 0;
 }
 
-/* Whether a state event lies in the step; if so the model is put at the first one. */
+/* Whether a state event lies in the step; if so the model is put at the first one.
+ *
+ * Relations are compared at SOLVER_CHECKS points of the step. Just after an event they are also compared near its
+ * beginning: a relation that has turned just now may turn back at once (a ball that hops very low), and both turns
+ * would lie inside of one step.
+ */
 static int find_event(Model *m, Step *s, double end, double *z_start) {
+    static const double near[] = {1e-5, 1e-3, 3e-2};
+    const int early = m->after_event ? 3 : 0, count = early + SOLVER_CHECKS;
     double z_lo[MODEL_CROSSINGS + 1], z_hi[MODEL_CROSSINGS + 1], lo = 0;
     memcpy(z_lo, z_start, sizeof z_lo);
-    for (int k = 1; k <= SOLVER_CHECKS; k++) {
-        double theta = (double)k / SOLVER_CHECKS;
-        int crossed;
-        if (k == SOLVER_CHECKS) {
-            if (SOLVER_CHECKS > 1) evaluate_at(m, end, s->y1, s->k[6]);
+    for (int k = 0; k < count; k++) {
+        int last = k + 1 == count, crossed;
+        double theta = k < early ? near[k] : (double)(k - early + 1) / SOLVER_CHECKS;
+        if (last) {
+            if (k) evaluate_at(m, end, s->y1, s->k[6]);
             crossed = events_crossed(m, z_hi);
         } else {
             crossed = probe(m, s, theta, z_hi);
@@ -140,6 +147,7 @@ static int find_event(Model *m, Step *s, double end, double *z_start) {
         memcpy(z_lo, z_hi, sizeof z_lo);
     }
     memcpy(z_start, z_hi, sizeof z_lo);
+    m->after_event = 0;
     return 0;
 }
 

@@ -32,6 +32,7 @@ typedef struct {
     double tolerance; /* relative, adaptive integrator */
     int current;      /* derivatives belong to the present states, inputs and time */
     int rest_current; /* so do all other variables */
+    int after_event;  /* no step since the last event */
     int idle_events;  /* events since time last moved on */
     char error[256];  /* empty: all is well */
 } Model;
