@@ -53,6 +53,7 @@ protected
   constant Real downSpeed[6, 4] = [0, 5, 20, 35; 0, 5, 20, 35; 0, 5, 25, 40; 0, 5, 30, 50; 0, 30, 50, 80; 0, 30, 50, 80];
   constant Real lowestRpm = 600;
   constant Real highestRpm = 6000;
+  constant Real creep(unit = "mph") = 0.01 "Below this speed the load falls to zero, so that the brake can hold the car";
 
   Real engine(unit = "rev/min", start = 1000, fixed = true, nominal = 1000) "Engine speed";
   Real wheel(unit = "rev/min", start = 0, fixed = true, nominal = 100) "Wheel speed";
@@ -74,7 +75,7 @@ equation
   slip = ratio * finalDrive * wheel / engine;
   impeller = (engine / linear(slip, speedRatio, capacity)) ^ 2;
   drive = ratio * impeller * linear(slip, speedRatio, torqueRatio);
-  load = noEvent(min(1, max(-1, speed / 0.05))) * (rollingLoad + airLoad * speed ^ 2 + brake);
+  load = noEvent(min(1, max(-1, speed / creep))) * (rollingLoad + airLoad * speed ^ 2 + brake);
   surplus = (bilinear(throttle, engine, engineThrottle, engineSpeed, engineTorqueMap) - impeller) / engineInertia;
   der(engine) = if engine >= highestRpm and surplus > 0 or engine <= lowestRpm and surplus < 0 then 0 else surplus;
   der(wheel) = (finalDrive * drive - load) / vehicleInertia;

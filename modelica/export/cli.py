@@ -8,7 +8,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from .emit_c import lay_out, model_c, sizes_h
+from .emit_c import System, lay_out, model_c, sizes_h
 from .evaluate import Evaluator
 from .flatten import flatten
 from .instance import Scope
@@ -20,6 +20,25 @@ from .syntax import ExportError
 
 HERE = Path(__file__).parent
 SYSTEMS = HERE / "systems.toml"
+
+
+def translate(source: Path, name: str) -> tuple[System, str]:
+    """From Modelica text to the text of model.c.
+
+    Args:
+        source: package directory or .mo file.
+        name: full name of the model.
+
+    Raises:
+        ExportError: with file and line of what is wrong or not supported.
+    """
+    root = load(source)
+    model = flatten(root, name)
+    states = states_of(model)
+    system = lay_out(model, states, sort(model, states), sort_initial(model, states))
+    scope = absolute(name, root)
+    assert scope is not None
+    return system, model_c(system, Evaluator(model, Scope(None, scope)))
 
 
 def export(source: Path, name: str, target: Path, *, version: int, platforms: tuple[str, ...]) -> None:
@@ -35,13 +54,7 @@ def export(source: Path, name: str, target: Path, *, version: int, platforms: tu
     Raises:
         ExportError: with file and line of what is wrong or not supported.
     """
-    root = load(source)
-    model = flatten(root, name)
-    states = states_of(model)
-    system = lay_out(model, states, sort(model, states), sort_initial(model, states))
-    scope = absolute(name, root)
-    assert scope is not None
-    code = model_c(system, Evaluator(model, Scope(None, scope)))
+    system, code = translate(source, name)
     description = fmi2(system, c_files(2)) if version == 2 else fmi3(system)
     build(Contents(model_identifier(system), version, description, code, sizes_h(system)), target, platforms)
 

@@ -31,9 +31,10 @@ from .ir import (
 )
 from .parameters import calculated_starts, fixed_names, sorted_parameters
 from .print_c import C_TYPES, Layout, Mode, Printer, c_name, literal
-from .sort import Block, Solved, values
+from .sort import Block, Solved, values, when_targets
 from .syntax import ExportError
 
+REPEAT_TICKS = {"never": 0, "unseen": 1, "always": 2}
 _OPERATORS = {"<": "OP_LT", "<=": "OP_LE", ">": "OP_GT", ">=": "OP_GE"}
 
 
@@ -79,10 +80,9 @@ def lay_out(model: FlatModel, states: list[str], blocks: list[Block], initial_bl
     needed = {
         part.name for block in blocks for v in values(block.item) for part in walk(v) if isinstance(part, Pre)
     }
-    section_reals = {n for block in blocks if isinstance(block.item, Section) for n in block.defines}
-    system.discrete_reals = [
-        n for n in system.reals if n in discrete | (section_reals & _discrete_names(model))
-    ]
+    discrete |= _section_memory(blocks, model)
+    system.discrete_reals = [n for n in system.reals if n in discrete]
+    _check_pre(system)
     extra = [n for n in system.reals if n in needed and n not in set(system.discrete_reals)]
     system.before = system.discrete_reals + extra
     for k, name in enumerate(system.before):
@@ -95,8 +95,26 @@ def _in_when(block: Block) -> bool:
     return isinstance(block.item, Section) or (isinstance(block.item, Solved) and block.item.discrete)
 
 
-def _discrete_names(model: FlatModel) -> set[str]:
-    return {name for name, variable in model.variables.items() if variable.variability == "discrete"}
+def _section_memory(blocks: list[Block], model: FlatModel) -> set[str]:
+    """Variables of algorithm sections that keep their value between events: declared so, or set in a when clause."""
+    found: set[str] = set()
+    for block in blocks:
+        if isinstance(block.item, Section):
+            found |= {n for n in block.defines if n in model.variables and model.variables[n].variability == "discrete"}
+            found |= {n for statement in block.item.statements for n in when_targets(statement)}
+    return found
+
+
+def _check_pre(system: System) -> None:
+    """`pre` of a continuous variable is only defined at events."""
+    known = set(system.discrete_reals)
+    for block in system.blocks:
+        if _in_when(block) or not isinstance(block.item, (Solved, Condition, Outputs)):
+            continue
+        for part in (part for value in values(block.item) for part in walk(value)):
+            if isinstance(part, Pre) and part.type == "Real" and part.name not in known:
+                place = block.item.place
+                raise ExportError(place, f"'pre({part.name})' of a continuous variable can only stand in a when clause")
 
 
 def _events(system: System) -> None:
@@ -375,10 +393,19 @@ def _tables(system: System) -> str:
             array("unsigned char model_real_kind", real_kinds),
             array("unsigned char model_int_kind", int_kinds),
             array("int model_pre_reals", before),
+            array("int model_output_ints", [str(k) for k in _discrete_outputs(system, system.ints)]),
+            array("int model_output_reals", [str(k) for k in _discrete_outputs(system, system.reals)]),
             array("unsigned char model_crossing_op", operators),
             array("double model_nominal", nominal),
         ]
     )
+
+
+def _discrete_outputs(system: System, names: list[str]) -> list[int]:
+    """Places of the outputs that change at events only."""
+    discrete = set(system.discrete_reals) | set(system.ints)
+    outputs = {name for name, variable in system.model.variables.items() if variable.causality == "output"}
+    return [k for k, name in enumerate(names) if name in discrete & outputs]
 
 
 def kinds_of(system: System) -> dict[str, str]:
@@ -413,6 +440,8 @@ def sizes_h(system: System) -> str:
         "MODEL_INTS": len(system.ints),
         "MODEL_PRE_REALS": len(system.before),
         "MODEL_DISCRETE_REALS": len(system.discrete_reals),
+        "MODEL_OUTPUT_INTS": len(_discrete_outputs(system, system.ints)),
+        "MODEL_OUTPUT_REALS": len(_discrete_outputs(system, system.reals)),
         "MODEL_CONDITIONS": system.model.conditions,
         "MODEL_RELATIONS": len(layout.relations),
         "MODEL_TIME_RELATIONS": len(layout.time_relations),
@@ -422,6 +451,6 @@ def sizes_h(system: System) -> str:
         "SOLVER_TOLERANCE": repr(float(system.model.tolerance or 1e-6)),
         "SOLVER_MAX_STEP": repr(float(solver["maxStep"])) if "maxStep" in solver else "HUGE_VAL",
         "SOLVER_CHECKS": int(solver.get("checks", 1 if fixed else 4)),
-        "SOLVER_REPEAT_TICKS": int(bool(solver.get("repeatLastTick", False))),
+        "SOLVER_REPEAT_TICKS": REPEAT_TICKS[str(solver.get("repeatTicks", "unseen"))],
     }
     return "".join(f"#define {name} {value}\n" for name, value in sizes.items())

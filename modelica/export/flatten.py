@@ -9,7 +9,14 @@ from .ir import Equation, FlatModel, Lit, Pre, Tensor, Type, Var, Variable
 from .library import absolute
 from .syntax import Class, ExportError, Expr, Modifier, Number, Operation, Place, Text, Truth
 
-SOLVER_SETTINGS = ("method", "step", "maxStep", "repeatLastTick", "checks")
+SOLVER_SETTINGS = {
+    "method": ("fixed", "adaptive"),
+    "step": None,
+    "maxStep": None,
+    "checks": None,
+    "repeatTicks": ("never", "unseen", "always"),
+}
+"""Names of solver settings with the words that they can be; None stands for a number."""
 
 
 def flatten(root: Class, name: str) -> FlatModel:
@@ -174,7 +181,13 @@ def _experiment(cls: Class, model: FlatModel) -> None:
             raise ExportError(
                 mod.place, f"__falsifier_solver knows {', '.join(SOLVER_SETTINGS)}, not '{name}'"
             )
-        model.solver[name] = _literal(mod.value, mod.place or cls.place)
+        value = _literal(mod.value, mod.place)
+        words = SOLVER_SETTINGS[name]
+        if (words is None and isinstance(value, (str, bool))) or (words and value not in words):
+            raise ExportError(
+                mod.place, f"'{name}' needs " + (f"one of {', '.join(words)}" if words else "a number")
+            )
+        model.solver[name] = value
 
 
 def _number(settings: dict[str, Modifier], name: str) -> float | None:

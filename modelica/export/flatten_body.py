@@ -171,8 +171,15 @@ def _if_equation(item: If, here: Evaluator, model: FlatModel) -> None:
         model.equations.append(Equation(last[target].left, value, item.place))
 
 
+def _no_when(body: Body) -> None:
+    for item in body:
+        if isinstance(item, When):
+            raise ExportError(item.place, "'when' inside of 'if' is not supported; put the condition into the when clause")
+
+
 def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str, Equation]:
     """The equations of one branch by the variable or derivative on their left side."""
+    _no_when(body)
     before = len(model.equations)
     for part in body:
         equation(part, here, model)
@@ -362,7 +369,9 @@ def _statement(item: Item, here: Evaluator, model: FlatModel, made: list[Stateme
                 made.extend(statements(body, _with_index(here, index, value_), model, guard))
         case If(branches, otherwise, place):
             cases = []
+            _no_when(otherwise)
             for text, body in branches:
+                _no_when(body)
                 condition = here.scalar(text)
                 cases.append((condition, tuple(statements(body, here, model, guard))))
             made.append(Branch(tuple(cases), tuple(statements(otherwise, here, model, guard)), place))

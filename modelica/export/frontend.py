@@ -46,7 +46,6 @@ def parse_file(path: Path, shown: str) -> list[Class]:
     for part in (lexer, parser):
         part.removeErrorListeners()
         part.addErrorListener(listener)
-    parser._interp.predictionMode = antlr4.PredictionMode.SLL
     tree = parser.stored_definition()
     rest = tokens.LT(1)
     if rest.type != antlr4.Token.EOF:

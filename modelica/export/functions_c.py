@@ -211,7 +211,7 @@ class FunctionWriter:
         if len(value.dims) != len(target.dims):
             raise ExportError(place, "the two sides of ':=' have different numbers of dimensions")
         size = " * ".join(value.dims)
-        check = f"same_size(m, {count}, {size}, {place.line});"
+        check = f"same_size(m, {count}, {size});"
         ctype = C_TYPES[value.type]
         return [
             check,
@@ -325,7 +325,8 @@ class FunctionWriter:
         rows = [self.value(item) for item in expr.elements]
         if not rows or any(row.dims for row in rows):
             raise ExportError(
-                expr.place, "inside of a function an empty array or a matrix needs to be a constant of the function"
+                expr.place,
+                "inside of a function an empty array or a matrix needs to be a constant of the function",
             )
         kind: Type = "Real" if any(row.type == "Real" for row in rows) else rows[0].type
         if wanted == "Real" and kind == "Integer":

@@ -15,7 +15,9 @@ from .syntax import Class, Colon, Component, ExportError, Expr, Modifier, Place
 if TYPE_CHECKING:
     from .evaluate import Evaluator
 
-ATTRIBUTES = frozenset(["start", "fixed", "min", "max", "nominal", "unit", "displayUnit", "quantity", "stateSelect"])
+ATTRIBUTES = frozenset(
+    ["start", "fixed", "min", "max", "nominal", "unit", "displayUnit", "quantity", "stateSelect"]
+)
 
 
 @dataclass(frozen=True, slots=True)

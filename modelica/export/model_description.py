@@ -240,7 +240,11 @@ def fmi3(system: System) -> str:
     variables = SubElement(root, "ModelVariables")
     time = len(system.reals) + len(system.ints)
     attributes = {"name": "time", "valueReference": str(time), "causality": "independent"}
-    SubElement(variables, "Float64", attributes | {"variability": "continuous", "description": "Simulation time in s"})
+    SubElement(
+        variables,
+        "Float64",
+        attributes | {"variability": "continuous", "description": "Simulation time in s"},
+    )
     references = {entry.name: entry.reference for entry in shown}
     names = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
     for entry in shown:

@@ -317,6 +317,13 @@ def _targets(item: Flat | Computed | Statement) -> tuple[str, ...]:
     return ()
 
 
+def when_targets(item: Statement) -> tuple[str, ...]:
+    """Variables that a statement sets inside of a when clause."""
+    if isinstance(item, Branch) and all(_only_at_events(condition) for condition, _ in item.branches):
+        return tuple(name for name in _targets(item) if not name.startswith("when("))
+    return ()
+
+
 # --------------------------------------------------------------------- order
 
 

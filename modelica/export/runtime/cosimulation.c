@@ -3,18 +3,24 @@
 
 #define MAX_IDLE_EVENTS 10000
 
-/* Ticks at the end of a communication step act at once, with the inputs of that step: what is read there has
- * happened. With SOLVER_REPEAT_TICKS (always at the start of the simulation) they are repeated if other inputs
- * are set for the next step.
+/* Ticks and time events at the end of a communication step act at once, with the inputs of that step, so that what
+ * is read there has happened. Where the next step brings other inputs the tick is repeated with them, as in a
+ * simulation in one piece. SOLVER_REPEAT_TICKS: 0 never, 2 always, 1 unless the tick has changed a discrete output:
+ * what has been seen stays (a gear must not appear for the length of one communication step).
  */
-static void end_of_step_events(Simulation *s, int repeatable) {
-    s->repeatable = 0;
+static int seen(const Model *before, const Model *now) {
+    for (int k = 0; k < MODEL_OUTPUT_INTS; k++)
+        if (before->i[model_output_ints[k]] != now->i[model_output_ints[k]]) return 1;
+    for (int k = 0; k < MODEL_OUTPUT_REALS; k++)
+        if (before->r[model_output_reals[k]] != now->r[model_output_reals[k]]) return 1;
+    return 0;
+}
+
+static void end_of_step_events(Simulation *s) {
     if (events_next_time(&s->now) > s->now.time + TIME_TOLERANCE) return;
-    if (repeatable) {
-        s->before = s->now;
-        s->repeatable = 1;
-    }
+    s->before = s->now;
     events_handle(&s->now);
+    s->repeatable = SOLVER_REPEAT_TICKS == 2 || (SOLVER_REPEAT_TICKS == 1 && !seen(&s->before, &s->now));
 }
 
 void simulation_start(Simulation *s) {
@@ -36,7 +42,6 @@ static void take_inputs(Simulation *s) {
     double z[MODEL_CROSSINGS + 1];
     Model *m = &s->now;
     m->current = m->rest_current = 0;
-    if (s->changed_others) model_parameters(m);
     if (s->repeatable) {
         keep_settings(&s->before, m);
         s->before.current = s->before.rest_current = 0;
@@ -74,7 +79,7 @@ int simulation_step(Simulation *s, double start, double size) {
     }
     if (!m->error[0]) {
         m->time = end;
-        end_of_step_events(s, SOLVER_REPEAT_TICKS);
+        end_of_step_events(s);
     }
     return m->error[0] != 0;
 }

@@ -9,6 +9,12 @@ void model_fail(Model *m, const char *message) {
     if (!m->error[0]) snprintf(m->error, sizeof m->error, "at t = %.9g s: %s", m->time, message);
 }
 
+void model_fail_subscript(Model *m, int index, int size, int line) {
+    char text[96];
+    snprintf(text, sizeof text, "the subscript %d is outside of 1..%d (line %d)", index, size, line);
+    model_fail(m, text);
+}
+
 static int holds(int op, double z) {
     switch (op) {
     case OP_LT: return z < 0;
@@ -50,10 +56,15 @@ static int freeze_relations(Model *m) {
     return changed;
 }
 
+static void remember_continuous(Model *m) {
+    for (int k = MODEL_DISCRETE_REALS; k < MODEL_PRE_REALS; k++) m->pr[k] = m->r[model_pre_reals[k]];
+}
+
 static void remember(Model *m) {
     memcpy(m->pi, m->i, sizeof m->i);
     memcpy(m->pw, m->w, sizeof m->w);
-    for (int k = 0; k < MODEL_PRE_REALS; k++) m->pr[k] = m->r[model_pre_reals[k]];
+    for (int k = 0; k < MODEL_DISCRETE_REALS; k++) m->pr[k] = m->r[model_pre_reals[k]];
+    remember_continuous(m);
 }
 
 static int discrete_changed(const Model *m) {
@@ -81,7 +92,8 @@ static void iterate(Model *m) {
             model_fail(m, "the when clauses of the model do not come to rest");
             break;
         }
-        remember(m);
+        if (n) remember(m);
+        else remember_continuous(m); /* the others are as the last event has left them, but for inputs */
         model_event(m);
         memset(m->tick, 0, sizeof m->tick);
         m->after_event |= freeze_relations(m);
@@ -105,7 +117,7 @@ void events_initialize(Model *m) {
     remember(m);
     model_initial(m);
     (void)freeze_relations(m);
-    memcpy(m->pw, m->w, sizeof m->w);
+    remember(m);
     for (int k = 0; k < MODEL_TICKS; k++) {
         double start, interval;
         model_tick_times(m, k, &start, &interval);

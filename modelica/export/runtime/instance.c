@@ -111,6 +111,13 @@ static int may_set(const Instance *c, int kind) {
     return kind > KIND_LOCAL && c->state.phase <= PHASE_INITIALIZING;
 }
 
+static void changed(Instance *c, int kind) {
+    Model *m = &c->state.simulation.now;
+    if (kind == KIND_TUNABLE && c->state.phase > PHASE_INITIALIZING) model_parameters(m);
+    m->current = m->rest_current = 0;
+    forget_preview(c);
+}
+
 Result instance_set_reals(Instance *c, const unsigned *vr, size_t n, const double *values) {
     Simulation *s = &c->state.simulation;
     for (size_t k = 0; k < n; k++) {
@@ -121,8 +128,7 @@ Result instance_set_reals(Instance *c, const unsigned *vr, size_t n, const doubl
         s->now.r[vr[k]] = values[k];
         if (kind == KIND_INPUT) s->changed_reals = 1;
         else s->changed_others = 1;
-        s->now.current = s->now.rest_current = 0;
-        forget_preview(c);
+        changed(c, kind);
     }
     return RESULT_OK;
 }
@@ -140,8 +146,7 @@ Result instance_set_int(Instance *c, unsigned vr, int value) {
     if (s->now.i[vr - VR_INTS] == value) return RESULT_OK;
     s->now.i[vr - VR_INTS] = value;
     s->changed_others = 1;
-    s->now.current = s->now.rest_current = 0;
-    forget_preview(c);
+    changed(c, model_int_kind[vr - VR_INTS]);
     return RESULT_OK;
 }
 
@@ -177,12 +182,6 @@ Result instance_deserialize(Instance *c, const void *bytes, size_t size, void **
 
 /* ---- model exchange ---- */
 
-static void parameters_up_to_date(Instance *c) {
-    Simulation *s = &c->state.simulation;
-    if (s->changed_others) model_parameters(&s->now);
-    s->changed_others = s->changed_reals = 0;
-}
-
 Result instance_set_time(Instance *c, double time) {
     c->state.simulation.now.time = time;
     c->state.simulation.now.current = c->state.simulation.now.rest_current = 0;
@@ -204,7 +203,6 @@ Result instance_get_states(Instance *c, double *x, size_t n) {
 
 Result instance_get_derivatives(Instance *c, double *dx, size_t n) {
     if (n != MODEL_STATES) return instance_error(c, "wrong number of derivatives");
-    parameters_up_to_date(c);
     Model *m = &c->state.simulation.now;
     if (c->state.phase == PHASE_INITIALIZING) m = readable(c);
     events_evaluate(m);
@@ -233,7 +231,6 @@ Result instance_update(Instance *c, int *states_changed, int *next_defined, doub
     Model *m = &c->state.simulation.now;
     double before[MODEL_STATES + 1];
     memcpy(before, m->r, MODEL_STATES * sizeof(double));
-    parameters_up_to_date(c);
     events_handle(m);
     *states_changed = memcmp(before, m->r, MODEL_STATES * sizeof(double)) != 0;
     *next_time = events_next_time(m);

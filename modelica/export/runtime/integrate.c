@@ -212,8 +212,7 @@ int integrate(Model *m, double stop) {
                 m->error[0] = 0;
                 continue;
             }
-            double wanted = s.h * min_real(5, max_real(0.2, factor));
-            if (s.h >= m->step || wanted < m->step) m->step = wanted; /* a step cut by `stop` says little */
+            if (s.h >= m->step || factor < 1) m->step = s.h * min_real(5, max_real(0.2, factor)); /* not where `stop` has cut it */
         }
         if (!all_finite(m, s.y1)) {
             if (!m->error[0]) model_fail(m, "a state is not a finite number");

@@ -46,6 +46,7 @@ enum { OP_LT = 0, OP_LE = 1, OP_GT = 2, OP_GE = 3 };
 extern const char model_guid[];
 extern const unsigned char model_real_kind[], model_int_kind[];
 extern const int model_pre_reals[]; /* index in r of the Reals with a value before the event; discrete ones first */
+extern const int model_output_ints[], model_output_reals[]; /* discrete outputs */
 extern const unsigned char model_crossing_op[];
 extern const double model_nominal[];
 void model_defaults(Model *m);           /* literal values of parameters and starts */
@@ -63,6 +64,7 @@ void model_tick_times(Model *m, int k, double *start, double *interval);
 
 /* ---- runtime ---- */
 void model_fail(Model *m, const char *message);
+void model_fail_subscript(Model *m, int index, int size, int line);
 
 /* events.c */
 void events_initialize(Model *m);           /* solve the initial system at the present time */
@@ -87,23 +89,11 @@ int simulation_step(Simulation *s, double start, double size);
 
 /* ---- small functions for generated code ---- */
 static inline int subscript(Model *m, int index, int size, int line) {
-    if (index < 1 || index > size) {
-        char text[96];
-        (void)line;
-        text[0] = 0;
-        strcat(text, "a subscript is out of bounds, see line ");
-        size_t n = strlen(text);
-        int digits[12], k = 0, value = line;
-        do { digits[k++] = value % 10; value /= 10; } while (value);
-        while (k) text[n++] = (char)('0' + digits[--k]);
-        text[n] = 0;
-        model_fail(m, text);
-        return 0;
-    }
-    return index - 1;
+    if (index >= 1 && index <= size) return index - 1;
+    model_fail_subscript(m, index, size, line);
+    return 0;
 }
-static inline void same_size(Model *m, int a, int b, int line) {
-    (void)line;
+static inline void same_size(Model *m, int a, int b) {
     if (a != b) model_fail(m, "arrays of different sizes in an assignment");
 }
 static inline int time_reached(const Model *m, double at) { return m->time >= at - TIME_TOLERANCE; }

@@ -1,0 +1,196 @@
+"""One small model for each feature of the language, with a solution that is known in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.modelica.conftest import Build
+from tests.modelica.support import opened
+
+
+def final(
+    build: Build, model: str, names: list[str], stop: float, size: float = 0.1, **values: float
+) -> list[float]:
+    with opened(build(model)) as [fmu]:
+        return [float(x) for x in fmu.start(**values).run(names, stop, size)[-1, 1:]]
+
+
+def test_start_values_and_calculated_parameters(build: Build) -> None:
+    assert final(build, "Decay", ["x", "y"], 1) == pytest.approx(
+        [3 * math.exp(-2), 6 * math.exp(-2)], rel=1e-8
+    )
+    x, y = final(build, "Decay", ["x", "y"], 1, k=4, x0=1)
+    assert (x, y) == pytest.approx((math.exp(-4), 2 * math.exp(-4)), rel=1e-8)
+
+
+def test_inputs_are_held_in_a_step(build: Build) -> None:
+    with opened(build("Decay")) as [fmu]:
+        rows = fmu.start(x0=0.0).run(["x"], 1, 0.25, lambda t: {"u": t})
+    x = 0.0
+    for k in range(4):
+        x = 0.25 * k / 2 + (x - 0.25 * k / 2) * math.exp(-0.5)
+        assert rows[k + 1, 1] == pytest.approx(x, rel=1e-8)
+
+
+def test_bouncing_ball_bounces_where_it_must(build: Build) -> None:
+    bounce, v = math.sqrt(2 / 9.81), 0.7 * math.sqrt(2 * 9.81)
+    times = [bounce]
+    for _ in range(11):
+        times.append(times[-1] + 2 * v / 9.81)
+        v *= 0.7
+    with opened(build("Ball")) as [fmu]:
+        rows = fmu.start().run(["h", "bounces", "v"], 5, 0.01)
+    t, h, bounces = rows[:, 0], rows[:, 1], rows[:, 2]
+    assert np.array_equal(bounces, np.searchsorted(times, t))
+    assert h.min() > -1e-9
+    after = t - times[0]
+    inside = (t > times[0]) & (t < times[1])
+    v1 = 0.7 * math.sqrt(2 * 9.81)
+    assert h[inside] == pytest.approx((v1 * after - 0.5 * 9.81 * after**2)[inside], abs=1e-8)
+    assert rows[-1, 3] == 0
+
+
+@pytest.mark.parametrize("size", [0.003, 0.04, 1.0])
+def test_the_communication_step_does_not_matter(build: Build, size: float) -> None:
+    with opened(build("Ball")) as [fmu]:
+        rows = fmu.start().run(["h", "bounces"], 1.2 if size < 1 else 2, size)
+    for t, h, bounces in rows:
+        assert (h, bounces) == pytest.approx(ball(t), abs=1e-7)
+
+
+def ball(t: float) -> tuple[float, int]:
+    """Height and number of bounces of the ball."""
+    if t < math.sqrt(2 / 9.81):
+        return 1 - 0.5 * 9.81 * t * t, 0
+    t -= math.sqrt(2 / 9.81)
+    v, bounces = 0.7 * math.sqrt(2 * 9.81), 1
+    while t > 2 * v / 9.81:
+        t, v, bounces = t - 2 * v / 9.81, 0.7 * v, bounces + 1
+        if bounces == 12:
+            return 0.0, 12
+    return v * t - 0.5 * 9.81 * t * t, bounces
+
+
+def test_sampling_is_exact(build: Build) -> None:
+    with opened(build("Counter")) as [fmu]:
+        rows = fmu.start().run(["ticks", "held", "late", "odd"], 2, 1 / 90)
+    k = np.arange(181)
+    assert np.array_equal(rows[:, 1], k // 3 + 1)
+    assert rows[:, 2] == pytest.approx(k // 3 / 30, abs=1e-12)
+    assert np.array_equal(rows[:, 3], 10 - np.searchsorted([0.25, 0.75, 1.25, 1.75], k / 90, side="right"))
+    assert np.array_equal(rows[:, 4], rows[:, 1] % 2)
+
+
+def test_sampling_with_another_period(build: Build) -> None:
+    assert final(build, "Counter", ["ticks"], 1, period=0.125) == [9]
+
+
+def test_sampling_after_a_late_start(build: Build) -> None:
+    with opened(build("Counter")) as [fmu]:
+        fmu.start(time=1.02)
+        fmu.step(0.05)
+        assert fmu.get("ticks") == 2  # 31/30 and 32/30
+        assert fmu.get("held") == pytest.approx(32 / 30, abs=1e-12)
+
+
+def test_equations_in_any_order(build: Build) -> None:
+    names = ["a", "b", "c", "d", "f", "late", "n"]
+    assert final(build, "Algebra", names, 0.4) == pytest.approx(
+        [0.4, 0.7, 3.7, 10 / 3.7, 4 * (10 / 3.7 - 1), 0, -7]
+    )
+    assert final(build, "Algebra", names, 1) == pytest.approx([1, 1, 4, 2.5, 6, 1, 7])
+
+
+def test_functions(build: Build) -> None:
+    names = ["value", "linear", "count", "few", "mean[1]", "mean[2]", "largest", "mixed", "jump", "chosen"]
+    assert final(build, "Functions", names, 0.4) == pytest.approx([1.32, 1.8, 5, 2, 2, 6, 9, 10.2, 2.4, 2])
+    assert final(build, "Functions", names, 1) == pytest.approx([3, 3, 5, 2, 2, 6, 9, 12, 1, 11])
+
+
+def test_arrays_and_arrays_of_components(build: Build) -> None:
+    names = ["v[1]", "v[2]", "v[3]", "last", "both", "total", "slow"]
+    c, tanks = math.cos(1), [k * (1 - math.exp(-1 / T)) for k, T in ((1, 1), (2, 2), (3, 4))]
+    expected = [c, 2 * c + 1, 3 * c, 3 * c, 1, 3 * c + 1 + sum(tanks), tanks[2]]
+    assert final(build, "Arrays", names, 1) == pytest.approx(expected, rel=1e-7)
+
+
+def test_array_assignment_that_shifts_an_array(build: Build) -> None:
+    names = [f"history[{k}]" for k in range(1, 5)]
+    assert final(build, "Arrays", names, 0.65, 0.05) == pytest.approx([0.6, 0.5, 0.4, 0.3])
+
+
+def test_extends_and_import(build: Build) -> None:
+    assert final(build, "Inherited", ["x", "z", "w"], 1) == pytest.approx(
+        [2 * math.exp(-3), 6 * math.exp(-3), 5]
+    )
+
+
+def test_located_events_follow_each_other_for_a_long_time(build: Build) -> None:
+    with opened(build("Thermostat")) as [fmu]:
+        rows = fmu.start().run(["x", "switches", "heating"], 20, 0.05)
+    phase = (rows[:, 0] + 0.5) % (4 / 3)
+    assert rows[:, 1] == pytest.approx(np.where(phase <= 1, 1 + phase, 2 - 3 * (phase - 1)), abs=1e-9)
+    assert rows[-1, 2] == 30
+    clear = (np.abs(phase - 1) > 1e-6) & (phase > 1e-6) & (phase < 4 / 3 - 1e-6)
+    assert np.array_equal(rows[clear, 3], phase[clear] < 1)
+
+
+def test_time_events_and_whole_parts(build: Build) -> None:
+    names = ["early", "stairs", "saw", "whole", "smoothed"]
+    early = 0.35 + 3.5 + 30
+    stairs = 0.25 * (0 + 1 + 2 + 3) - 1
+    saw = 3 * 0.045 + 0.005
+    assert final(build, "Times", names, 1, 0.2) == pytest.approx([early, stairs, saw, 4, 1.5], abs=1e-9)
+    assert final(build, "Times", ["early"], 1, 0.2, t1=0.45)[0] == pytest.approx(0.45 + 4.5 + 10, abs=1e-9)
+
+
+def test_initial_equations_and_initial_when(build: Build) -> None:
+    names = ["x", "y", "d", "mode", "first", "sum"]
+    with opened(build("Starts")) as [fmu]:
+        rows = fmu.start(p=4).run(names, 1, 0.1)
+    assert rows[0, 1:] == pytest.approx([5, 20, 6, 5, 1, 31])
+    assert rows[6, 1:] == pytest.approx([5, 20.6, 7, 5, 0, 32.6])
+    assert rows[-1, 1:] == pytest.approx([5, 21, 7, 15, 0, 33])
+
+
+def test_algorithm_section_with_continuous_and_sampled_parts(build: Build) -> None:
+    with opened(build("Mixed")) as [fmu]:
+        rows = fmu.start().run(["smooth", "kept", "twice"], 1, 0.1)
+    assert rows[:, 1] == pytest.approx(rows[:, 0] + 1)
+    assert rows[:, 2] == pytest.approx([-1] * 5 + [1.5] * 2 + [11.5] * 3 + [2])
+    assert rows[:, 3] == pytest.approx(2 * rows[:, 2])
+
+
+def test_if_equations_and_discrete_inputs(build: Build) -> None:
+    with opened(build("Switched")) as [fmu]:
+        fmu.start(level=2)
+        assert fmu.row(["x", "y", "changes"]) == [0, 0, 0]
+        fmu.step(0.5)
+        fmu.set({"on": 1})
+        fmu.step(0.5)
+        assert fmu.row(["x", "y", "changes"]) == pytest.approx([1, 2, 0])
+        fmu.set({"on": 0, "level": 3})
+        fmu.step(0.01)
+        assert fmu.row(["x", "y", "changes"]) == pytest.approx([2, -1, 1])
+
+
+def test_an_assertion_stops_the_simulation_with_its_message(
+    build: Build, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with opened(build("Switched")) as [fmu], pytest.raises(Exception, match="fmi2"):
+        fmu.start(level=3).run(["x"], 0.2, 0.1)
+    assert "Switched.mo:23: x has left its range" in "".join(capfd.readouterr())
+
+
+def test_elementary_functions(build: Build) -> None:
+    u = 0.4
+    expected = [
+        math.sqrt(u), math.exp(u), math.log(u), math.log10(u), math.sin(u), math.cos(u), math.tan(u), math.asin(u),
+        math.acos(u), math.atan(u), math.atan2(u, -1), math.sinh(u), math.cosh(u), math.tanh(u), u, 0.25, u, u**3, u**2,
+    ]  # fmt: skip
+    names = [f"y[{k}]" for k in range(1, 20)]
+    with opened(build("Elementary")) as [fmu]:
+        assert fmu.start(u=u).row(names) == pytest.approx(expected, rel=1e-14)
