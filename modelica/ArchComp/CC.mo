@@ -25,5 +25,7 @@ equation
   y3 = car3.y;
   y4 = car4.y;
   y5 = car5.y;
-  annotation(experiment(StopTime = 100, Interval = 0.01, Tolerance = 1e-6));
+  annotation(
+    experiment(StopTime = 100, Interval = 0.01, Tolerance = 1e-6),
+    __falsifier_solver(method = "fixed", step = 0.01));
 end CC;

@@ -168,5 +168,7 @@ equation
   der(pe) = u * cos(theta) * sin(psi) + v * (sin(phi) * sin(theta) * sin(psi) + cos(phi) * cos(psi))
     + w * (cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi));
   der(altitude) = u * sin(theta) - v * sin(phi) * cos(theta) - w * cos(phi) * cos(theta);
-  annotation(experiment(StopTime = 15, Interval = 0.03333333333333333, Tolerance = 1e-6));
+  annotation(
+    experiment(StopTime = 15, Interval = 0.03333333333333333, Tolerance = 1e-6),
+    __falsifier_solver(method = "fixed", step = 1 / 120));
 end F16;

@@ -23,7 +23,8 @@ package F16Aerodynamics "Force and moment coefficients of the F-16: Morelli's po
   constant Real r[10] = {-0.03348717, 0.04276655, 0.006573646, 0.3535831, -1.373308, 1.237582, 0.2302543, -0.2512876, 0.1588105, -0.5199526} "Cn of the ailerons";
   constant Real s[6] = {-0.08115894, -0.0115658, 0.02514167, 0.2038748, -0.3337476, 0.1004297} "Cn of the rudder";
   constant Real degPerRad = 180 / 3.141592653589793;
-  // Damping derivatives over the angle of attack, -10 to 45 deg in steps of 5 deg
+  // Damping derivatives over the angle of attack in deg
+  constant Real attack[12] = {-10, -5, 0, 5, 10, 15, 20, 25, 30, 35, 40, 45};
   constant Real CXq[12] = {-0.267, -0.11, 0.308, 1.34, 2.08, 2.91, 2.76, 2.05, 1.5, 1.49, 1.83, 1.21};
   constant Real CYr[12] = {0.882, 0.852, 0.876, 0.958, 0.962, 0.974, 0.819, 0.483, 0.59, 1.21, -0.493, -1.04};
   constant Real CYp[12] = {-0.108, -0.108, -0.188, 0.11, 0.258, 0.226, 0.344, 0.362, 0.611, 0.529, 0.298, -2.27};
@@ -50,7 +51,7 @@ package F16Aerodynamics "Force and moment coefficients of the F-16: Morelli's po
     input Real alpha(unit = "rad");
     output Real y;
   algorithm
-    y := lookup(table, 0.2 * alpha * degPerRad + 3);
+    y := Tables.linear(alpha * degPerRad, attack, table);
   end damping;
 
   function CX "Coefficient of the force along the body's x axis"

@@ -1,6 +1,8 @@
 within ArchComp;
 package F16Engine "Thrust and power lag of the F-16's engine (Stevens and Lewis); power runs from 0 to 100 percent, 50 is military power"
-  // Rows: Mach number 0 to 1 in steps of 0.2. Columns: altitude 0 to 50000 ft in steps of 10000 ft. Thrust in lbf.
+  constant Real machs[6] = {0, 0.2, 0.4, 0.6, 0.8, 1};
+  constant Real altitudes[6](each unit = "ft") = {0, 10000, 20000, 30000, 40000, 50000};
+  // Thrust in lbf; rows: Mach number, columns: altitude
   constant Real idle[6, 6] = {
     {1060, 670, 880, 1140, 1500, 1860},
     {635, 425, 690, 1010, 1330, 1700},
@@ -29,17 +31,15 @@ package F16Engine "Thrust and power lag of the F-16's engine (Stevens and Lewis)
     input Real mach "Mach number";
     output Real y(unit = "lbf");
   protected
-    Real row;
-    Real column;
-    Real mil "Thrust at military power";
+    Real above(unit = "ft") "Altitude within the tables";
+    Real mil(unit = "lbf") "Thrust at military power";
   algorithm
-    row := 5 * mach + 1;
-    column := max(altitude, 0.01) / 10000 + 1;
-    mil := lookup2(military, row, column);
+    above := max(altitude, 0.01);
+    mil := Tables.bilinear(mach, above, machs, altitudes, military);
     if power < 50 then
-      y := mil + (lookup2(idle, row, column) - mil) * (1 - power / 50);
+      y := mil + (Tables.bilinear(mach, above, machs, altitudes, idle) - mil) * (1 - power / 50);
     else
-      y := mil + (lookup2(maximum, row, column) - mil) * (power / 50 - 1);
+      y := mil + (Tables.bilinear(mach, above, machs, altitudes, maximum) - mil) * (power / 50 - 1);
     end if;
   end thrust;
 

@@ -10,6 +10,8 @@ model NN "Magnetic levitation: a ball of position Pos floats above an electromag
   parameter Real magnet = 5 "Magnet strength per mass";
   parameter Real gravity(unit = "m/s2") = 9.8 "Acceleration of gravity";
   parameter Real friction(unit = "1/s") = 4 "Viscous friction per mass";
+  Real velocity(unit = "1/s", start = 0, fixed = true) "Velocity of the ball";
+  discrete Real current(unit = "A", start = 0, fixed = true) "Coil current, held between samples";
 protected
   constant Real minPosition = 0.0012713472471279201 "Position that is -1 for the network";
   constant Real maxPosition = 3.9954019738068034 "Position that is +1 for the network";
@@ -74,8 +76,6 @@ protected
     y := 2 * (x - low) / (high - low) - 1;
   end normalise;
 
-  Real velocity(unit = "1/s", start = 0, fixed = true) "Velocity of the ball";
-  discrete Real current(unit = "A", start = 0, fixed = true) "Coil current, held between samples";
   discrete Real y(start = 0, fixed = true) "Normalised position at this sample";
   discrete Real u(start = 0, fixed = true) "Normalised current of this sample";
   discrete Real uBefore(start = 0, fixed = true) "Normalised current of the sample before";
@@ -96,5 +96,7 @@ equation
     u = normalise(current, minCurrent, maxCurrent);
     uBefore = pre(u);
   end when;
-  annotation(experiment(StopTime = 40, Interval = 0.001, Tolerance = 1e-6));
+  annotation(
+    experiment(StopTime = 40, Interval = 0.01, Tolerance = 1e-6),
+    __falsifier_solver(method = "fixed", step = 0.005, repeatLastTick = true));
 end NN;

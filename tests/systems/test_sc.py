@@ -14,7 +14,7 @@ OUTPUTS = ("T", "Fcw", "Q", "pressure")
 def steam(points: dict[str, Any], times: Array) -> Array:
     if "half_period" in points:
         phase = np.floor((times + points["lead"]) / points["half_period"] + 1e-9)
-        return np.asarray(np.where(phase % 2 == 1, points["high"], points["low"]))
+        return np.asarray(np.where(phase % 2 == 1, points["odd"], points["even"]))
     return evenly(points["values"], STOP).sample(times)
 
 

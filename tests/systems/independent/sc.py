@@ -16,13 +16,14 @@ def outputs(steam: Array, step: float) -> dict[str, Array]:
     data = tables("SC")
     to_network = np.hstack([data["weight1"], data["weight2"]])
 
-    def continued(table: Array, x: Array) -> Array:
-        piece = np.clip(np.searchsorted(table[:, 0], x, side="right") - 1, 0, len(table) - 2)
-        share = (x - table[piece, 0]) / (table[piece + 1, 0] - table[piece, 0])
-        return np.asarray((1 - share) * table[piece, 1] + share * table[piece + 1, 1])
+    def continued(table: str, x: Array) -> Array:
+        at, values = data["steamPressure"], data[table]
+        piece = np.clip(np.searchsorted(at, x, side="right") - 1, 0, len(at) - 2)
+        share = (x - at[piece]) / (at[piece + 1] - at[piece])
+        return np.asarray((1 - share) * values[piece] + share * values[piece + 1])
 
     def heat(water: Array, pressure: Array, flow: Array) -> Array:
-        steam_side = continued(data["saturation"], pressure)
+        steam_side = continued("condensingTemperature", pressure)
         mean_difference = (water - 60) / (np.log(steam_side - 60) - np.log(steam_side - water))
         return np.asarray(mean_difference / (0.0872924756541668 * flow**-0.8 + 0.00073786772008033))
 
@@ -35,11 +36,11 @@ def outputs(steam: Array, step: float) -> dict[str, Array]:
         network = data["outputWeight"] @ units - 0.33227866684137108
         command = (network + 1) / 2 * (66.879264965962932 + 30.855068745036114) - 30.855068745036114
         q = heat(water, pressure, flow)
-        condensed = q / continued(data["condensation"], pressure)
+        condensed = q / continued("condensationHeat", pressure)
         return np.vstack(
             [
                 (q / 4.2 + flow * (60 - water)) / 500,
-                0.461526 / 3 * continued(data["saturation"], pressure) * (inflow - condensed),
+                0.461526 / 3 * continued("condensingTemperature", pressure) * (inflow - condensed),
                 np.clip(107.8880952381 + command, 0, 200) - flow,
                 2 * (pressure - measured),
                 units - 10 * filters[:3],

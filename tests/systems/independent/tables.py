@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SOURCES = Path(__file__).parents[3] / "modelica" / "ArchComp"
-_CONSTANT = re.compile(r"constant Real (\w+)\[[^\]]*\]\s*=\s*(\{[^;\"]*\})")
+_CONSTANT = re.compile(r"constant Real (\w+)\[[^\]]*\](?:\([^)]*\))?\s*=\s*(\{[^;\"]*\})")
 
 
 def tables(source: str) -> dict[str, NDArray[np.float64]]:
