@@ -3,7 +3,7 @@
 Samples each requirement's search space uniformly, counts violations, and sets 1/p beside the published mean
 number of simulations until the first violation. The mean of ten such numbers has a standard error of about
 1/p / sqrt(10), so z = (published / measured - 1) * sqrt(10). Where not all ten published runs falsified in
-1500 simulations, P is the probability of a number of falsified runs that is no likelier than the published one.
+1500 simulations, P is the probability of a number of falsified runs no likelier than the published one.
 
     python bench/fidelity.py              # the table of bench/fidelity.md
     python bench/fidelity.py AT CC --share 0.1
