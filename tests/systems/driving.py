@@ -1,8 +1,7 @@
-"""Drives a bundled FMU by plain FMI 2.0 co-simulation calls: held inputs, one step, outputs."""
+"""Drives the bundled FMUs with inputs on a grid, and judges what comes out by the spec files."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.fmu import FmuModel
+from falsifier.model import Experiment
 from falsifier.signals import Signal
 from falsifier.stl import Monitor, parse
 from falsifier.trajectory import Trajectory
@@ -30,15 +31,13 @@ def evenly(values: list[float], stop_time: float) -> Signal:
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """One instance of an FMU, used for one run after the other.
+    """A bundled FMU, driven by inputs that are held over the steps of a grid.
 
     Attributes:
-        instance: fmpy's FMI 2.0 slave.
-        description: fmpy's model description.
+        model: the FMU, simulated by co-simulation.
     """
 
-    instance: Any
-    description: Any
+    model: FmuModel
 
     def run(
         self,
@@ -58,64 +57,11 @@ class Driver:
             samples: number of grid times, both ends included.
             parameters: values set before the start.
         """
-        fmu = self.instance
-        variables = {v.name: v for v in self.description.modelVariables}
-        driven = [variables[name].valueReference for name in inputs]
-        rows = np.column_stack([*inputs.values()]).tolist() if inputs else [[]] * samples
-        reals = [i for i, name in enumerate(outputs) if variables[name].type == "Real"]
-        integers = [i for i, name in enumerate(outputs) if variables[name].type == "Integer"]
-        real_references = [variables[outputs[i]].valueReference for i in reals]
-        integer_references = [variables[outputs[i]].valueReference for i in integers]
-        result = np.empty((samples, len(outputs)))
-
-        def record(k: int) -> None:
-            if reals:
-                result[k, reals] = fmu.getReal(real_references)
-            if integers:
-                result[k, integers] = fmu.getInteger(integer_references)
-
-        fmu.reset()
-        fmu.setupExperiment(startTime=0.0, stopTime=stop_time)
-        for name, value in (parameters or {}).items():
-            fmu.setReal([variables[name].valueReference], [value])
-        fmu.enterInitializationMode()
-        if driven:
-            fmu.setReal(driven, rows[0])
-        fmu.exitInitializationMode()
-        record(0)
-        grid = np.linspace(0.0, stop_time, samples).tolist()
-        for k in range(samples - 1):
-            if driven:
-                fmu.setReal(driven, rows[k])
-            fmu.doStep(grid[k], grid[k + 1] - grid[k])
-            record(k + 1)
-        fmu.terminate()
-        return result
-
-
-@contextmanager
-def driver(system: str) -> Iterator[Driver]:
-    """Load the bundled FMU of a system."""
-    import shutil
-
-    import fmpy
-    from fmpy.fmi2 import FMU2Slave
-
-    path = ROOT / "fmus" / f"{system}.fmu"
-    description = fmpy.read_model_description(path)
-    folder = fmpy.extract(path)
-    slave = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=folder,
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName=system,
-    )
-    slave.instantiate()
-    try:
-        yield Driver(slave, description)
-    finally:
-        slave.freeInstance()
-        shutil.rmtree(folder, ignore_errors=True)
+        grid = tuple(np.linspace(0.0, stop_time, samples).tolist())
+        held = {name: Signal(grid, tuple(u.tolist()), "constant") for name, u in inputs.items()}
+        experiment = Experiment(stop_time, stop_time / (samples - 1), outputs)
+        trajectory = self.model.simulate(held, parameters or {}, experiment)
+        return np.column_stack([trajectory[name] for name in outputs])
 
 
 def robustness(requirement: str, system: str, columns: Mapping[str, Array], *, stop_time: float) -> float:

@@ -63,4 +63,4 @@ def test_independent_flights(fmu: Driver) -> None:
         valid = np.cumprod(expected["altitude"][:, run] > 0).astype(bool)
         assert flight["mode"][valid].tolist() == expected["mode"][valid, run].tolist()
         difference = np.abs(flight["altitude"] - expected["altitude"][:, run])[valid]
-        assert difference.max() < (0.02 if run % 4 == 0 else 3e-3)
+        assert difference.max() < (0.05 if run % 4 == 0 else 0.01)

@@ -22,7 +22,7 @@ def test_golden_paces(fmu: Driver, name: str) -> None:
     signal = Signal.evenly(points["values"], stop_time=STOP, interpolation=points["interpolation"])
     counted = count(fmu, signal.sample(TIMES))
     paces = TIMES[1:][np.diff(counted) > 0]
-    # A pace that a step of the input sets off is seen in the row after the step: outputs are read before inputs are set.
+    # A pace that a step of the input sets off shows one row later: outputs are read before inputs are set.
     late = 1e-3 if name == "alternating" else 1e-9
     assert paces[: len(run["first"])] == pytest.approx(run["first"], abs=late)
     assert paces[-1] == pytest.approx(run["last"], abs=1e-9)

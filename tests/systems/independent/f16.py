@@ -9,7 +9,7 @@ from tests.systems.independent.tables import tables
 STAND_BY, ROLL, PULL = 0, 1, 2
 DEGREE = np.pi / 180
 SAMPLES_PER_SECOND = 30
-STEPS_PER_SAMPLE = 4
+STEPS_PER_SAMPLE = 2
 NAMES = ("vt", "alpha", "beta", "phi", "theta", "psi", "p", "q", "r", "pn", "pe", "altitude", "power")
 
 

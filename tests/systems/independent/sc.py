@@ -59,7 +59,7 @@ def outputs(steam: Array, step: float) -> dict[str, Array]:
         def held(x: Array, inflow: Array = inflow, set_point: float = set_point) -> Array:
             return slope(x, inflow, set_point)
 
-        state = runge_kutta(held, state, step, 2)
+        state = runge_kutta(held, state, step, 1)
     return {
         "T": rows[:, 0],
         "Fcw": rows[:, 2],
