@@ -98,5 +98,5 @@ equation
   end when;
   annotation(
     experiment(StopTime = 40, Interval = 0.01, Tolerance = 1e-6),
-    __falsifier_solver(method = "fixed", step = 0.005, repeatLastTick = true));
+    __falsifier_solver(method = "fixed", step = 0.005, repeatTicks = "always"));
 end NN;
