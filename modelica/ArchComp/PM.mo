@@ -26,5 +26,7 @@ equation
     elapsed = if phase == pre(phase) then pre(elapsed) + 1 else 0;
     PACE_COUNT = if phase == Pace and pre(phase) == Charge then pre(PACE_COUNT) + 1 else pre(PACE_COUNT);
   end when;
-  annotation(experiment(StopTime = 10, Interval = 0.001));
+  annotation(
+    experiment(StopTime = 10, Interval = 0.001),
+    __falsifier_solver(repeatTicks = "always"));
 end PM;
