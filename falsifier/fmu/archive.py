@@ -5,6 +5,7 @@ import platform
 import stat
 import sys
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -84,7 +85,7 @@ def read_entry(path: Path, name: str) -> bytes:
             raise ModelError(
                 f"{path}: no {name} in the archive, so it is not an FMU; export the model again"
             ) from None
-        except zipfile.BadZipFile as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError) as error:
             raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
 
 
@@ -97,7 +98,7 @@ def extract(path: Path, folder: Path) -> None:
     with open_archive(path) as archive:
         try:
             archive.extractall(folder)
-        except (zipfile.BadZipFile, OSError, RuntimeError) as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
             raise ModelError(f"{path}: cannot unpack the FMU into {folder} ({error})") from error
 
 

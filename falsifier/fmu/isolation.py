@@ -6,6 +6,7 @@ leaks is replaced; what it was doing becomes a SimulationError.
 
 import atexit
 import contextlib
+import fcntl
 import json
 import mmap
 import os
@@ -25,7 +26,7 @@ from typing import IO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.errors import ModelError, SimulationError
+from falsifier.errors import FailureStatus, ModelError, SimulationError
 from falsifier.fmu import nursery
 from falsifier.fmu.channel import (
     Closed,
@@ -70,6 +71,11 @@ class Nursery:
                 start_new_session=True,
             )
         self._ready = False
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process.poll() is None
 
     def start_worker(self, order: Order, connection: int, log: int) -> int:
         """Fork a worker that serves the connection; returns its process id.
@@ -118,7 +124,9 @@ class _Worker:
 
     def __init__(self, owner: Nursery, order: Order) -> None:
         self._owner = owner
-        self.log: IO[bytes] = tempfile.TemporaryFile(mode="ab+")  # noqa: SIM115 (closed in kill)
+        self.log = _anonymous_file()
+        # What is written after it was read and cut goes to its new end.
+        fcntl.fcntl(self.log, fcntl.F_SETFL, fcntl.fcntl(self.log, fcntl.F_GETFL) | os.O_APPEND)
         self.sock, theirs = socket.socketpair()
         with theirs:
             self.pid = owner.start_worker(order, theirs.fileno(), self.log.fileno())
@@ -153,13 +161,17 @@ class _Worker:
             os.kill(self.pid, signal.SIGKILL)
         self.sock.close()
         self.log.close()
-        return self._owner.reap(self.pid)
+        try:
+            return self._owner.reap(self.pid)
+        except ModelError:
+            # The nursery is gone, and with it the exit code; the next worker comes from a new one.
+            return 0
 
 
 class IsolatedFmu:
     """Simulates one FMU in a worker process, which is replaced when needed."""
 
-    def __init__(self, owner: Nursery, order: Order) -> None:
+    def __init__(self, owner: Callable[[], Nursery], order: Order) -> None:
         self._owner, self._order = owner, order
         self._worker: _Worker | None = None
         self._reuse: Reuse | None = None
@@ -230,7 +242,7 @@ class IsolatedFmu:
         worker = self._worker
         if worker is None:
             order = replace(self._order, reuse=self._reuse)
-            worker = self._worker = _Worker(self._owner, order)
+            worker = self._worker = _Worker(self._owner(), order)
         if worker.plan is not plan:
             self._prepare(worker, plan)
         return worker
@@ -270,7 +282,7 @@ class IsolatedFmu:
         if reply.leaving:
             self._drop()
 
-    def _end(self, reason: str, status: str) -> SimulationError:
+    def _end(self, reason: str, status: FailureStatus) -> SimulationError:
         worker = self._worker
         assert worker is not None, "a simulation was under way"
         log = worker.take_log()
@@ -286,7 +298,8 @@ class IsolatedFmu:
 
 def _error(reply: Reply, log: tuple[str, ...]) -> SimulationError:
     time = None if reply.time < 0 else reply.time
-    return SimulationError(reply.text + _last_line(log), status=reply.status, time=time, log=log)
+    status: FailureStatus = "timeout" if reply.status == "timeout" else "failed"
+    return SimulationError(reply.text + _last_line(log), status=status, time=time, log=log)
 
 
 def _last_line(log: tuple[str, ...]) -> str:
@@ -325,6 +338,9 @@ class _Registry:
 
     def nursery(self) -> Nursery:
         with self._lock:
+            if self._nursery is not None and not self._nursery.is_alive:
+                self._nursery.close()
+                self._nursery = None
             if self._nursery is None:
                 self._nursery = Nursery()
             return self._nursery
@@ -333,9 +349,8 @@ class _Registry:
         key = (order.sha256, order.interface)
         found = self._fmus.get(key)
         if found is None:
-            owner = self.nursery()
             with self._lock:
-                found = self._fmus.setdefault(key, IsolatedFmu(owner, order))
+                found = self._fmus.setdefault(key, IsolatedFmu(self.nursery, order))
         return found
 
     def drop(self, sha256: str, interface: str) -> None:

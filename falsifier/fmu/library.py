@@ -26,6 +26,11 @@ def status_name(status: int) -> str:
     return _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {status}"
 
 
+def load_binding() -> None:
+    """Import what loading any FMU needs, so that processes forked from this one have it already."""
+    from fmpy import fmi1, fmi2, fmi3, logging  # noqa: F401
+
+
 class Library:
     """One loaded library with one instance.
 

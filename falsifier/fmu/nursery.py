@@ -1,8 +1,8 @@
 """The process that FMU workers are forked from.
 
-It is started once by a process that simulates, with a clean environment and no threads. It imports and compiles
-what every worker needs, so that a new worker costs a fork. FMUs are extracted to a folder that it owns and
-removes when its parent is gone, for whatever reason.
+It is started once by a process that simulates, with a clean environment and no threads. It imports and
+compiles what every worker needs, so that a new worker costs a fork. FMUs are extracted to a folder that it
+owns and removes when its parent is gone, for whatever reason.
 """
 
 import contextlib

@@ -90,8 +90,9 @@ def make_plan(
         description.slot(name)
         if kinds[name].causality != "input":
             known = ", ".join(v.name for v in description.info.inputs) or "none"
+            role = kinds[name].causality
             raise ModelError(
-                f"{model}: {name!r} is not an input but a {kinds[name].causality}; inputs are: {known}"
+                f"{model}: {name!r} is not an input (its causality is {role}); inputs are: {known}"
             )
     for name in plan.parameters:
         slot = description.slot(name)

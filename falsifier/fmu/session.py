@@ -57,8 +57,9 @@ class Session:
         """
         deadline = time.perf_counter() + self._plan.time_limit
         if self._state != "new":
-            can_reset = self._state == "finished" and self.reuse == "reset"
-            if not (can_reset and self._lifecycle.reset()):
+            if self._state == "finished" and self.reuse == "reset" and not self._lifecycle.reset():
+                self.reuse = "instance"
+            if self._state == "broken" or self.reuse != "reset":
                 self._library.renew()
         self._state = "broken"
         self._lifecycle.initialise(self._plan, self._stepper.set_parameters, self._stepper.set_first_inputs)
@@ -85,7 +86,8 @@ class Session:
             except FalsifierError:
                 continue
             if np.array_equal(trial.outputs, expected, equal_nan=True):
-                found = reuse
+                # An instance that refused its reset was replaced.
+                found = self.reuse
                 break
         self.prepare(plan, room)
         self.reuse = found

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from falsifier.errors import SimulationError
 from falsifier.fmu.description import Description
-from falsifier.fmu.library import Library, status_name
+from falsifier.fmu.library import Library, load_binding, status_name
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.room import Room
@@ -137,11 +137,7 @@ def loops() -> Any:
 
 def warm_up() -> None:
     """Load what every simulation needs, so that processes forked from this one find it ready."""
-    import fmpy.fmi1
-    import fmpy.fmi2
-    import fmpy.fmi3
-    import fmpy.logging  # noqa: F401
-
+    load_binding()
     compiled = loops()
     calls, places = np.zeros((0, 5), dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
     rows, report = np.zeros((0, 1)), np.zeros(3, dtype=np.int64)

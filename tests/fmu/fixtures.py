@@ -1,0 +1,48 @@
+"""The project's own small FMUs (tests/fixtures/fmus) and what is done with them again and again."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from falsifier.fmu import FmuModel
+from falsifier.model import Experiment, Interface
+from falsifier.signals import Signal
+from falsifier.trajectory import Trajectory
+
+FOLDER = Path(__file__).parents[1] / "fixtures" / "fmus"
+
+
+def path(name: str) -> Path:
+    """Path of a test FMU, e.g. ``Lag_2``."""
+    return FOLDER / f"{name}.fmu"
+
+
+def local(name: str, interface: Interface = "co-simulation") -> FmuModel:
+    """A test FMU in this process."""
+    return FmuModel(path(name), interface, isolate=False)
+
+
+def isolated(name: str, interface: Interface = "co-simulation") -> FmuModel:
+    """A test FMU in a worker."""
+    return FmuModel(path(name), interface)
+
+
+def run(
+    model: FmuModel,
+    outputs: Sequence[str],
+    *,
+    stop: float = 1.0,
+    interval: float = 0.1,
+    signals: Mapping[str, Signal] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+    time_limit: float = 60.0,
+) -> Trajectory:
+    """Simulate once."""
+    experiment = Experiment(stop, interval, tuple(outputs), step_size, tolerance, time_limit)
+    return model.simulate(signals or {}, parameters or {}, experiment)
+
+
+def ramp(stop: float, slope: float = 1.0) -> Signal:
+    """The signal slope * t."""
+    return Signal((0.0, stop), (0.0, slope * stop), "linear")

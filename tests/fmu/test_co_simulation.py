@@ -1,0 +1,144 @@
+"""Co-simulation of the test FMUs, compiled and plain, against what the models are by their equations."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from falsifier.errors import SimulationError
+from falsifier.fmu import plain, stepper
+from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.ports import make_ports
+from falsifier.model import ModelInfo
+from falsifier.signals import Signal
+from tests.fmu.fixtures import local, ramp, run
+
+LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
+OUTPUTS = {
+    **{name: ("x", "y") for name in LAGS},
+    **{name: ("h", "v", "bounces") for name in ("Ball_2", "Ball_3")},
+    **{name: ("sampled", "count", "x") for name in ("Ticker_2", "Ticker_3")},
+    "Arrays_3": ("x[2]", "y[1]", "A[1,2]"),
+    "VanDerPol_3": ("x", "v"),
+}
+
+
+Floats = NDArray[np.float64]
+
+
+def held_lag(values: Floats, step: float, *, period: float = 2.0) -> Floats:
+    """x' = (u - x) / period with u held over each step: the exact solution at the step ends."""
+    x, decay, found = 0.0, float(np.exp(-step / period)), [0.0]
+    for u in values:
+        x = u + (x - u) * decay
+        found.append(x)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", LAGS)
+def test_inputs_of_a_communication_point_hold_until_the_next(name: str) -> None:
+    wave = Signal.evenly((0.0, 3.0, -2.0, 5.0), stop_time=2.0)
+    got = run(local(name), ("x", "y"), stop=2.0, signals={"u": wave}, parameters={"gain": 3.0})
+    expected = held_lag(wave.sample(np.linspace(0.0, 1.9, 20)), 0.1)
+    np.testing.assert_allclose(got["x"], expected, atol=1e-9)
+    np.testing.assert_allclose(got["y"], 3.0 * expected, atol=1e-9)
+    assert len(got) == 21 and got.units == {"x": "m", "y": "m"}
+
+
+@pytest.mark.parametrize("name", LAGS)
+def test_a_smaller_communication_step_keeps_the_output_grid(name: str) -> None:
+    got = run(local(name), ("x",), signals={"u": ramp(1.0)}, step_size=0.02)
+    expected = held_lag(np.linspace(0.0, 0.98, 50), 0.02)[::5]
+    np.testing.assert_allclose(got["x"], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", LAGS)
+def test_start_values_and_parameters_are_set_before_the_start(name: str) -> None:
+    got = run(local(name), ("x",), parameters={"x": 4.0, "T": 0.5})
+    np.testing.assert_allclose(got["x"], 4.0 * np.exp(-got.times / 0.5), atol=1e-5)
+
+
+@pytest.mark.parametrize("name", sorted(OUTPUTS))
+def test_plain_loops_do_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = local(name)
+    inputs = {v.name: Signal.evenly((0.0, 2.0, -1.0, 1.0), stop_time=2.0) for v in model.info.inputs}
+
+    def outcome() -> Floats:
+        model.close()
+        got = run(model, OUTPUTS[name], stop=2.0, interval=0.05, signals=inputs, step_size=0.01)
+        return np.stack([got[n] for n in got.names])
+
+    compiled = outcome()
+    monkeypatch.setattr(stepper, "loops", lambda: plain)
+    np.testing.assert_array_equal(outcome(), compiled)
+
+
+@pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
+@pytest.mark.parametrize("is_plain", [False, True])
+def test_every_type_goes_in_rounded_and_comes_out(
+    name: str, is_plain: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_plain:
+        monkeypatch.setattr(stepper, "loops", lambda: plain)
+    model = local(name)
+    model.close()
+    inputs = {v.name: ramp(1.0, 3.0 if v.kind != "boolean" else 1.0) for v in model.info.inputs}
+    outputs = [v.name for v in model.info.outputs]
+    got = run(model, outputs, signals=inputs)
+    points = np.arange(10) * 0.1
+    for variable in model.info.outputs:
+        raw = 3.0 * points
+        expected = {
+            "real": raw.astype(np.float32) if "32" in variable.name else raw,
+            "boolean": (points >= 0.5).astype(float),
+        }.get(variable.kind, np.rint(raw))
+        np.testing.assert_allclose(got[variable.name][1:], expected, err_msg=variable.name)
+    model.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "low", "high"), [("Int8", -128, 127), ("UInt8", 0, 255), ("Int16", -32768, 32767)]
+)
+def test_integers_keep_their_limits(kind: str, low: int, high: int) -> None:
+    model = local("Echo_3")
+    for value in (low, high):
+        got = run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (float(value),))})
+        assert got[f"out_{kind}"][-1] == value
+    with pytest.raises(SimulationError, match=rf"do not fit 'in_{kind}', whose type takes {low} to {high}"):
+        run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (high + 1.0,))})
+
+
+def test_elements_of_arrays_are_driven_set_and_recorded_alone() -> None:
+    # x1' = x2 + u1, x2' = -x1: with u1 = 1 held from rest x1 = sin t, x2 = cos t - 1.
+    got = run(local("Arrays_3"), ("y[2]", "x[1]"), signals={"u[1]": Signal((0.0,), (1.0,))}, interval=0.01)
+    np.testing.assert_allclose(got["x[1]"], np.sin(got.times), atol=1e-9)
+    np.testing.assert_allclose(got["y[2]"], np.cos(got.times) - 1 + 20.0, atol=1e-9)
+    got = run(local("Arrays_3"), ("y[1]", "y[2]", "A[2,1]"), parameters={"offset[2]": 5.0, "A[2,1]": 0.0})
+    assert (got["y[1]"][-1], got["y[2]"][-1], got["A[2,1]"][-1]) == (10.0, 5.0, 0.0)
+
+
+def test_event_mode_sets_discrete_inputs_at_events() -> None:
+    step = Signal((0.0, 0.5), (1.0, 3.0), "constant")
+    got = run(local("Echo_3"), ("out_Int32",), signals={"in_Int32": step})
+    assert got["out_Int32"].tolist() == [1, 1, 1, 1, 1, 1, 3, 3, 3, 3, 3]
+
+
+@pytest.mark.parametrize("name", ["Ball_2", "Ball_3"])
+def test_events_inside_of_steps(name: str) -> None:
+    """The first bounce is at t = sqrt(2 h / g) = 0.4515 s, whether or not the FMU returns early for it."""
+    got = run(local(name), ("h", "v", "bounces"), interval=0.05)
+    assert got["bounces"][got.index(0.45)] == 0 and got["bounces"][got.index(0.5)] == 1
+    flight = 0.5 - np.sqrt(2 / 9.81)
+    assert got["v"][got.index(0.5)] == pytest.approx(0.7 * np.sqrt(2 * 9.81) - 9.81 * flight, abs=0.12)
+
+
+def test_a_negated_alias_has_the_other_sign() -> None:
+    info = ModelInfo("M", fmi_version="1.0")
+    slots = {"a": Slot(0, "Real"), "b": Slot(0, "Real", negated=True)}
+    ports = make_ports(Description(info, "", {}, slots), ["a", "b"], {"Real": 1})
+    memory = ports.memory[1]
+    memory[0] = 2.5
+    loops = stepper.loops()
+    assert [loops.fetch(ports.places[k]) for k in (0, 1)] == [2.5, -2.5]
+    assert [plain.fetch(ports.places[k]) for k in (0, 1)] == [2.5, -2.5]
+    loops.put(ports.places[1], 4.0)
+    assert memory[0] == -4.0

@@ -1,0 +1,255 @@
+"""What happens when an FMU misbehaves in its worker, and what is left behind afterwards."""
+
+import os
+import pickle
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import ModelError, SimulationError
+from falsifier.fmu import FmuModel, worker
+from falsifier.fmu.isolation import REGISTRY
+from tests.fmu import fixtures
+from tests.fmu.fixtures import isolated, run
+
+NOTHING, CRASH, HANG, EXIT, ALLOCATE, NAN, DISCARD, END, ABORT, ERROR, TALK, PRINT = range(12)
+
+
+@pytest.fixture
+def misdeeds() -> Iterator[FmuModel]:
+    model = isolated("Misdeeds_2")
+    yield model
+    model.close()
+
+
+def commit(model: FmuModel, misdeed: int, *, time_limit: float = 60.0) -> SimulationError:
+    with pytest.raises(SimulationError) as caught:
+        run(model, ("y",), parameters={"misdeed": misdeed}, time_limit=time_limit)
+    assert run(model, ("y",))["y"].tolist() == list(range(11)), "the next simulation runs"
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("misdeed", "status", "reason"),
+    [
+        (CRASH, "crashed", "signal SIGSEGV"),
+        (ABORT, "crashed", "signal SIGABRT; its last message: assertion failed: pressure > 0"),
+        (EXIT, "crashed", "it ended itself with exit code 7"),
+        (ALLOCATE, "failed", "the step returned error at t = 0.5 s.*no memory for the table"),
+        (NAN, "failed", "output 'y' is nan at t = 0.6 s"),
+        (DISCARD, "failed", "the step returned discard at t = 0.5 s, before the stop time 1 s"),
+        (END, "failed", "the step returned discard at t = 0.5 s"),
+        (ERROR, "failed", "the step returned error at t = 0.5 s.*the tank is empty"),
+    ],
+)
+def test_misdeeds_are_failed_simulations(misdeeds: FmuModel, misdeed: int, status: str, reason: str) -> None:
+    error = commit(misdeeds, misdeed)
+    assert error.status == status
+    assert error.args[0].startswith("Misdeeds: ")
+    assert re.search(reason, str(error))
+
+
+@pytest.mark.parametrize("name", ["Misdeeds_1cs", "Misdeeds_3"])
+@pytest.mark.parametrize(("misdeed", "status"), [(CRASH, "crashed"), (DISCARD, "failed"), (END, "failed")])
+def test_in_other_versions_too(name: str, misdeed: int, status: str) -> None:
+    model = isolated(name)
+    assert commit(model, misdeed).status == status
+    model.close()
+
+
+def test_ending_with_the_last_step_is_a_full_trajectory() -> None:
+    model = isolated("Misdeeds_3")
+    got = run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})
+    assert got["y"].tolist() == list(range(11))
+    model.close()
+
+
+def test_an_endless_loop_is_stopped_at_the_time_limit(misdeeds: FmuModel) -> None:
+    run(misdeeds, ("y",))
+    started = time.perf_counter()
+    error = commit(misdeeds, HANG, time_limit=0.3)
+    assert error.status == "timeout" and "time limit of 0.3 s" in str(error)
+    assert time.perf_counter() - started < 3.0
+
+
+def test_messages_of_failed_and_of_successful_simulations_are_kept(misdeeds: FmuModel) -> None:
+    assert commit(misdeeds, ERROR).log == ("error: the tank is empty",)
+    got = run(misdeeds, ("y",), parameters={"misdeed": TALK, "moment": 0.85})
+    assert got.log == ("warning: valve nearly closed",)
+    got = run(misdeeds, ("y",), parameters={"misdeed": PRINT, "moment": 0.75})
+    assert got.log == ("solver: step halved",) * 2
+    assert run(misdeeds, ("y",)).log == ()
+
+
+def test_a_worker_that_dies_between_simulations_is_replaced_without_blame(misdeeds: FmuModel) -> None:
+    run(misdeeds, ("y",))
+    run(misdeeds, ("y",))
+    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == misdeeds.sha256]
+    assert fmu._worker is not None
+    os.kill(fmu._worker.pid, signal.SIGKILL)
+    time.sleep(0.05)
+    assert run(misdeeds, ("y",))["y"][-1] == 10
+
+
+def test_a_nursery_that_dies_is_replaced(misdeeds: FmuModel) -> None:
+    run(misdeeds, ("y",))
+    nursery = REGISTRY.nursery()
+    nursery._process.kill()
+    nursery._process.wait()
+    assert commit(misdeeds, CRASH).status == "crashed"
+    assert REGISTRY.nursery() is not nursery
+
+
+@pytest.mark.parametrize(
+    ("name", "reuse"),
+    [
+        ("Lag_2", "reset"),
+        ("NoReset_2", "instance"),
+        ("LyingReset_2", "instance"),
+        ("KeepsStatic_2", "process"),
+    ],
+)
+def test_repeated_runs_are_equal_whatever_the_reset_does(name: str, reuse: str) -> None:
+    model = isolated(name)
+    runs = [run(model, ("y",))["y"].tolist() for _ in range(4)]
+    assert runs == [runs[0]] * 4
+    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.sha256]
+    assert fmu._reuse == reuse
+    model.close()
+
+
+def test_workers_are_replaced_before_they_have_made_too_many_instances() -> None:
+    model = isolated("NoReset_2")
+    pids = set()
+    for _ in range(worker._MOST_INSTANCES + 20):
+        assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
+        (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.sha256]
+        pids |= {fmu._worker.pid} if fmu._worker else set()
+    assert len(pids) == 2
+    model.close()
+
+
+def test_models_travel_between_processes_and_are_equal_by_content(tmp_path: Path) -> None:
+    model = isolated("Lag_2")
+    twin = pickle.loads(pickle.dumps(model))
+    assert twin == model and hash(twin) == hash(model)
+    assert run(twin, ("y",))["y"].tolist() == run(model, ("y",))["y"].tolist()
+    assert isolated("Lag_3") != model
+    assert FmuModel(model.path, "model-exchange") != model
+
+
+def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
+    copy = tmp_path / "model.fmu"
+    copy.write_bytes(fixtures.path("Lag_3").read_bytes())
+    with zipfile.ZipFile(copy, "a") as archive:
+        archive.writestr("resources/note.txt", "another file than the others")
+    model = FmuModel(copy)
+    copy.write_bytes(fixtures.path("Ball_3").read_bytes())
+    with pytest.raises(ModelError, match=r"model\.fmu: the file has changed since the model was loaded"):
+        run(model, ("y",))
+
+
+def test_no_binary_for_this_platform_says_what_there_is_and_what_to_do() -> None:
+    with pytest.raises(
+        ModelError, match=r"no library for .*no binaries; .*compile them with `falsifier build`"
+    ):
+        run(isolated("Lag_2sources"), ("y",))
+
+
+SCRIPT = """
+import os, sys, time
+from pathlib import Path
+from falsifier.fmu import FmuModel
+from falsifier.model import Experiment
+model = FmuModel(sys.argv[1])
+experiment = Experiment(1.0, 0.1, ("y",))
+def go(misdeed=0):
+    return model.simulate({}, {"misdeed": misdeed}, experiment)["y"][-1]
+go(); go()
+"""
+
+
+def script(body: str, **environment: str) -> subprocess.Popen[str]:
+    """Start a process that simulates."""
+    return subprocess.Popen(
+        [sys.executable, "-c", SCRIPT + body, str(fixtures.path("Misdeeds_2"))],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
+    )
+
+
+def leftovers(folder: Path) -> list[str]:
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline and list(folder.glob("falsifier-fmu-*")):
+        time.sleep(0.05)
+    return [p.name for p in folder.glob("falsifier-fmu-*")]
+
+
+@pytest.mark.parametrize("ending", ["", "go(1)", "os.kill(os.getpid(), 9)", "os._exit(3)"])
+def test_folders_and_processes_are_gone_however_the_process_ends(tmp_path: Path, ending: str) -> None:
+    with script("print('ran', flush=True)\n" + ending, TMPDIR=str(tmp_path)) as process:
+        assert process.stdout is not None
+        assert process.stdout.read() == "ran\n"
+    assert leftovers(tmp_path) == []
+
+
+def test_a_forked_copy_starts_workers_of_its_own(tmp_path: Path) -> None:
+    body = """
+pid = os.fork()
+if not pid:
+    print(go(), flush=True)
+    os._exit(0)
+os.waitpid(pid, 0)
+print(go(), flush=True)
+"""
+    with script(body, TMPDIR=str(tmp_path)) as process:
+        assert process.stdout is not None
+        assert process.stdout.read() == "10.0\n10.0\n"
+    assert leftovers(tmp_path) == []
+
+
+def test_fmu_processes_see_no_secrets(tmp_path: Path) -> None:
+    body = """
+from falsifier.fmu.isolation import REGISTRY
+(fmu,) = REGISTRY._fmus.values()
+for pid in (fmu._worker.pid, REGISTRY._nursery._process.pid):
+    print(Path(f"/proc/{pid}/environ").read_text().replace(chr(0), chr(10)))
+"""
+    with script(
+        body, SOME_API_KEY="hidden-1", GH="ghp_hidden2hidden2hidden2", LICENSE="port@host"
+    ) as process:
+        assert process.stdout is not None
+        seen = process.stdout.read()
+    assert "hidden" not in seen
+    assert seen.count("LICENSE=port@host") == 2
+
+
+def test_interrupting_a_simulation_leaves_no_stale_answer() -> None:
+    body = """
+import signal, threading
+threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    go(2)
+except KeyboardInterrupt:
+    print("interrupted", go())
+"""
+    with script(body) as process:
+        assert process.stdout is not None
+        assert process.stdout.read() == "interrupted 10.0\n"
+
+
+def test_nothing_of_this_process_is_left_in_the_temporary_folder() -> None:
+    run(isolated("Lag_2"), ("y",))
+    own = [p for p in Path(tempfile.gettempdir()).glob("falsifier-fmu-*") if p.stat().st_uid == os.getuid()]
+    REGISTRY.close()
+    after = list(Path(tempfile.gettempdir()).glob("falsifier-fmu-*"))
+    assert len(after) < len(own)

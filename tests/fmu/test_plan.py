@@ -1,0 +1,49 @@
+import pytest
+
+from falsifier.errors import FalsifierError, ModelError, SpecError
+from falsifier.fmu.description import read_description
+from falsifier.fmu.plan import make_plan
+from falsifier.model import Experiment
+from tests.fmu import fixtures
+
+LAG = read_description(fixtures.path("Lag_2"))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "parameters", "outputs", "message"),
+    [
+        (["v"], [], ["y"], "no variable 'v'"),
+        (["y"], [], ["y"], "'y' is not an input .its causality is output.; inputs are: u"),
+        (["u"], ["y"], ["y"], "'y' cannot be set: the model computes"),
+        (["u"], ["gian"], ["y"], "did you mean 'gain'"),
+        (["u"], [], ["z"], "no variable 'z'"),
+    ],
+)
+def test_wrong_names_are_refused_with_the_reason(
+    inputs: list[str], parameters: list[str], outputs: list[str], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        make_plan(LAG, Experiment(1.0, 0.1, tuple(outputs)), inputs, parameters)
+
+
+@pytest.mark.parametrize(
+    ("stop", "interval", "step", "key"),
+    [
+        (1.0, 0.3, None, "output_interval"),
+        (1.0, 2.0, None, "output_interval"),
+        (1.0, 0.1, 0.03, "step_size"),
+        (1.0, 0.1, 0.2, "step_size"),
+        (1.0, 0.1, -0.1, "step_size"),
+    ],
+)
+def test_steps_must_fit(stop: float, interval: float, step: float | None, key: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        make_plan(LAG, Experiment(stop, interval, ("y",), step_size=step), [], [])
+    assert caught.value.key == key
+
+
+def test_smaller_steps_divide_the_output_interval() -> None:
+    plan = make_plan(LAG, Experiment(2.0, 0.1, ("y",), step_size=0.02), ["u"], [])
+    assert (plan.samples, plan.every, plan.steps) == (21, 5, 100)
+    assert plan.times[:3].tolist() == [0.0, 0.02, 0.04]
+    assert issubclass(SpecError, FalsifierError)
