@@ -34,7 +34,7 @@ def order_residuals(
 ) -> float:
     """Largest residual of the Runge-Kutta order conditions (Hairer, Norsett, Wanner I, table II.2.2)."""
     ac = a @ c
-    conditions = [
+    conditions: list[list[tuple[float, float]]] = [
         [(b.sum(), 1)],
         [(b @ c, 1 / 2)],
         [(b @ c**2, 1 / 3), (b @ ac, 1 / 6)],
