@@ -14,8 +14,12 @@ MAX_REASKS = 2
 _LONGEST_QUOTE = 4000
 
 
-class RejectedReply(FalsifierError):
+class RejectedReplyError(FalsifierError):
     """A reply cannot be used; the message tells its author why."""
+
+
+class NoValidReplyError(ChatError):
+    """The model answered, but never validly."""
 
 
 def converse(
@@ -31,12 +35,13 @@ def converse(
     Args:
         chat: who is asked.
         request: the question.
-        read: makes a value of a reply's text, or raises RejectedReply.
+        read: makes a value of a reply's text, or raises RejectedReplyError.
         on_exchange: called with every question and answer, rejected ones included.
         reasks: how often a rejected reply is asked for again.
 
     Raises:
-        ChatError: when no answer came, or none was valid.
+        NoValidReplyError: when no answer was valid.
+        ChatError: when no answer came.
     """
     problems: list[str] = []
     for _ in range(reasks + 1):
@@ -45,7 +50,7 @@ def converse(
         problem = None
         try:
             value = read(_usable_text(reply))
-        except RejectedReply as rejection:
+        except RejectedReplyError as rejection:
             problem = _explained(reply, str(rejection))
         on_exchange(
             Exchange(
@@ -61,18 +66,18 @@ def converse(
             return value
         problems.append(problem or "")
         request = _asked_again(request, reply, problem or "")
-    raise ChatError(
+    raise NoValidReplyError(
         f"{chat.model} gave no valid reply in {reasks + 1} tries; what was wrong: {' | '.join(problems)}"
     )
 
 
 def _usable_text(reply: ChatReply) -> str:
     if reply.finish_reason == "content_filter":
-        raise RejectedReply("the provider's content filter withheld the reply")
+        raise RejectedReplyError("the provider's content filter withheld the reply")
     if reply.finish_reason == "refusal":
-        raise RejectedReply(f"the reply refuses the task: {reply.text[:200]}")
+        raise RejectedReplyError(f"the reply refuses the task: {reply.text[:200]}")
     if not reply.text.strip():
-        raise RejectedReply("the reply was empty")
+        raise RejectedReplyError("the reply was empty")
     return reply.text
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from falsifier.errors import CandidateError, did_you_mean
-from falsifier.llm.conversation import RejectedReply
+from falsifier.llm.conversation import RejectedReplyError
 from falsifier.signals import INTERPOLATIONS, Interpolation, Signal
 from falsifier.space import Candidate, SearchSpace
 
@@ -73,7 +73,7 @@ class ReplyForm:
         """Candidates of a reply.
 
         Raises:
-            RejectedReply: telling what is wrong with it.
+            RejectedReplyError: telling what is wrong with it.
         """
         text = _THOUGHT.sub("", text)
         replies = [_validated(found) for found in _candidate_objects(text)]
@@ -82,7 +82,9 @@ class ReplyForm:
         else:
             candidates = [self._decoded(found, "", origin) for found in _points(text)]
         if not candidates:
-            raise RejectedReply("it holds neither a JSON object with a candidate nor <point> ... </point>")
+            raise RejectedReplyError(
+                "it holds neither a JSON object with a candidate nor <point> ... </point>"
+            )
         return candidates
 
     def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:
@@ -91,7 +93,7 @@ class ReplyForm:
         signals = {}
         for signal in reply.signals:
             if signal.name in signals:
-                raise RejectedReply(f"input {signal.name!r} is given twice")
+                raise RejectedReplyError(f"input {signal.name!r} is given twice")
             signals[signal.name] = self._signal(signal)
         parameters = {p.name: p.value for p in reply.parameters}
         return self._admitted(Candidate(signals, parameters, origin, reply.rationale[:_LONGEST_RATIONALE]))
@@ -105,13 +107,13 @@ class ReplyForm:
     def _signal(self, reply: "SignalReply") -> Signal:
         ranges = {r.name: r for r in self.space.inputs}
         if reply.name not in ranges:
-            raise RejectedReply(f"unknown input {reply.name!r}; {did_you_mean(reply.name, ranges)}")
+            raise RejectedReplyError(f"unknown input {reply.name!r}; {did_you_mean(reply.name, ranges)}")
         chosen = ranges[reply.name]
         values = _unrolled(reply.values)
         times = reply.times or ()
         interpolation = reply.interpolation or chosen.interpolation
         if not values:
-            raise RejectedReply(f"input {reply.name!r} has no values")
+            raise RejectedReplyError(f"input {reply.name!r} has no values")
         try:
             if times:
                 return Signal(tuple(times), tuple(values), interpolation, chosen.hold)
@@ -119,19 +121,19 @@ class ReplyForm:
                 values, stop_time=self.space.stop_time, interpolation=interpolation, hold=chosen.hold
             )
         except ValueError as error:
-            raise RejectedReply(f"input {reply.name!r}: {error}") from None
+            raise RejectedReplyError(f"input {reply.name!r}: {error}") from None
 
     def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:
         try:
             return self.space.decode(numbers, origin=origin, rationale=rationale[:_LONGEST_RATIONALE])
         except CandidateError as error:
-            raise RejectedReply(str(error)) from None
+            raise RejectedReplyError(str(error)) from None
 
     def _admitted(self, candidate: Candidate) -> Candidate:
         try:
             return self._allowed().admit(candidate)
         except CandidateError as error:
-            raise RejectedReply(str(error)) from None
+            raise RejectedReplyError(str(error)) from None
 
 
 _TEXT = {"type": "string"}
@@ -210,7 +212,7 @@ def _validated(found: dict[str, Any]) -> CandidateReply:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise RejectedReply(f"{where}: {first['msg']}") from None
+        raise RejectedReplyError(f"{where}: {first['msg']}") from None
 
 
 def _candidate_objects(text: str) -> list[dict[str, Any]]:
@@ -243,7 +245,9 @@ def _points(text: str) -> Iterator[list[float]]:
         words = [w for w in re.split(r"[\s,;()\[\]]+", match[1]) if w]
         wrong = [w for w in words if not _NUMBER.fullmatch(w)]
         if wrong:
-            raise RejectedReply(f"between <point> and </point> only numbers are expected, got {wrong[0]!r}")
+            raise RejectedReplyError(
+                f"between <point> and </point> only numbers are expected, got {wrong[0]!r}"
+            )
         yield [float(w) for w in words]
 
 
@@ -255,10 +259,10 @@ def _unrolled(values: list[float | str]) -> list[float]:
             numbers.append(float(value))
         elif run := _RUN.fullmatch(value):
             if len(numbers) + int(run[2]) > _LONGEST_RUN:
-                raise RejectedReply(f"{value!r} makes the signal longer than {_LONGEST_RUN} values")
+                raise RejectedReplyError(f"{value!r} makes the signal longer than {_LONGEST_RUN} values")
             numbers.extend([float(run[1])] * int(run[2]))
         elif _NUMBER.fullmatch(value.strip()):
             numbers.append(float(value))
         else:
-            raise RejectedReply(f"{value!r} is neither a number nor a run such as '0 x 187'")
+            raise RejectedReplyError(f"{value!r} is neither a number nor a run such as '0 x 187'")
     return numbers

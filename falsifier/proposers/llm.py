@@ -1,14 +1,30 @@
 """A language model as a search engine."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from falsifier.errors import ChatError
 from falsifier.evaluation import Evaluation
-from falsifier.llm.conversation import OnExchange, RejectedReply, converse
-from falsifier.llm.messages import Chat, ChatRequest, Message
-from falsifier.llm.prompts import Variant, View, build_prompt, render, variant_named
+from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
+from falsifier.llm.disguise import Disguise
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message
+from falsifier.llm.prompts import (
+    DEFAULT_PROMPT_TOKENS,
+    Variant,
+    View,
+    build_prompt,
+    render,
+    trimmed,
+    variant_named,
+)
 from falsifier.llm.replies import ReplyForm
 from falsifier.problem import Problem
+from falsifier.proposers.protocol import Proposer
 from falsifier.space import Candidate
+
+# Trajectories of older evaluations are let go, except for the best ones: prompts tell of few old samples.
+_KEPT_RECENT = 40
+_KEPT_BEST = 10
 
 
 class LLMProposer:
@@ -20,6 +36,10 @@ class LLMProposer:
         variant: what its prompts tell.
         on_exchange: called with every question and answer.
         sample: which of several runs with equal questions this is.
+        prompt_tokens: most tokens of a prompt, by estimate.
+        anonymous: whether the model is told neutral names only.
+        fallback: who goes on when the model cannot be reached or gives no valid reply; None: the error ends
+            the run.
     """
 
     def __init__(
@@ -30,12 +50,19 @@ class LLMProposer:
         *,
         on_exchange: OnExchange = lambda _: None,
         sample: int = 0,
+        prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+        anonymous: bool = False,
+        fallback: Proposer | None = None,
     ) -> None:
-        self._view = view
+        self._disguise = Disguise.of(view) if anonymous else None
+        self._view = self._disguise.view if self._disguise else view
         self._chat = chat
         self._variant = variant
         self._on_exchange = on_exchange
         self._sample = sample
+        self._prompt_tokens = prompt_tokens
+        self._fallback = fallback
+        self._handed_over = False
         self._evaluations: list[Evaluation] = []
         self._pending: list[Candidate] = []
 
@@ -44,59 +71,77 @@ class LLMProposer:
         """Model and prompt variant."""
         return f"{self._chat.model} {self._variant.name}"
 
+    @property
+    def handed_over(self) -> bool:
+        """Whether the fallback has taken over for good."""
+        return self._handed_over
+
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n new candidates.
 
         Raises:
-            ChatError: when the model cannot be reached or gives no valid reply.
+            ChatError: when the model cannot be reached or gives no valid reply, and there is no fallback.
         """
         candidates: list[Candidate] = []
         while len(candidates) < n:
-            found = self._ask_once(n - len(candidates))
-            candidates += found
+            if self._handed_over and self._fallback is not None:
+                return candidates + self._fallback.ask(n - len(candidates))
+            try:
+                found = self._ask_once(n - len(candidates))
+            except ChatError:
+                if self._fallback is None:
+                    raise
+                self._handed_over = True
+                continue
             self._pending += found
+            candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
         return candidates
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, whoever proposed their candidates."""
-        self._evaluations += evaluations
-        told = {e.candidate.key for e in evaluations}
-        self._pending = [c for c in self._pending if c.key not in told]
+        if self._fallback is not None:
+            self._fallback.tell(evaluations)
+        told = [self._disguise.hidden(e) for e in evaluations] if self._disguise else evaluations
+        keys = {e.candidate.key for e in told}
+        self._pending = [c for c in self._pending if c.key not in keys]
+        self._evaluations = _thinned([*self._evaluations, *told])
 
     def _ask_once(self, count: int) -> list[Candidate]:
-        view, variant = self._view, self._variant
-        form = ReplyForm(view.space, named=variant.has("names"), free=variant.has("freedom"), count=count)
+        variant = self._variant
+        form = ReplyForm(
+            self._view.space, named=variant.has("names"), free=variant.has("freedom"), count=count
+        )
+        prompt = build_prompt(self._view, variant, self._evaluations, pending=self._pending, count=count)
         request = ChatRequest(
-            messages=render(
-                build_prompt(view, variant, self._evaluations, pending=self._pending, count=count)
-            ),
+            messages=render(trimmed(prompt, self._prompt_tokens)),
             reply_schema=form.schema(),
             sample=self._sample,
         )
-        return converse(
-            self._chat,
-            request,
-            lambda text: self._new(form.read(text, origin=self.name))[:count],
-            self._on_exchange,
-        )
+        try:
+            return converse(
+                self._chat,
+                request,
+                lambda text: self._new(form.read(text, origin=self.name))[:count],
+                self._on_exchange,
+            )
+        except NoValidReplyError:
+            raise
+        except ChatError as error:
+            if self._fallback is not None:  # so that a resumed run hands over at the same place
+                self._on_exchange(_unanswered(self._chat, request, error))
+            raise
 
     def _new(self, candidates: list[Candidate]) -> list[Candidate]:
         """Candidates that were not seen before.
 
         Raises:
-            RejectedReply: when there is none.
+            RejectedReplyError: when there is none.
         """
         seen = {e.candidate.key: f"sample {i}" for i, e in enumerate(self._evaluations, start=1)}
         seen |= {c.key: "one that was proposed already" for c in self._pending}
-        repeated = ""
-        new: dict[tuple[object, ...], Candidate] = {}
-        for candidate in candidates:
-            if candidate.key in seen:
-                repeated = seen[candidate.key]
-            else:
-                new.setdefault(candidate.key, candidate)
+        new = {c.key: c for c in candidates if c.key not in seen}
         if not new:
-            raise RejectedReply(f"it repeats {repeated}")
+            raise RejectedReplyError(f"it repeats {seen[candidates[0].key]}")
         return list(new.values())
 
 
@@ -107,17 +152,62 @@ def make_llm_proposer(
     variant: str | None = None,
     on_exchange: OnExchange = lambda _: None,
     sample: int = 0,
+    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+    anonymous: bool = False,
+    fallback: Proposer | None = None,
 ) -> LLMProposer:
-    """Make the proposer for a problem; variant None means the default one.
+    """Make the proposer for a problem; variant None means the default one. See LLMProposer.
 
     Raises:
         SpecError: for an unknown variant.
     """
-    return LLMProposer(View.of(problem), chat, variant_named(variant), on_exchange=on_exchange, sample=sample)
+    return LLMProposer(
+        View.of(problem),
+        chat,
+        variant_named(variant),
+        on_exchange=on_exchange,
+        sample=sample,
+        prompt_tokens=prompt_tokens,
+        anonymous=anonymous,
+        fallback=fallback,
+    )
 
 
 def preview(
-    problem: Problem, *, variant: str | None = None, evaluations: Sequence[Evaluation] = (), count: int = 1
+    problem: Problem,
+    *,
+    variant: str | None = None,
+    evaluations: Sequence[Evaluation] = (),
+    count: int = 1,
+    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+    anonymous: bool = False,
 ) -> tuple[Message, ...]:
     """Messages that would be sent next; sends nothing."""
-    return render(build_prompt(View.of(problem), variant_named(variant), evaluations, count=count))
+    view = View.of(problem)
+    if anonymous:
+        disguise = Disguise.of(view)
+        view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
+    prompt = build_prompt(view, variant_named(variant), evaluations, count=count)
+    return render(trimmed(prompt, prompt_tokens))
+
+
+def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
+    return Exchange(
+        model=chat.model,
+        messages=request.messages,
+        parameters=dict(chat.parameters),
+        reply=None,
+        problem=str(error),
+    )
+
+
+def _thinned(evaluations: list[Evaluation]) -> list[Evaluation]:
+    """Return the same evaluations without those trajectories that no prompt will tell."""
+    if len(evaluations) <= _KEPT_RECENT:
+        return evaluations
+    judged = sorted((e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None)
+    kept = {i for _, i in judged[:_KEPT_BEST]} | set(range(len(evaluations) - _KEPT_RECENT, len(evaluations)))
+    return [
+        e if i in kept or e.trajectory is None else replace(e, trajectory=None)
+        for i, e in enumerate(evaluations)
+    ]

@@ -3,10 +3,12 @@
 from falsifier.llm.prompts.blocks import Prompt
 from falsifier.llm.prompts.build import build_prompt
 from falsifier.llm.prompts.render import render
+from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS, trimmed
 from falsifier.llm.prompts.variants import DEFAULT_VARIANT, VARIANTS, Variant, variant_named
 from falsifier.llm.prompts.view import View
 
 __all__ = [
+    "DEFAULT_PROMPT_TOKENS",
     "DEFAULT_VARIANT",
     "VARIANTS",
     "Prompt",
@@ -14,5 +16,6 @@ __all__ = [
     "View",
     "build_prompt",
     "render",
+    "trimmed",
     "variant_named",
 ]

@@ -65,6 +65,7 @@ class InputLine(_Block):
     kind: str = "real"
     low: str
     high: str
+    control_points: int
     times: tuple[str, ...]
     interpolation: Interpolation
     hold: float | None = None
@@ -98,9 +99,12 @@ class SampleLines(_Block):
     number: int
     mark: str = Field(default="", description="Why it is shown although it is old: 'best so far', ...")
     inputs: tuple[str, ...]
-    robustness: str | None
+    robustness: str = Field(default="", description="Empty: there is no verdict.")
     failure: str = ""
     facts: tuple[str, ...] = Field(default=(), description="What was seen, one line each.")
+    details: tuple[str, ...] = Field(
+        default=(), description="More of it, the first to go when room is short."
+    )
 
 
 class HistoryBlock(_Block):

@@ -4,28 +4,33 @@ import json
 from collections.abc import Sequence
 
 from falsifier.evaluation import Evaluation
+from falsifier.llm.prompts import choices, observations, selection
+from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
-    AdviceBlock,
     DimensionLine,
     HistoryBlock,
+    InputLine,
     InputsBlock,
     OutputsBlock,
+    ParameterLine,
     Prompt,
     ReplyBlock,
     RequirementBlock,
     SampleLines,
     SignalLine,
+    SystemBlock,
     TaskBlock,
 )
-from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, runs, signed
+from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
+from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.signals import even_times
-from falsifier.space import Candidate
-from falsifier.trajectory import Trajectory
+from falsifier.space import Candidate, InputRange, ParameterRange
+from falsifier.stl import in_words
 
-# Most recent samples that a prompt tells.
-RECENT = 10
+# Control-point times that are told one by one; of more only the distance.
+_MOST_TIMES = 25
 
 
 def build_prompt(
@@ -48,146 +53,189 @@ def build_prompt(
     return Prompt(
         variant=variant.name,
         task=TaskBlock(knows_requirement=variant.has("requirement"), count=count),
-        requirement=_requirement(view) if variant.has("requirement") else None,
-        outputs=_outputs(view) if variant.has("outputs") else None,
-        inputs=_inputs(view, variant),
+        system=_system(view) if variant.has("system") else None,
+        requirement=_requirement(view, variant) if variant.has("requirement") else None,
+        outputs=_outputs(view, variant) if variant.has("outputs") else None,
+        inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
         history=_history(view, variant, evaluations, pending),
-        advice=_advice(variant) if variant.has("advice") else None,
+        advice=advice(view, variant) if variant.has("advice") else None,
         reply=_reply(view, variant, count),
     )
 
 
-def _requirement(view: View) -> RequirementBlock:
-    return RequirementBlock(formula=str(view.requirement.formula))
+def _system(view: View) -> SystemBlock | None:
+    info = view.info
+    return (
+        SystemBlock(name=info.name, description=info.description) if info.name or info.description else None
+    )
 
 
-def _outputs(view: View) -> OutputsBlock:
-    searched = set(view.space.names)
-    names = [name for name in view.requirement.formula.signals if name not in searched]
-    return OutputsBlock(signals=tuple(SignalLine(name=name) for name in names))
+def _requirement(view: View, variant: Variant) -> RequirementBlock:
+    formula = view.requirement.formula
+    if not variant.has("reading"):
+        return RequirementBlock(formula=str(formula))
+    return RequirementBlock(
+        formula=str(formula),
+        reading=in_words(formula),
+        description=view.requirement.description,
+        terms=tuple(str(e) for e in formula.expressions),
+    )
 
 
-def _inputs(view: View, variant: Variant) -> InputsBlock:
+def _outputs(view: View, variant: Variant) -> OutputsBlock:
+    if not variant.has("system"):
+        return OutputsBlock(signals=tuple(SignalLine(name=name) for name in view.formula_outputs))
+    others = [n for n in view.experiment.outputs if n not in view.formula_outputs]
+    return OutputsBlock(
+        signals=tuple(
+            SignalLine(
+                name=name, unit=view.unit(name), description=view.description(name), kind=view.kind(name)
+            )
+            for name in (*view.formula_outputs, *others)
+        )
+    )
+
+
+def _dimensions(view: View, variant: Variant) -> InputsBlock:
+    """Numbers to choose, with their meanings or without."""
+    clock = decimals_for(view.space.stop_time, 4)
     dimensions = []
     for i, dimension in enumerate(view.space.dimensions, start=1):
         low, high = bounds(dimension.low, dimension.high)
-        meaning = ""
-        if variant.has("names"):
-            at = "" if dimension.time is None else f" at t = {plain(dimension.time, _time_decimals(view))} s"
-            meaning = f"{dimension.name}{at}"
+        at = "" if dimension.time is None else f" at t = {plain(dimension.time, clock)} s"
+        meaning = f"{dimension.name}{at}" if variant.has("names") else ""
         dimensions.append(DimensionLine(number=i, meaning=meaning, low=low, high=high))
     return InputsBlock(stop_time=number(view.space.stop_time), dimensions=tuple(dimensions))
 
 
-def _time_decimals(view: View) -> int:
-    return decimals_for(view.space.stop_time, 4)
+def _named_inputs(view: View, variant: Variant) -> InputsBlock:
+    """Signals and parameters to choose, with everything that is known of them."""
+    free = variant.has("freedom")
+    return InputsBlock(
+        stop_time=number(view.space.stop_time),
+        inputs=tuple(_input(view, r, free=free) for r in view.space.inputs),
+        parameters=tuple(_parameter(p) for p in view.space.parameters),
+    )
+
+
+def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
+    low, high = bounds(r.low, r.high)
+    times = even_times(r.control_points, stop_time=view.space.stop_time, interpolation=r.interpolation)
+    told = tuple(number(round(t, 6)) for t in times)
+    if len(told) > _MOST_TIMES:
+        told = (*told[:3], "...", told[-1])
+    freedom = r.free if free else None
+    return InputLine(
+        name=r.name,
+        unit=r.unit,
+        description=r.description,
+        kind=view.kind(r.name),
+        low=low,
+        high=high,
+        control_points=r.control_points,
+        times=told,
+        interpolation=r.interpolation,
+        hold=r.hold,
+        max_control_points=freedom and freedom.max_control_points,
+        min_interval=freedom and freedom.min_interval,
+    )
+
+
+def _parameter(p: ParameterRange) -> ParameterLine:
+    low, high = bounds(p.low, p.high)
+    nominal = "" if p.nominal is None else number(p.nominal)
+    return ParameterLine(
+        name=p.name, unit=p.unit, description=p.description, low=low, high=high, nominal=nominal
+    )
 
 
 def _history(
     view: View, variant: Variant, evaluations: Sequence[Evaluation], pending: Sequence[Candidate]
 ) -> HistoryBlock | None:
-    told = [(i, e) for i, e in enumerate(evaluations, start=1) if e.verdict is not None]
-    samples = tuple(_sample(view, variant, i, e) for i, e in told[-RECENT:])
-    if not samples and not pending:
+    if variant.has("selection"):
+        chosen = selection.recent_best_and_different(view, evaluations)
+    else:
+        chosen = selection.recent(evaluations)
+    if not chosen and not pending:
         return None
+    judged = sum(e.verdict is not None or variant.has("failures") for e in evaluations)
     return HistoryBlock(
-        samples=samples,
-        omitted=len(told) - len(samples),
+        samples=tuple(_sample(view, variant, i, mark, evaluations[i]) for i, mark in chosen.items()),
+        omitted=judged - len(chosen),
         pending=tuple("; ".join(_chosen(view, variant, c)) for c in pending),
+        notes=tuple(_notes(view, evaluations)) if variant.has("observations") else (),
     )
 
 
-def _sample(view: View, variant: Variant, index: int, evaluation: Evaluation) -> SampleLines:
-    facts = []
-    trajectory = evaluation.trajectory
-    if variant.has("values") and trajectory is not None:
-        facts += _values_at_control_points(view, trajectory)
-    if variant.has("critical"):
-        facts.append(_decided(view, evaluation))
+def _sample(view: View, variant: Variant, index: int, mark: str, evaluation: Evaluation) -> SampleLines:
+    inputs = _chosen(view, variant, evaluation.candidate)
+    if evaluation.robustness is None:
+        return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
+    rich = variant.has("observations")
+    digits = observations.ROBUSTNESS_DIGITS if rich else 3
     return SampleLines(
-        number=index,
-        inputs=_chosen(view, variant, evaluation.candidate),
-        robustness=signed(evaluation.robustness or 0.0),
-        facts=tuple(facts),
+        number=index + 1,
+        mark=mark,
+        inputs=inputs,
+        robustness=signed(evaluation.robustness, digits),
+        facts=tuple(
+            observations.facts(view, evaluation) if rich else published_facts(view, variant, evaluation)
+        ),
+        details=tuple(observations.details(view, evaluation)) if rich else (),
     )
+
+
+def _failure(evaluation: Evaluation) -> str:
+    return f"no verdict, the simulation {evaluation.status}: {evaluation.reason}".rstrip(": ")
 
 
 def _chosen(view: View, variant: Variant, candidate: Candidate) -> tuple[str, ...]:
     if not variant.has("names"):
-        return (f"point = {runs([float(v) for v in view.space.encode(candidate)])}",)
-    signals = (f"{r.name} = {runs(candidate.signals[r.name].values)}" for r in view.space.inputs)
-    parameters = (f"{p.name} = {number(candidate.parameters[p.name])}" for p in view.space.parameters)
-    return (*signals, *parameters)
+        return choices.as_point(view, candidate)
+    return (choices.as_signals if variant.has("system") else choices.as_values)(view, candidate)
 
 
-def _values_at_control_points(view: View, trajectory: Trajectory) -> list[str]:
-    times = sorted(
-        {
-            t
-            for r in view.space.inputs
-            for t in even_times(
-                r.control_points, stop_time=view.space.stop_time, interpolation=r.interpolation
-            )
-        }
-    ) or [0.0, view.space.stop_time]
-    lines = []
-    for name in _formula_outputs(view):
-        if name in trajectory.columns:
-            column = trajectory[name]
-            decimals = decimals_for(float(abs(column).max()))
-            values = [f"{column[trajectory.index(t)]:.{decimals}f} at {_clock(view, t)}" for t in times]
-            lines.append(f"{name}: {', '.join(values)}")
-    return lines
-
-
-def _decided(view: View, evaluation: Evaluation) -> str:
-    verdict = evaluation.verdict
-    assert verdict is not None
-    values = []
-    for name in view.requirement.formula.signals:
-        if name in verdict.values:
-            values.append(f"{name} = {_valued(evaluation.trajectory, name, verdict.values[name])}")
-    with_values = f" with {', '.join(values)}" if values else ""
-    return f"the robustness was decided at t = {_clock(view, verdict.critical_time)}{with_values}"
-
-
-def _valued(trajectory: Trajectory | None, name: str, value: float) -> str:
-    if trajectory is None or name not in trajectory.columns:
-        return number(value)
-    return f"{value:.{decimals_for(float(abs(trajectory[name]).max()))}f}"
-
-
-def _formula_outputs(view: View) -> list[str]:
-    return [name for name in view.requirement.formula.signals if name not in view.space.names]
-
-
-def _clock(view: View, time: float) -> str:
-    return f"{time:.{decimals_for(view.space.stop_time, 3)}f} s"
-
-
-def _advice(variant: Variant) -> AdviceBlock:
-    lines = ["Use the output values of the earlier samples to work out how each input moves the outputs."]
-    if variant.has("critical"):
-        lines.append(
-            "Look at the time that decided each robustness value, and change the inputs so that the signals "
-            "there move towards the wrong side."
-        )
-    return AdviceBlock(lines=tuple(lines))
+def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:
+    """What the samples show together."""
+    values = [e.robustness for e in evaluations if e.robustness is not None]
+    distinct = {f"{v:.9g}" for v in values}
+    if len(values) < 2 or len(distinct) > 1:
+        return []
+    return [
+        f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its size shows "
+        "no direction. Go by what it hides: how near a condition came to being true, how short a stay was, "
+        "how far a signal was from where it switches."
+    ]
 
 
 def _reply(view: View, variant: Variant, count: int) -> ReplyBlock:
     space = view.space
     one: dict[str, object] = {"rationale": "why these values"}
+    free = variant.has("freedom") and any(r.free for r in space.inputs)
     if not variant.has("names"):
         one["point"] = [_middle(d.low, d.high) for d in space.dimensions]
     else:
         if space.inputs:
-            one["signals"] = [
-                {"name": r.name, "values": [_middle(r.low, r.high)] * r.control_points} for r in space.inputs
-            ]
+            one["signals"] = [_example(r, free=free) for r in space.inputs]
         if space.parameters:
             one["parameters"] = [{"name": p.name, "value": _middle(p.low, p.high)} for p in space.parameters]
-    return ReplyBlock(example=json.dumps(one if count == 1 else {"candidates": [one]}))
+    example = json.dumps(one if count == 1 else {"candidates": [one]})
+    return ReplyBlock(example=example, notes=_FREE_NOTES if free else ())
+
+
+_FREE_NOTES = (
+    'An empty "times" means that the values are evenly spaced control points from 0 to the end, however '
+    "many there are; with constant interpolation they are equally long pieces.",
+    'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is kept.',
+    'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
+)
+
+
+def _example(r: InputRange, *, free: bool) -> dict[str, object]:
+    values = [_middle(r.low, r.high)] * min(r.control_points, _MOST_TIMES)
+    if not free:
+        return {"name": r.name, "values": [_middle(r.low, r.high)] * r.control_points}
+    return {"name": r.name, "interpolation": r.interpolation, "times": [], "values": values}
 
 
 def _middle(low: float, high: float) -> float:

@@ -7,6 +7,7 @@ from math import floor, isfinite, log10
 # Digits of the largest magnitude that a column of numbers shows.
 _COLUMN_DIGITS = 4
 _BOUND_DIGITS = 10
+_CHOSEN_DIGITS = 7
 
 
 def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
@@ -55,13 +56,13 @@ def _bound(value: float, rounding: str) -> str:
     return number(float(rounded))
 
 
-def number(value: float) -> str:
-    """Shortest text of a number with at most ten digits.
+def number(value: float, digits: int = _BOUND_DIGITS) -> str:
+    """Shortest text of a number with at most so many digits.
 
     >>> number(100.0), number(0.1 + 0.2)
     ('100', '0.3')
     """
-    return f"{value:.{_BOUND_DIGITS}g}"
+    return f"{value:.{digits}g}"
 
 
 def runs(values: Sequence[float]) -> str:
@@ -77,7 +78,7 @@ def runs(values: Sequence[float]) -> str:
         end = start
         while end < len(values) and values[end] == values[start]:
             end += 1
-        text = number(values[start])
+        text = number(values[start], _CHOSEN_DIGITS)
         length = end - start
         is_long = length >= shortest_run and len(values) > 3 * shortest_run
         parts += [f'"{text} x {length}"'] if is_long else [text] * length

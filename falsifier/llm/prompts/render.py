@@ -1,71 +1,140 @@
 """From a prompt to messages: pure text, block by block."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.blocks import (
     AdviceBlock,
     HistoryBlock,
+    InputLine,
     InputsBlock,
     OutputsBlock,
+    ParameterLine,
     Prompt,
     ReplyBlock,
     RequirementBlock,
     SampleLines,
+    SignalLine,
+    SystemBlock,
     TaskBlock,
 )
 
 
 def render(prompt: Prompt) -> tuple[Message, ...]:
     """Messages of a prompt: the task and what stays the same first, what changes last."""
-    standing: list[str] = [_task(prompt.task)]
-    if prompt.requirement is not None:
-        standing.append(_requirement(prompt.requirement))
-    if prompt.outputs is not None:
-        standing.append(_outputs(prompt.outputs))
-    standing.append(_inputs(prompt.inputs))
-    if prompt.advice is not None:
-        standing.append(_advice(prompt.advice))
-    standing.append(_reply(prompt.reply, prompt.task.count))
     return (
-        Message(role="system", content="\n\n".join(standing)),
-        Message(role="user", content=_history(prompt.history, prompt.task.count)),
+        Message(role="system", content="\n\n".join(_standing(prompt))),
+        Message(role="user", content="\n\n".join(_changing(prompt.history, prompt.task.count))),
     )
+
+
+def _standing(prompt: Prompt) -> Iterator[str]:
+    yield _task(prompt.task)
+    if prompt.system is not None:
+        yield _system(prompt.system)
+    if prompt.requirement is not None:
+        yield _requirement(prompt.requirement)
+    if prompt.outputs is not None:
+        yield _outputs(prompt.outputs)
+    yield _inputs(prompt.inputs)
+    if prompt.advice is not None:
+        yield _advice(prompt.advice)
+    yield _reply(prompt.reply, prompt.task.count)
 
 
 def _task(task: TaskBlock) -> str:
-    aim = (
-        "Find inputs for which the requirement below is violated, in as few simulations as possible."
-        if task.knows_requirement
-        else "Find a point at which its value is negative, in as few simulations as possible."
-    )
-    what = (
-        "You search for a counterexample: a system is simulated with inputs that you choose, and a monitor "
-        "returns the robustness, which says by how much its requirement holds."
-        if task.knows_requirement
-        else "You minimise an unknown function, the robustness of a simulated system."
-    )
     sign = "Robustness below 0 is a violation; exactly 0 is not. Smaller is closer to a violation."
-    return f"{what} {aim} {sign}"
+    if not task.knows_requirement:
+        return (
+            "You minimise an unknown function, the robustness of a simulated system. Find a point at which "
+            f"its value is negative, in as few simulations as possible. {sign}"
+        )
+    return (
+        "You search for a counterexample: a system is simulated with inputs that you choose, and a monitor "
+        "returns the robustness, which says by how much its requirement holds. Find inputs for which the "
+        f"requirement below is violated, in as few simulations as possible. {sign}"
+    )
+
+
+def _system(block: SystemBlock) -> str:
+    return f"System: {block.name}. {block.description}".rstrip(" .") + "."
 
 
 def _requirement(block: RequirementBlock) -> str:
-    return f"Requirement, in Signal Temporal Logic with times in seconds:\n{block.formula}"
+    lines = ["Requirement, in Signal Temporal Logic with times in seconds:", block.formula]
+    if block.reading:
+        lines.append(f"In words: {block.reading}")
+    if block.description:
+        lines.append(f"Its author says: {block.description}")
+    if block.terms:
+        lines.append(f"Terms that are told like signals of their own: {'; '.join(block.terms)}")
+    return "\n".join(lines)
 
 
 def _outputs(block: OutputsBlock) -> str:
-    names = ", ".join(s.name for s in block.signals)
-    return f"Output signals: {names or 'none; the requirement speaks of inputs only'}"
+    if not block.signals:
+        return "Output signals: none; the requirement speaks of inputs only."
+    if not any(s.unit or s.description or s.kind != "real" for s in block.signals):
+        return f"Output signals: {', '.join(s.name for s in block.signals)}"
+    return "\n".join(("Recorded signals:", *(_signal(s) for s in block.signals)))
+
+
+def _signal(line: SignalLine) -> str:
+    kind = "" if line.kind == "real" else f", {line.kind}"
+    return f"- {line.name}{_bracketed(line.unit)}{kind}{_described(line.description)}"
 
 
 def _inputs(block: InputsBlock) -> str:
-    lines = [
-        f"You choose {len(block.dimensions)} numbers. The simulation runs from 0 to {block.stop_time} s."
-    ]
-    for d in block.dimensions:
-        meaning = f": {d.meaning}" if d.meaning else ""
-        lines.append(f"{d.number}{meaning}, from {d.low} to {d.high}")
+    length = f"The simulation runs from 0 to {block.stop_time} s."
+    if block.dimensions:
+        lines = [f"You choose {len(block.dimensions)} numbers. {length}"]
+        for d in block.dimensions:
+            meaning = f": {d.meaning}" if d.meaning else ""
+            lines.append(f"{d.number}{meaning}, from {d.low} to {d.high}")
+        return "\n".join(lines)
+    lines = [f"What you choose. {length}"]
+    lines += [_input(line) for line in block.inputs]
+    lines += [_parameter(line) for line in block.parameters]
     return "\n".join(lines)
+
+
+def _input(line: InputLine) -> str:
+    whole = "" if line.kind == "real" else f" {line.kind} values"
+    one = line.control_points == 1
+    parts = [
+        f"- input signal {line.name}{_bracketed(line.unit)}{_described(line.description)}",
+        f"{whole} from {line.low} to {line.high}".strip(),
+        "one value for the whole time"
+        if one
+        else f"{line.control_points} control points at t = {', '.join(line.times)} s",
+    ]
+    if not one:
+        parts.append(_INTERPOLATION[line.interpolation])
+    if line.hold is not None:
+        parts.append(f"sampled and held every {line.hold:g} s")
+    text = "; ".join(parts)
+    if line.max_control_points is None:
+        return text
+    return (
+        f"{text}. Instead you may choose number, times and interpolation (pchip, linear or constant) of the "
+        f"control points yourself: at most {line.max_control_points}, at least {line.min_interval:g} s apart"
+    )
+
+
+_INTERPOLATION = {
+    "pchip": "pchip (monotone cubic) interpolation",
+    "linear": "linear interpolation",
+    "constant": "each value held until the next control point",
+}
+
+
+def _parameter(line: ParameterLine) -> str:
+    nominal = f", usually {line.nominal}" if line.nominal else ""
+    described = _described(line.description)
+    return (
+        f"- number {line.name}{_bracketed(line.unit)}{described}; from {line.low} to {line.high}{nominal}; "
+        "one value for the whole simulation"
+    )
 
 
 def _advice(block: AdviceBlock) -> str:
@@ -84,29 +153,32 @@ def _reply(block: ReplyBlock, count: int) -> str:
     )
 
 
-def _history(block: HistoryBlock | None, count: int) -> str:
-    wanted = "the first sample" if block is None else "the next sample"
-    if count > 1:
-        wanted = f"{wanted}s ({count} different ones)"
-    request = f"Propose {wanted}."
+def _changing(block: HistoryBlock | None, count: int) -> Iterator[str]:
+    wanted = f"{count} different samples" if count > 1 else "sample"
     if block is None:
-        return request
-    parts: list[str] = []
+        yield f"Propose the first {wanted}."
+        return
     if block.samples:
-        shown = f" (the {len(block.samples)} most recent)" if block.omitted else ""
-        parts.append(f"Samples so far{shown}, in the order in which they were simulated:")
-        parts.extend(_sample(s) for s in block.samples)
+        shown = f", {len(block.samples)} of {len(block.samples) + block.omitted}" if block.omitted else ""
+        yield f"Samples so far{shown}, in the order in which they were simulated:"
+        yield from (_sample(s) for s in block.samples)
+    yield from block.notes
     if block.pending:
-        parts.append("Already proposed, results not known yet: " + " | ".join(block.pending))
-    return "\n\n".join((*parts, f"{request} Do not repeat an earlier one."))
+        yield "\n".join(("Already proposed, results not known yet:", *block.pending))
+    yield f"Propose the next {wanted}. Do not repeat an earlier one."
 
 
 def _sample(sample: SampleLines) -> str:
-    return "\n".join(_sample_lines(sample))
+    mark = f" ({sample.mark})" if sample.mark else ""
+    lines = [f"Sample {sample.number}{mark}: {'; '.join(sample.inputs)}"]
+    lines.append(f"  robustness {sample.robustness}" if sample.robustness else f"  {sample.failure}")
+    lines += [f"  {line}" for line in (*sample.facts, *sample.details)]
+    return "\n".join(lines)
 
 
-def _sample_lines(sample: SampleLines) -> Iterable[str]:
-    yield f"Sample {sample.number}: {'; '.join(sample.inputs)}"
-    yield f"  robustness {sample.robustness}"
-    for fact in sample.facts:
-        yield f"  {fact}"
+def _bracketed(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _described(description: str) -> str:
+    return f": {description}" if description else ""

@@ -35,3 +35,12 @@ class View:
     def description(self, name: str) -> str:
         """Description of a signal, empty where there is none."""
         return self.info[name].description if name in self.info else ""
+
+    def kind(self, name: str) -> str:
+        """Type of a signal's values; real where unknown."""
+        return self.info[name].kind if name in self.info else "real"
+
+    @property
+    def formula_outputs(self) -> tuple[str, ...]:
+        """Signals of the formula that are not searched inputs, in order of appearance."""
+        return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)

@@ -1,0 +1,125 @@
+"""Neutral names: what a model is told says nothing of whose system it is."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+from falsifier.evaluation import Evaluation
+from falsifier.llm.prompts.view import View
+from falsifier.model import ModelInfo
+from falsifier.problem import Requirement
+from falsifier.space import Candidate
+from falsifier.stl.expression import Name
+from falsifier.trajectory import Trajectory
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Disguise:
+    """A view under neutral names, without units and descriptions, and the way back.
+
+    Attributes:
+        real: the view as it is.
+        names: neutral name by real name: inputs u1, u2, ..., parameters p1, ..., other signals y1, ...
+    """
+
+    real: View
+    names: Mapping[str, str]
+
+    @classmethod
+    def of(cls, view: View) -> "Disguise":
+        """Disguise for a view."""
+        inputs = [r.name for r in view.space.inputs]
+        parameters = [p.name for p in view.space.parameters]
+        searched = {*inputs, *parameters}
+        seen = dict.fromkeys(
+            (*view.requirement.formula.signals, *view.experiment.outputs, *(v.name for v in view.info.inputs))
+        )
+        others = [name for name in seen if name not in searched]
+        return cls(
+            view,
+            {
+                **{name: f"u{i}" for i, name in enumerate(inputs, start=1)},
+                **{name: f"p{i}" for i, name in enumerate(parameters, start=1)},
+                **{name: f"y{i}" for i, name in enumerate(others, start=1)},
+            },
+        )
+
+    @property
+    def view(self) -> View:
+        """What may be told."""
+        real, names = self.real, self.names
+        return View(
+            info=ModelInfo(
+                name="",
+                variables=tuple(
+                    replace(v, name=names[v.name], unit="", display_unit="", description="")
+                    for v in real.info.variables
+                    if v.name in names
+                ),
+            ),
+            requirement=Requirement("R", renamed(real.requirement.formula, names)),
+            space=replace(
+                real.space,
+                inputs=tuple(
+                    replace(r, name=names[r.name], unit="", description="") for r in real.space.inputs
+                ),
+                parameters=tuple(
+                    replace(p, name=names[p.name], unit="", description="") for p in real.space.parameters
+                ),
+            ),
+            experiment=replace(real.experiment, outputs=tuple(names[n] for n in real.experiment.outputs)),
+        )
+
+    def hidden(self, evaluation: Evaluation) -> Evaluation:
+        """Return an evaluation under neutral names; messages of the model are left out."""
+        verdict, trajectory = evaluation.verdict, evaluation.trajectory
+        return replace(
+            evaluation,
+            candidate=self.hidden_candidate(evaluation.candidate),
+            verdict=verdict
+            and replace(
+                verdict, predicate=self._predicate(verdict.predicate), values=self._told(verdict.values)
+            ),
+            trajectory=trajectory and Trajectory(trajectory.times, self._told(trajectory.columns)),
+            reason="",
+            log=(),
+        )
+
+    def hidden_candidate(self, candidate: Candidate) -> Candidate:
+        """Return a candidate under neutral names."""
+        return Candidate(self._told(candidate.signals), self._told(candidate.parameters))
+
+    def revealed(self, candidate: Candidate) -> Candidate:
+        """Return a candidate under its real names, also where its rationale mentions them."""
+        real = {neutral: name for name, neutral in self.names.items()}
+        return replace(
+            candidate,
+            signals={real[n]: s for n, s in candidate.signals.items()},
+            parameters={real[n]: v for n, v in candidate.parameters.items()},
+            rationale=re.sub(r"\b[upy]\d+\b", lambda m: real.get(m[0], m[0]), candidate.rationale),
+        )
+
+    def _told(self, values: Mapping[str, T]) -> dict[str, T]:
+        return {self.names[n]: v for n, v in values.items() if n in self.names}
+
+    def _predicate(self, text: str) -> str:
+        found = (p for p in self.real.requirement.formula.predicates if str(p) == text)
+        return str(renamed(next(found, ""), self.names))
+
+
+def renamed(node: T, names: Mapping[str, str]) -> T:
+    """Return the same formula or expression over other names."""
+    return _renamed(node, names)  # type: ignore[no-any-return]
+
+
+def _renamed(node: Any, names: Mapping[str, str]) -> Any:
+    if isinstance(node, Name):
+        return Name(names[node.name])
+    if isinstance(node, tuple):
+        return tuple(_renamed(part, names) for part in node)
+    if is_dataclass(node) and not isinstance(node, type):
+        return type(node)(*(_renamed(getattr(node, f.name), names) for f in fields(node)))
+    return node

@@ -1,0 +1,66 @@
+"""What was chosen in a sample, as a model would write it itself."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from falsifier.llm.prompts.numbers import number, runs
+from falsifier.llm.prompts.view import View
+from falsifier.signals import Signal, even_times
+from falsifier.space import Candidate, InputRange
+
+
+def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
+    """The numbers in the order of the dimensions."""
+    return (f"point = {runs([float(v) for v in view.space.encode(candidate)])}",)
+
+
+def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
+    """Values of each input at the fixed control points, by name, and parameters."""
+    return (
+        *(f"{r.name} = {runs(_fixed_values(view, r, candidate.signals[r.name]))}" for r in view.space.inputs),
+        *_parameters(view, candidate),
+    )
+
+
+def as_signals(view: View, candidate: Candidate) -> tuple[str, ...]:
+    """Each input with its own control points and interpolation, and parameters."""
+    return (
+        *(
+            f"{r.name}: {signal_text(candidate.signals[r.name], stop_time=view.space.stop_time)}"
+            for r in view.space.inputs
+        ),
+        *_parameters(view, candidate),
+    )
+
+
+def signal_text(signal: Signal, *, stop_time: float) -> str:
+    """Parameterization of one signal.
+
+    >>> signal_text(Signal((0.0, 2.5), (100.0, 0.0), "constant"), stop_time=50.0)
+    'constant pieces from [time, value] points [[0, 100], [2.5, 0]]'
+    >>> signal_text(Signal.evenly([3.0, 3.0], stop_time=50.0), stop_time=50.0)
+    'constant 3'
+    """
+    if len(set(signal.values)) == 1:
+        return f"constant {number(signal.values[0])}"
+    manner = "constant pieces" if signal.interpolation == "constant" else signal.interpolation
+    even = even_times(len(signal.times), stop_time=stop_time, interpolation=signal.interpolation)
+    if np.allclose(signal.times, even, rtol=0, atol=1e-9 * max(stop_time, 1.0)):
+        return f"{manner}, {len(signal.values)} evenly spaced values {runs(signal.values)}"
+    points = list(zip(signal.times, signal.values, strict=True))
+    if signal.interpolation == "constant":
+        points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
+    told = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
+    return f"{manner} from [time, value] points [{told}]"
+
+
+def _fixed_values(view: View, r: InputRange, signal: Signal) -> tuple[float, ...]:
+    times = even_times(r.control_points, stop_time=view.space.stop_time, interpolation=r.interpolation)
+    if signal.times == times:
+        return signal.values
+    return tuple(float(v) for v in signal.held(None).sample(np.asarray(times)))
+
+
+def _parameters(view: View, candidate: Candidate) -> Iterator[str]:
+    return (f"{p.name} = {number(candidate.parameters[p.name])}" for p in view.space.parameters)

@@ -1,0 +1,189 @@
+"""Courses of signals in words: change lists, extrema, stretches, oscillations, dense bursts.
+
+Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.llm.prompts.numbers import decimals_for, plain
+
+Array = NDArray[np.float64]
+
+# A real column with at most so many distinct values, all whole, is told by its changes.
+_MOST_LEVELS = 12
+# Changes that are told one by one; of longer lists the beginning and the end.
+_SHOWN_CHANGES = 16
+# Turning points closer to their neighbours than this share of the signal's span are ripple.
+_RIPPLE_SHARE = 0.02
+# Fewer turning points are a transient, not an oscillation.
+_FEWEST_TURNS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of constant value, from start until end in s."""
+
+    value: float
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillation:
+    """Fast turning of a signal.
+
+    Attributes:
+        start: begin in s.
+        end: end in s.
+        period: median period in s.
+        low: lowest turning point.
+        high: highest turning point.
+    """
+
+    start: float
+    end: float
+    period: float
+    low: float
+    high: float
+
+
+def is_discrete(column: Array, *, kind: str) -> bool:
+    """Whether a signal is better told by its changes: by its type, or a real one with few whole values."""
+    if kind != "real":
+        return True
+    if np.ptp(column) == 0 or not np.all(column == np.round(column)):
+        return False
+    return len(np.unique(column)) <= _MOST_LEVELS
+
+
+def pieces(times: Array, column: Array) -> list[Piece]:
+    """Stretches of constant value in order."""
+    starts = [0, *(np.flatnonzero(np.diff(column)) + 1).tolist()]
+    ends = [*starts[1:], len(times) - 1]
+    return [
+        Piece(float(column[a]), float(times[a]), float(times[b])) for a, b in zip(starts, ends, strict=True)
+    ]
+
+
+def change_list(times: Array, column: Array, *, clock: int) -> str:
+    """Values with the times from which they hold.
+
+    Args:
+        times: time grid in s.
+        column: the signal.
+        clock: decimals of times.
+
+    >>> change_list(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 1.0, 2.0, 2.0]), clock=2)
+    '1, then 2 from 2 s'
+    """
+    found = pieces(times, column)
+    words = [plain(found[0].value, 6)]
+    words += [f"{plain(p.value, 6)} from {plain(p.start, clock)} s" for p in found[1:]]
+    if len(words) == 1:
+        return f"constant {words[0]}"
+    if len(words) > _SHOWN_CHANGES:
+        half = _SHOWN_CHANGES // 2
+        words = [*words[:half], f"{len(words) - 2 * half} more changes", *words[-half:]]
+    return f"{words[0]}, then {', '.join(words[1:])}"
+
+
+def dwell_list(times: Array, column: Array, *, clock: int) -> str:
+    """How often and how shortly each value was held, the first stretch and the cut-off last one apart."""
+    found = pieces(times, column)
+    if len(found) < 2:
+        return ""
+    words = []
+    for value in sorted({p.value for p in found}):
+        again = [p for p in found[1:] if p.value == value]
+        complete = [p for p in again if p is not found[-1]]
+        name = plain(value, 6)
+        if complete:
+            shortest = min(complete, key=lambda p: p.end - p.start)
+            length = plain(shortest.end - shortest.start, 3)
+            begin = plain(shortest.start, clock)
+            words.append(f"{name}: entered {_times(len(again))}, shortest stay {length} s from {begin} s")
+        elif again:
+            words.append(f"{name}: entered at {plain(again[0].start, clock)} s and kept to the end")
+        else:
+            words.append(f"{name}: never entered again")
+    return "; ".join(words)
+
+
+def extrema(times: Array, column: Array, *, decimals: int, clock: int) -> str:
+    """Smallest and largest value with their times; a constant signal is called so."""
+    low, high = int(column.argmin()), int(column.argmax())
+    if column[low] == column[high]:
+        return f"constant {plain(float(column[low]), decimals)}"
+    return (
+        f"min {plain(float(column[low]), decimals)} at {plain(float(times[low]), clock)} s, "
+        f"max {plain(float(column[high]), decimals)} at {plain(float(times[high]), clock)} s"
+    )
+
+
+def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, float] | None:
+    """Begin and end in s of the longest time without a break for which this is true; None if it never is."""
+    edges = np.diff(np.concatenate(([0], wrong.astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    if not starts.size:
+        return None
+    longest = int((ends - starts).argmax())
+    return float(times[starts[longest]]), float(times[ends[longest]])
+
+
+def oscillation(times: Array, column: Array, *, slower_than: float) -> Oscillation | None:
+    """Fastest part of a signal that turns more often than samples ``slower_than`` s apart can show."""
+    turns = _turning_points(column)
+    if len(turns) < _FEWEST_TURNS:
+        return None
+    gaps = np.diff(times[turns])
+    fast = longest_stretch(times[turns][:-1], gaps < slower_than)
+    if fast is None:
+        return None
+    inside = [k for k in turns if fast[0] <= times[k] <= fast[1]]
+    if len(inside) < _FEWEST_TURNS:
+        return None
+    values = column[inside]
+    return Oscillation(
+        start=fast[0],
+        end=fast[1],
+        period=2 * float(np.median(np.diff(times[inside]))),
+        low=float(values.min()),
+        high=float(values.max()),
+    )
+
+
+def samples_at(times: Array, column: Array, moments: Sequence[float], *, decimals: int) -> str:
+    """Values nearest to these moments, separated by commas."""
+    indices = np.abs(times[None, :] - np.asarray(moments)[:, None]).argmin(axis=1)
+    return ", ".join(plain(float(column[k]), decimals) for k in indices)
+
+
+def column_decimals(column: Array, *, margin: float | None = None) -> int:
+    """Decimals that show a column's values, and a margin of this size between two of them."""
+    usual = decimals_for(float(np.abs(column).max()))
+    if margin is None or margin == 0:
+        return usual
+    most = decimals_for(float(np.abs(column).max()), 9)
+    return min(max(usual, decimals_for(margin, 3)), most)
+
+
+def _turning_points(column: Array) -> list[int]:
+    """Indices of extrema that stand out from their neighbours by more than ripple."""
+    least = _RIPPLE_SHARE * float(np.ptp(column))
+    slopes = np.sign(np.diff(column))
+    moving = np.flatnonzero(slopes)
+    candidates = [int(b) for a, b in pairwise(moving) if slopes[a] != slopes[b]]
+    turns: list[int] = []
+    for k in candidates:
+        if not turns or abs(column[k] - column[turns[-1]]) > least:
+            turns.append(k)
+    return turns
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

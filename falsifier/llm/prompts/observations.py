@@ -1,0 +1,236 @@
+"""Everything that was seen of one sample: what decided it, its parts, and the course of all signals."""
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from math import ceil, floor, log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.evaluation import Evaluation
+from falsifier.llm.prompts.courses import (
+    change_list,
+    column_decimals,
+    dwell_list,
+    extrema,
+    is_discrete,
+    longest_stretch,
+    oscillation,
+    samples_at,
+)
+from falsifier.llm.prompts.numbers import decimals_for, number, plain, signed
+from falsifier.llm.prompts.view import View
+from falsifier.stl import Diagnosis, Formula, Monitor
+from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
+from falsifier.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+# Digits of robustness values: small differences between samples are what the search lives on.
+ROBUSTNESS_DIGITS = 5
+# Values of each signal that are told over the whole time, at most.
+_GRID_VALUES = 21
+# Share of the stop time, around the critical time, that is told densely, and in how many steps.
+_BURST_SHARE = 1 / 25
+_BURST_STEPS = 20
+# Signals whose course is told, those of the formula first.
+_MOST_SIGNALS = 16
+
+
+def facts(view: View, evaluation: Evaluation) -> Iterator[str]:
+    """Lines that matter most: what decided, all values there, robustness of the parts, stays."""
+    verdict, trajectory = evaluation.verdict, evaluation.trajectory
+    assert verdict is not None
+    if trajectory is None:
+        yield f"decided at t = {number(verdict.critical_time)} s by {verdict.predicate}"
+        return
+    monitor = monitor_for(view)
+    diagnosis = monitor.diagnose(trajectory)
+    clock = _clock(view)
+    yield f"why: {diagnosis.text}"
+    there = []
+    for name, value in trajectory.at(diagnosis.critical_time).items():
+        decimals = _decimals(view, trajectory[name], name, verdict.robustness)
+        there.append(f"{name} = {plain(value, decimals)}{_unit(view, name)}")
+    yield f"all signals at t = {plain(diagnosis.critical_time, clock)} s: {', '.join(there)}"
+    yield from _parts(view, monitor, diagnosis, trajectory)
+    for name in view.formula_outputs:
+        if is_discrete(trajectory[name], kind=view.kind(name)):
+            yield f"{name}: {change_list(trajectory.times, trajectory[name], clock=clock)}"
+            if stays := dwell_list(trajectory.times, trajectory[name], clock=clock):
+                yield f"{name} stays: {stays}"
+    for predicate in view.requirement.formula.predicates:
+        yield _predicate(predicate, monitor.course(trajectory, predicate), trajectory, clock)
+
+
+def details(view: View, evaluation: Evaluation) -> Iterator[str]:
+    """Lines on the course of all signals and of the terms of the formula, also densely where it matters."""
+    verdict, trajectory = evaluation.verdict, evaluation.trajectory
+    if verdict is None or trajectory is None:
+        return
+    step = grid_step(view.space.stop_time)
+    grid = np.arange(0.0, view.space.stop_time * (1 + 1e-9), step)
+    columns = _told_columns(view, trajectory)
+    yield f"values every {number(step)} s from t = 0:"
+    for name, column in columns.items():
+        yield from _course(view, name, column, trajectory.times, grid, verdict.robustness)
+    yield from _burst(view, columns, trajectory.times, verdict.critical_time, verdict.robustness)
+
+
+def monitor_for(view: View) -> Monitor:
+    """Compiled monitor of the requirement on its output grid."""
+    return _monitor(view.requirement.formula, view.experiment.output_interval, view.experiment.samples)
+
+
+@lru_cache(maxsize=64)
+def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
+    return Monitor(formula, step=step, samples=samples)
+
+
+def grid_step(stop_time: float) -> float:
+    """Round step in s that divides the time into at most twenty parts.
+
+    >>> grid_step(50.0), grid_step(40.0), grid_step(0.3)
+    (2.5, 2.0, 0.02)
+    """
+    least = stop_time / (_GRID_VALUES - 1)
+    power = 10.0 ** floor(log10(least))
+    chosen = next(m for m in (1, 2, 2.5, 5, 10) if m * power >= least * (1 - 1e-9))
+    return float(f"{chosen * power:.3g}")
+
+
+def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
+    """Robustness of both sides of every connective on the way to what decided."""
+    told: set[Formula] = set()
+    for step in diagnosis.path:
+        if step.formula in told or not isinstance(step.formula, And | Or | Implies | Iff):
+            continue
+        sides = _sides(step.formula)
+        told.update(step.formula.walk() if isinstance(step.formula, And | Or) else ())
+        found = monitor.robustness(trajectory, step.time)
+        words = (
+            f"{side} robustness {signed(found[side], 4)}{_scale(view, side)}"
+            for side in sides
+            if side in found
+        )
+        name = {And: "conjuncts", Or: "alternatives", Implies: "condition and consequence", Iff: "sides"}
+        yield f"{name[type(step.formula)]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
+
+
+def _sides(formula: Formula) -> list[Formula]:
+    """Operands of a connective, chains of the same connective in one list."""
+    if not isinstance(formula, And | Or):
+        return list(formula.children)
+    return [
+        side
+        for child in formula.children
+        for side in (_sides(child) if type(child) is type(formula) else [child])
+    ]
+
+
+def _scale(view: View, part: Formula) -> str:
+    """Unit in which a part's robustness is measured, where there is one."""
+    units = {view.unit(name) for name in part.signals}
+    return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
+
+
+def _predicate(predicate: Predicate, margin: Array, trajectory: Trajectory, clock: int) -> str:
+    times = trajectory.times[: len(margin)]
+    wrong = margin < 0
+    stretch = longest_stretch(times, wrong)
+    nearest = int(np.abs(margin).argmin())
+    if stretch is None:
+        near = int(margin.argmin())
+        return (
+            f"{predicate}: always true, least margin {_short(margin[near])} "
+            f"at {plain(float(times[near]), clock)} s"
+        )
+    if wrong.all():
+        return (
+            f"{predicate}: never true, nearest at {plain(float(times[nearest]), clock)} s, "
+            f"missing by {_short(-margin[nearest])}"
+        )
+    step = trajectory.step
+    return (
+        f"{predicate}: false for {number(round(float(wrong.sum()) * step, 6))} s in all, longest from "
+        f"{plain(stretch[0], clock)} to {plain(stretch[1], clock)} s"
+    )
+
+
+def _short(margin: float) -> str:
+    return f"{margin:.5g}"
+
+
+def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
+    """Signals of the formula, its terms, then other recorded signals; searched inputs are known anyway."""
+    formula = view.requirement.formula
+    terms = {str(e): e.evaluate(trajectory.columns) for e in formula.expressions}
+    others = [n for n in view.experiment.outputs if n in trajectory.columns and n not in formula.signals]
+    columns = {n: trajectory[n] for n in view.formula_outputs} | {
+        text: np.broadcast_to(column, trajectory.times.shape) for text, column in terms.items()
+    }
+    columns |= {n: trajectory[n] for n in others[: max(0, _MOST_SIGNALS - len(columns))]}
+    return {text: column for text, column in columns.items() if np.isfinite(column).all()}
+
+
+def _course(
+    view: View, name: str, column: Array, times: Array, grid: Array, robustness: float
+) -> Iterator[str]:
+    clock = _clock(view)
+    if is_discrete(column, kind=view.kind(name)):
+        if name not in view.formula_outputs:  # those are told before
+            yield f"{name}: {change_list(times, column, clock=clock)}"
+        return
+    decimals = _decimals(view, column, name, robustness)
+    seen = extrema(times, column, decimals=decimals, clock=clock)
+    if seen.startswith("constant"):
+        yield f"{name}: {seen}"
+        return
+    usual = column_decimals(column)
+    yield f"{name}: {samples_at(times, column, grid.tolist(), decimals=usual)}; {seen}"
+    fast = oscillation(times, column, slower_than=float(grid[1] - grid[0]))
+    if fast is not None:
+        yield (
+            f"{name} oscillates with a period of about {number(float(f'{fast.period:.2g}'))} s between "
+            f"{plain(fast.low, usual)} and {plain(fast.high, usual)} from {plain(fast.start, clock)} to "
+            f"{plain(fast.end, clock)} s, which the values above are too far apart to show"
+        )
+
+
+def _burst(
+    view: View, columns: Mapping[str, Array], times: Array, critical: float, robustness: float
+) -> Iterator[str]:
+    """Signals of the formula and its terms, densely around the critical time."""
+    interval = view.experiment.output_interval
+    width = view.space.stop_time * _BURST_SHARE
+    step = max(1, round(width / _BURST_STEPS / interval)) * interval
+    first = max(0, ceil((critical - width / 2) / step - 1e-9))
+    last = min(floor(view.space.stop_time / step + 1e-9), floor((critical + width / 2) / step + 1e-9))
+    moments = [k * step for k in range(first, last + 1)]
+    told = {*view.formula_outputs, *(str(e) for e in view.requirement.formula.expressions)}
+    lines = [
+        f"{name}: {samples_at(times, column, moments, decimals=_decimals(view, column, name, robustness))}"
+        for name, column in columns.items()
+        if name in told and not is_discrete(column, kind=view.kind(name)) and np.ptp(column) > 0
+    ]
+    if lines and len(moments) > 1:
+        yield f"values every {number(round(step, 9))} s from t = {number(round(moments[0], 9))} s:"
+        yield from lines
+
+
+def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
+    """Decimals of a signal: more for those of the formula, whose margin must be visible."""
+    in_formula = name in view.requirement.formula.signals or name not in view.info
+    return column_decimals(column, margin=abs(robustness) if in_formula else None)
+
+
+def _clock(view: View) -> int:
+    """Decimals of times: those of the output grid, for times are where signals were sampled."""
+    return min(
+        6, max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))
+    )
+
+
+def _unit(view: View, name: str) -> str:
+    unit = view.unit(name)
+    return f" {unit}" if unit and unit != "1" else ""

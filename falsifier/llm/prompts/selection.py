@@ -1,0 +1,50 @@
+"""Which earlier samples a prompt tells: the most recent, and beside them the best and the most different."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.evaluation import Evaluation
+from falsifier.llm.prompts.view import View
+
+RECENT = 10
+_BEST = 2
+_DIFFERENT = 2
+# Points at which input signals are compared; enough to tell a pulse of a twentieth of the time.
+_COMPARED_POINTS = 41
+
+
+def recent(evaluations: Sequence[Evaluation]) -> dict[int, str]:
+    """Indices of the most recent samples with a verdict, in order, each without a mark."""
+    judged = [i for i, e in enumerate(evaluations) if e.verdict is not None]
+    return dict.fromkeys(judged[-RECENT:], "")
+
+
+def recent_best_and_different(view: View, evaluations: Sequence[Evaluation]) -> dict[int, str]:
+    """Indices of the samples to tell, in order, with why an old one is among them."""
+    chosen = dict.fromkeys(range(max(0, len(evaluations) - RECENT), len(evaluations)), "")
+    judged = [(e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None]
+    for rank, (_, i) in enumerate(sorted(judged)[:_BEST]):
+        chosen[i] = "best so far" if rank == 0 else "second best so far"
+    others = [i for _, i in judged if i not in chosen]
+    points = {i: _features(view, evaluations[i]) for i in (*chosen, *others)} if others else {}
+    for _ in range(min(_DIFFERENT, len(others))):
+        farthest = max(
+            others, key=lambda i: min(float(np.linalg.norm(points[i] - points[j])) for j in chosen)
+        )
+        chosen[farthest] = "kept because it differs most from the others"
+        others.remove(farthest)
+    return dict(sorted(chosen.items()))
+
+
+def _features(view: View, evaluation: Evaluation) -> NDArray[np.float64]:
+    """Inputs over time and parameters, each scaled to its range."""
+    times = np.linspace(0.0, view.space.stop_time, _COMPARED_POINTS)
+    candidate = evaluation.candidate
+    signals = [
+        (candidate.signals[r.name].sample(times) - r.low) / (r.high - r.low) / np.sqrt(_COMPARED_POINTS)
+        for r in view.space.inputs
+    ]
+    parameters = [(candidate.parameters[p.name] - p.low) / (p.high - p.low) for p in view.space.parameters]
+    return np.concatenate([*signals, np.array(parameters)])

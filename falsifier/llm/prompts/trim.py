@@ -1,0 +1,75 @@
+"""Making a prompt fit: the history gives way first, its oldest samples before its newest."""
+
+from collections.abc import Callable
+
+from falsifier.errors import ChatError
+from falsifier.llm.prompts.blocks import HistoryBlock, Prompt, SampleLines
+from falsifier.llm.prompts.render import render
+from falsifier.llm.usage import estimate_tokens
+
+# Fits models with a context of 32k tokens and leaves them room to think.
+DEFAULT_PROMPT_TOKENS = 16_000
+
+_Change = Callable[[SampleLines], SampleLines | None]
+
+
+def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS) -> Prompt:
+    """Return the prompt with as much of its history as fits.
+
+    The courses of old samples go first, then what was seen of them, then the samples; of marked ones (the
+    best, the most different) the inputs and the robustness stay to the last.
+
+    Args:
+        prompt: what would be told.
+        tokens: most tokens, by estimate.
+
+    Raises:
+        ChatError: when it does not fit without any history.
+    """
+    for change, marked_too in _STAGES:
+        position = 0
+        while prompt.history is not None and position < len(prompt.history.samples):
+            if size(prompt) <= tokens:
+                return prompt
+            prompt, position = _changed(prompt, prompt.history, position, change, marked_too=marked_too)
+    if size(prompt) > tokens:
+        raise ChatError(
+            f"the prompt needs about {size(prompt)} tokens without any history, the limit is {tokens}: raise "
+            "the limit, or choose a plainer prompt variant"
+        )
+    return prompt
+
+
+def size(prompt: Prompt) -> int:
+    """Estimated tokens of a prompt."""
+    return sum(estimate_tokens(m.content) for m in render(prompt))
+
+
+def _without_details(sample: SampleLines) -> SampleLines:
+    return sample.model_copy(update={"details": ()})
+
+
+def _without_facts(sample: SampleLines) -> SampleLines:
+    return sample.model_copy(update={"details": (), "facts": ()})
+
+
+_STAGES: tuple[tuple[_Change, bool], ...] = (
+    (_without_details, False),
+    (_without_details, True),
+    (_without_facts, True),
+    (lambda _: None, False),
+    (lambda _: None, True),
+)
+
+
+def _changed(
+    prompt: Prompt, history: HistoryBlock, position: int, change: _Change, *, marked_too: bool
+) -> tuple[Prompt, int]:
+    """Change the sample at this position; return where the next one stands."""
+    sample = history.samples[position]
+    if sample.mark and not marked_too:
+        return prompt, position + 1
+    new = change(sample)
+    samples = (*history.samples[:position], *([new] if new else []), *history.samples[position + 1 :])
+    smaller = history.model_copy(update={"samples": samples, "omitted": history.omitted + (0 if new else 1)})
+    return prompt.model_copy(update={"history": smaller}), position + (1 if new else 0)
