@@ -111,13 +111,13 @@ class LiteLLMChat:
         self, request: ChatRequest, response: Any, arguments: Mapping[str, Any], seconds: float
     ) -> ChatReply:
         choice = response.choices[0]
-        text = choice.message.content or getattr(choice.message, "refusal", None) or ""
-        refused = bool(text) and not choice.message.content
+        refusal = _refusal(choice.message)
+        text = choice.message.content or refusal
         reported = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         return ChatReply(
             text=text,
             reasoning=getattr(choice.message, "reasoning_content", None) or "",
-            finish_reason="refusal" if refused else choice.finish_reason or "",
+            finish_reason="refusal" if refusal and text is refusal else choice.finish_reason or "",
             usage=usage_of(
                 getattr(response, "usage", None),
                 request=request,
@@ -145,3 +145,9 @@ class LiteLLMChat:
         if "max_tokens" in effective:
             effective["max_tokens"] = arguments["max_tokens"]
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
+
+
+def _refusal(message: Any) -> str:
+    """Why the model declines, where it says so in a field of its own."""
+    fields = getattr(message, "provider_specific_fields", None) or {}
+    return str(getattr(message, "refusal", None) or fields.get("refusal") or "")

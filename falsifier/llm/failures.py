@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from falsifier.errors import ChatError
 
-_TRANSIENT_STATUS = frozenset({408, 409, 425, 429})
+# 200 is an answer that is no JSON: a page of some machine in between.
+_TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
 _FORMAT_WORDS = ("response_format", "json_schema", "json_object", "structured output", "grammar", "schema")
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
 _REDACTED = "[redacted]"
@@ -28,10 +29,12 @@ class TransientChatError(ChatError):
 
     Attributes:
         retry_after: seconds that the server asked to wait, or None.
+        for_all: whether other requests of the same account had better wait too, as after a rate limit.
     """
 
-    def __init__(self, message: str, *, retry_after: float | None = None) -> None:
+    def __init__(self, message: str, *, retry_after: float | None = None, for_all: bool = False) -> None:
         self.retry_after = retry_after
+        self.for_all = for_all
         super().__init__(message)
 
 
@@ -83,7 +86,9 @@ def classify(
     if status in (400, 422, 501) and any(word in lowered for word in _FORMAT_WORDS):
         return FormatUnsupportedError(f"{model}{where}: {detail}")
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or _is_connection(error):
-        return TransientChatError(f"{model}{where}: {detail}", retry_after=_retry_after(error))
+        return TransientChatError(
+            f"{model}{where}: {detail}", retry_after=_retry_after(error), for_all=status == 429
+        )
     return ChatError(f"{model}{where}: {detail}")
 
 

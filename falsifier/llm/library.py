@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from falsifier.errors import ChatError, did_you_mean
-from falsifier.llm.providers import PROVIDERS, known, provider_of
+from falsifier.llm.providers import PROVIDERS, known
 from falsifier.llm.usage import Price
 
 # What litellm would do unasked when it is imported or first used, and how it is told not to.
@@ -44,17 +44,13 @@ def check_name(model: str) -> None:
     Raises:
         ChatError: with the form that is expected.
     """
-    if "/" in model and provider_of(model) in PROVIDERS and model.split("/", 1)[1]:
+    provider, _, name = model.partition("/")
+    if name and (provider in PROVIDERS or _knows(model)):
         return
-    try:
-        load_litellm().get_llm_provider(model)
-    except ChatError:
-        raise
-    except Exception:  # litellm raises several kinds for names that it does not know
-        hint = did_you_mean(provider_of(model), PROVIDERS)
-        raise ChatError(
-            f"{model!r} names no known provider: expected PROVIDER/MODEL such as openai/gpt-5-mini; {hint}"
-        ) from None
+    raise ChatError(
+        f"{model!r} names no known provider and model: expected PROVIDER/MODEL such as openai/gpt-5-mini; "
+        f"{did_you_mean(provider, PROVIDERS)}"
+    )
 
 
 def listed_price(model: str) -> Price | None:
@@ -77,6 +73,15 @@ def dropped_parameters(model: str, arguments: Mapping[str, Any]) -> tuple[str, .
     stated = {k: v for k, v in arguments.items() if k in _DROPPABLE and k not in allowed}
     effort = {k: v for k, v in stated.items() if k == "reasoning_effort"}
     return tuple(name for name in stated if not _takes(model, {**effort, name: stated[name]}))
+
+
+def _knows(model: str) -> bool:
+    litellm = load_litellm()
+    try:
+        litellm.get_llm_provider(model)
+    except Exception:  # litellm raises several kinds for names that it does not know
+        return False
+    return True
 
 
 def _takes(model: str, arguments: Mapping[str, Any]) -> bool:

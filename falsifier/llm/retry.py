@@ -29,7 +29,7 @@ class Gate:
     def passage(self) -> Iterator[None]:
         """Wait for a slot and for the end of a pause."""
         with self._slots:
-            while (wait := self._remaining()) > 0:
+            while (wait := self.remaining()) > 0:
                 self._sleep(wait)
             yield
 
@@ -42,7 +42,8 @@ class Gate:
         """Wait without holding up others."""
         self._sleep(seconds)
 
-    def _remaining(self) -> float:
+    def remaining(self) -> float:
+        """Seconds until the end of a pause; negative after it."""
         with self._lock:
             return self._open_at - time.monotonic()
 
@@ -94,16 +95,11 @@ class RetryingChat:
                     ) from None
                 if attempt == self.attempts:
                     raise ChatError(f"gave up after {attempt} attempts. {error}") from None
-                self._delay(attempt, asked)
+                own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
+                delay = min(own, self.longest_delay) if asked is None else asked
+                (self.gate.pause if error.for_all else self.gate.wait)(delay)
         raise AssertionError("attempts is at least 1")
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """See Chat."""
         self.inner.accepted(request, reply)
-
-    def _delay(self, attempt: int, asked: float | None) -> None:
-        if asked is not None:
-            self.gate.pause(asked)
-            return
-        own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
-        self.gate.wait(min(own, self.longest_delay))

@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -84,8 +84,7 @@ class Server:
                 elif step.status != 200:
                     payload = json.dumps({"error": {"message": step.message, "code": step.status}}).encode()
                 else:
-                    native = "/api/chat" in self.path
-                    payload = json.dumps(_ollama(step) if native else _openai(step, body)).encode()
+                    payload = json.dumps(_dialect(self.path)(step, body)).encode()
                 with suppress(BrokenPipeError, ConnectionResetError):
                     self.send_response(step.status)
                     self.send_header("content-type", "application/json")
@@ -137,7 +136,35 @@ def _openai(step: Step, body: dict[str, Any]) -> dict[str, Any]:
     return answer if step.usage is None else {**answer, "usage": step.usage}
 
 
-def _ollama(step: Step) -> dict[str, Any]:
+def _dialect(path: str) -> Callable[[Step, dict[str, Any]], dict[str, Any]]:
+    if "/api/chat" in path:
+        return _ollama
+    if path.endswith("/messages"):
+        return _anthropic
+    return _gemini if "generateContent" in path else _openai
+
+
+def _anthropic(step: Step, body: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "id": "1",
+        "type": "message",
+        "role": "assistant",
+        "model": body["model"],
+        "content": [{"type": "text", "text": step.content}],
+        "stop_reason": "end_turn",
+        "usage": {"input_tokens": 100, "output_tokens": 20},
+    }
+
+
+def _gemini(step: Step, body: dict[str, Any]) -> dict[str, Any]:
+    content = {"role": "model", "parts": [{"text": step.content}]}
+    return {
+        "candidates": [{"content": content, "finishReason": "STOP", "index": 0}],
+        "usageMetadata": {"promptTokenCount": 100, "candidatesTokenCount": 20, "totalTokenCount": 120},
+    }
+
+
+def _ollama(step: Step, body: dict[str, Any]) -> dict[str, Any]:
     return {
         "model": "m",
         "created_at": "2025-01-01T00:00:00Z",

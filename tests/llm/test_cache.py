@@ -1,0 +1,54 @@
+from pathlib import Path
+
+from falsifier.llm.cache import CachedChat
+from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.scripted import ScriptedChat
+
+QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=5, cost=0.01), seconds=3.0)
+
+
+def test_valid_replies_are_kept_and_cost_nothing_again(tmp_path: Path) -> None:
+    inner = ScriptedChat([PAID, "never"])
+    chat = CachedChat(inner, tmp_path)
+    chat.accepted(QUESTION, chat.complete(QUESTION))
+    again = CachedChat(inner, tmp_path).complete(QUESTION)
+    assert again.text == "answer"
+    assert again.source == "cache"
+    assert again.usage == Usage(cost=0.0)
+    assert len(inner.requests) == 1
+
+
+def test_rejected_replies_are_not_kept(tmp_path: Path) -> None:
+    chat = CachedChat(ScriptedChat(["bad", "good"]), tmp_path)
+    assert chat.complete(QUESTION).text == "bad"
+    assert chat.complete(QUESTION).text == "good"
+
+
+def test_everything_that_is_sent_is_part_of_the_question(tmp_path: Path) -> None:
+    kept = CachedChat(ScriptedChat(["one"], model="a"), tmp_path)
+    kept.accepted(QUESTION, kept.complete(QUESTION))
+    others = [
+        QUESTION.model_copy(update={"sample": 1}),
+        QUESTION.model_copy(update={"reply_schema": {"type": "object"}}),
+        QUESTION.model_copy(update={"messages": (Message(role="system", content="?"),)}),
+    ]
+    for other in others:
+        assert CachedChat(ScriptedChat(["two"], model="a"), tmp_path).complete(other).text == "two"
+    assert CachedChat(ScriptedChat(["two"], model="b"), tmp_path).complete(QUESTION).text == "two"
+
+
+def test_a_damaged_file_is_asked_for_again(tmp_path: Path) -> None:
+    chat = CachedChat(ScriptedChat([PAID, "anew"]), tmp_path)
+    chat.accepted(QUESTION, chat.complete(QUESTION))
+    (file,) = tmp_path.rglob("*.json")
+    file.write_text("{")
+    assert chat.complete(QUESTION).text == "anew"
+
+
+def test_nothing_else_is_left_behind(tmp_path: Path) -> None:
+    chat = CachedChat(ScriptedChat([PAID]), tmp_path / "new" / "folder")
+    reply = chat.complete(QUESTION)
+    chat.accepted(QUESTION, reply)
+    chat.accepted(QUESTION, reply)
+    assert [p.suffix for p in tmp_path.rglob("*") if p.is_file()] == [".json"]

@@ -1,0 +1,313 @@
+"""What goes over the wire for each provider, and what is made of what comes back."""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from falsifier.errors import ChatError
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
+from falsifier.llm.messages import ChatRequest, Message
+from falsifier.llm.providers import first_mode
+from falsifier.llm.usage import Price
+from tests.llm.server import Received, Server, Step, serving
+
+SCHEMA = {
+    "type": "object",
+    "properties": {"rationale": {"type": "string"}},
+    "required": ["rationale"],
+    "additionalProperties": False,
+}
+STRICT = {"type": "json_schema", "json_schema": {"name": "reply", "strict": True, "schema": SCHEMA}}
+REQUEST = ChatRequest(
+    messages=(Message(role="system", content="standing"), Message(role="user", content="question")),
+    reply_schema=SCHEMA,
+)
+KEYS = {
+    "OPENAI_API_KEY": "sk-openai-secret",
+    "HF_TOKEN": "hf_secret_token",
+    "ANTHROPIC_API_KEY": "sk-ant-secret",
+    "GEMINI_API_KEY": "gemini-secret",
+    "OPENROUTER_API_KEY": "openrouter-secret",
+}
+
+
+@pytest.fixture
+def keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in KEYS.items():
+        monkeypatch.setenv(name, value)
+
+
+@dataclass(frozen=True)
+class Wire:
+    """One provider: its model string and what must arrive."""
+
+    model: str
+    body: dict[str, Any]
+    path: str = "/v1/chat/completions"
+    header: tuple[str, str] | None = ("authorization", "Bearer none")
+    absent: tuple[str, ...] = ()
+    base: str = "v1"
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+WIRES = [
+    Wire(
+        "openai/gpt-5-mini",
+        {"model": "gpt-5-mini", "reasoning_effort": "low", "response_format": STRICT},
+        header=("authorization", "Bearer sk-openai-secret"),
+        absent=("temperature", "max_retries"),
+        options={"temperature": 0.5},
+    ),
+    Wire(
+        "openai/some-model",
+        {
+            "model": "some-model",
+            "reasoning_effort": "low",
+            "response_format": STRICT,
+            "temperature": 0.5,
+        },
+        header=("authorization", "Bearer sk-openai-secret"),
+        options={"temperature": 0.5},
+    ),
+    Wire(
+        "hosted_vllm/openai/gpt-oss-20b",
+        {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT},
+        header=None,
+        absent=("max_retries",),
+    ),
+    Wire(
+        "huggingface/openai/gpt-oss-20b",
+        {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT},
+        header=("authorization", "Bearer hf_secret_token"),
+        absent=("max_retries",),
+    ),
+    Wire(
+        "huggingface/openai/gpt-oss-120b:cerebras",
+        {"model": "openai/gpt-oss-120b:cerebras", "reasoning_effort": "low"},
+        header=("authorization", "Bearer hf_secret_token"),
+    ),
+    Wire(
+        "ollama_chat/gpt-oss:20b",
+        {"model": "gpt-oss:20b", "think": "low"},
+        path="/api/chat",
+        header=None,
+        absent=("format", "max_retries"),
+        base="",
+    ),
+    Wire(
+        "ollama_chat/qwen3",
+        {"model": "qwen3", "format": SCHEMA},
+        path="/api/chat",
+        header=None,
+        base="",
+    ),
+    Wire(
+        "lm_studio/gpt-oss-20b",
+        {"model": "gpt-oss-20b", "reasoning_effort": "low"},
+        absent=("response_format", "max_retries"),
+    ),
+    Wire("lm_studio/qwen", {"model": "qwen", "response_format": STRICT}),
+    Wire("llamafile/any", {"model": "any", "response_format": STRICT}, absent=("reasoning_effort",)),
+    Wire(
+        "openrouter/openai/gpt-5-mini",
+        {"model": "openai/gpt-5-mini", "reasoning_effort": "low", "response_format": STRICT},
+        header=("authorization", "Bearer openrouter-secret"),
+    ),
+    Wire(
+        "anthropic/claude-sonnet-4-5",
+        {"model": "claude-sonnet-4-5"},
+        path="/v1/messages",
+        header=("x-api-key", "sk-ant-secret"),
+        base="",
+    ),
+    Wire(
+        "gemini/gemini-2.5-flash",
+        {},
+        path="/v1/models/gemini-2.5-flash:generateContent",
+        header=("x-goog-api-key", "gemini-secret"),
+    ),
+]
+
+
+@pytest.mark.usefixtures("keys")
+@pytest.mark.parametrize("wire", WIRES, ids=lambda w: w.model)
+def test_what_is_sent(wire: Wire) -> None:
+    with serving(Step("an answer")) as server:
+        reply = chat_for(wire, server).complete(REQUEST)
+    (received,) = [r for r in server.received if r.body]
+    assert reply.text == "an answer"
+    assert received.path == wire.path
+    assert {k: received.body.get(k) for k in wire.body} == wire.body
+    assert not set(wire.absent) & received.body.keys()
+    assert "question" in str(received.body) and "standing" in str(received.body)
+    if wire.header is not None:
+        assert lowered(received)[wire.header[0]] == wire.header[1]
+    assert reply.usage.prompt_tokens == 100
+    assert reply.usage.completion_tokens == 20
+
+
+def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
+    base = server.url if wire.base else server.root
+    return LiteLLMChat(
+        wire.model, effort="low", api_base=base, options=wire.options, mode=first_mode(wire.model)
+    )
+
+
+def lowered(received: Received) -> dict[str, str]:
+    return {k.lower(): v for k, v in received.headers.items()}
+
+
+@pytest.mark.usefixtures("keys")
+def test_effective_parameters_name_what_was_dropped() -> None:
+    with serving(Step("a"), Step("b")) as server:
+        known = LiteLLMChat(
+            "openai/gpt-5-mini", effort="low", api_base=server.url, options={"temperature": 0.5}
+        )
+        other = LiteLLMChat("openai/other", api_base=server.url, options={"temperature": 0.5})
+        dropped, kept = known.complete(REQUEST).parameters, other.complete(REQUEST).parameters
+    assert dropped["dropped"] == ["temperature"]
+    assert "temperature" not in dropped
+    assert dropped["effort"] == "low"
+    assert dropped["mode"] == "json_schema"
+    assert kept["temperature"] == 0.5
+    assert "dropped" not in kept
+
+
+def test_a_server_of_ones_own_needs_no_key() -> None:
+    with serving(Step("a")) as server:
+        LiteLLMChat("openai/mine", api_base=server.url).complete(REQUEST)
+    assert lowered(server.received[0])["authorization"] == "Bearer none"
+
+
+def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
+    with serving(Step("a"), Step("b"), Step("c"), Step("d")) as server:
+        foreign = LiteLLMChat("openai/gpt-5-mini", api_base=server.url).complete(REQUEST)
+        hosted = LiteLLMChat("huggingface/openai/gpt-oss-20b", api_base=server.url).complete(REQUEST)
+        local = LiteLLMChat("ollama_chat/qwen3", api_base=server.root).complete(REQUEST)
+        priced = LiteLLMChat(
+            "openai/gpt-5-mini", api_base=server.url, price=Price(prompt=0.25, completion=2.0)
+        ).complete(REQUEST)
+    assert foreign.usage.cost is None
+    assert hosted.usage.cost is None
+    assert local.usage.cost == 0
+    assert priced.usage.cost == pytest.approx(0.1 * 0.25 + 0.02 * 2.0)
+
+
+def test_reasoning_tokens_and_text_are_kept() -> None:
+    step = Step("answer", extra={"reasoning_content": "first I thought"})
+    with serving(step, Step("<think>hidden</think>shown")) as server:
+        chat = LiteLLMChat("openai/mine", api_base=server.url)
+        first, second = chat.complete(REQUEST), chat.complete(REQUEST)
+    assert first.reasoning == "first I thought"
+    assert first.usage.reasoning_tokens == 12
+    assert second.text.endswith("shown")
+
+
+def test_missing_counts_are_estimated_and_cost_is_unknown() -> None:
+    with serving(Step("x" * 400, usage=None)) as server:
+        usage = LiteLLMChat("ollama_chat/x", api_base=server.root).complete(REQUEST).usage
+        assert not usage.estimated  # Ollama always counts
+    with serving(Step("x" * 400, usage={"prompt_tokens": 0, "completion_tokens": 0})) as server:
+        usage = LiteLLMChat("hosted_vllm/x", api_base=server.url).complete(REQUEST).usage
+    assert usage.estimated
+    assert usage.completion_tokens == 100
+    assert usage.cost is None
+
+
+def test_refusal_is_told_apart() -> None:
+    with serving(Step(None, extra={"refusal": "I would rather not"})) as server:
+        reply = LiteLLMChat("openai/mine", api_base=server.url).complete(REQUEST)
+    assert reply.finish_reason == "refusal"
+    assert reply.text == "I would rather not"
+
+
+@pytest.mark.usefixtures("keys")
+@pytest.mark.parametrize("model", ["openai/mine", "hosted_vllm/mine", "huggingface/org/mine"])
+class TestFailures:
+    """One request is one request: nothing is sent again behind our back."""
+
+    def failing(self, model: str, *script: Step, **kwargs: Any) -> tuple[ChatError, int]:
+        with serving(*script) as server:
+            chat = LiteLLMChat(model, api_base=server.url, **kwargs)
+            with pytest.raises(ChatError) as caught:
+                chat.complete(REQUEST)
+        return caught.value, len(server.received)
+
+    def test_rate_limit(self, model: str) -> None:
+        error, count = self.failing(model, Step(status=429, headers={"Retry-After": "7"}))
+        assert isinstance(error, TransientChatError)
+        assert error.retry_after == 7
+        assert error.for_all
+        assert count == 1
+
+    def test_server_error(self, model: str) -> None:
+        error, count = self.failing(model, Step(status=503), Step("never seen"))
+        assert isinstance(error, TransientChatError)
+        assert count == 1
+
+    def test_timeout(self, model: str) -> None:
+        error, count = self.failing(model, Step(delay=0.6), timeout=0.2)
+        assert isinstance(error, TransientChatError)
+        assert count == 1
+
+    def test_lost_connection(self, model: str) -> None:
+        error, _ = self.failing(model, Step(hang_up=True))
+        assert isinstance(error, TransientChatError)
+
+    def test_no_choices(self, model: str) -> None:
+        error, _ = self.failing(model, Step(raw='{"id": "1", "object": "chat.completion", "choices": []}'))
+        assert isinstance(error, TransientChatError)
+
+    def test_not_json(self, model: str) -> None:
+        error, _ = self.failing(model, Step(raw="<html>Bad gateway</html>"))
+        assert isinstance(error, TransientChatError)
+
+    def test_unauthorized_names_model_and_variable(self, model: str) -> None:
+        error, count = self.failing(model, Step(status=401, message="bad key sk-openai-secret"))
+        assert not isinstance(error, TransientChatError)
+        assert model in str(error)
+        assert "key" in str(error)
+        assert "sk-openai-secret" not in str(error)
+        assert count == 1
+
+    def test_unknown_model(self, model: str) -> None:
+        error, _ = self.failing(model, Step(status=404, message="no such model"))
+        assert not isinstance(error, TransientChatError)
+        assert "--api-base" in str(error)
+
+    def test_schema_refused(self, model: str) -> None:
+        error, _ = self.failing(model, Step(status=400, message="response_format json_schema unsupported"))
+        assert isinstance(error, FormatUnsupportedError)
+
+    def test_no_quota_is_not_worth_waiting(self, model: str) -> None:
+        error, _ = self.failing(model, Step(status=429, message="insufficient_quota: check your billing"))
+        assert not isinstance(error, TransientChatError)
+
+    def test_nobody_listens(self, model: str) -> None:
+        with serving() as server:
+            pass
+        with pytest.raises(TransientChatError, match=r"127\.0\.0\.1"):
+            LiteLLMChat(model, api_base=server.url, timeout=2).complete(REQUEST)
+
+
+def test_importing_the_layer_does_not_import_litellm() -> None:
+    code = (
+        "import sys, falsifier.proposers.llm, falsifier.llm.connect; "
+        "print('litellm' in sys.modules, 'openai' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
+
+
+def test_litellm_is_told_to_stay_off_the_network() -> None:
+    from falsifier.llm.library import load_litellm
+
+    load_litellm()
+    assert os.environ["LITELLM_LOCAL_MODEL_COST_MAP"] == "True"
+    assert os.environ["LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS"] == "True"
+    assert os.environ["LITELLM_MODE"] == "PRODUCTION"

@@ -1,0 +1,100 @@
+"""Asking again with what was wrong."""
+
+import pytest
+
+from falsifier.errors import ChatError
+from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.scripted import ScriptedChat
+
+QUESTION = ChatRequest(messages=(Message(role="user", content="a number, please"),))
+
+
+def number(text: str) -> int:
+    if not text.isdigit():
+        raise RejectedReplyError(f"{text!r} is no number")
+    return int(text)
+
+
+def asked(*script: str | ChatReply | Exception) -> tuple[int, ScriptedChat, list[Exchange]]:
+    exchanges: list[Exchange] = []
+    chat = ScriptedChat(script)
+    return converse(chat, QUESTION, number, exchanges.append), chat, exchanges
+
+
+def test_first_valid_reply() -> None:
+    value, chat, exchanges = asked("7")
+    assert value == 7
+    assert len(chat.requests) == 1
+    assert exchanges[0].problem is None
+
+
+def test_a_value_that_is_false_is_still_a_value() -> None:
+    assert asked("0")[0] == 0
+
+
+def test_a_rejected_reply_goes_back_with_its_problem() -> None:
+    value, chat, exchanges = asked("seven", "7")
+    assert value == 7
+    again = chat.requests[1].messages
+    assert [m.role for m in again] == ["user", "assistant", "user"]
+    assert again[1].content == "seven"
+    assert "'seven' is no number" in again[2].content
+    assert [e.problem for e in exchanges] == ["'seven' is no number", None]
+
+
+def test_two_reasks_at_most() -> None:
+    exchanges: list[Exchange] = []
+    chat = ScriptedChat(["a", "b", "c", "4"])
+    with pytest.raises(NoValidReplyError, match=r"no valid reply in 3 tries.*'a'.*'b'.*'c'"):
+        converse(chat, QUESTION, number, exchanges.append)
+    assert len(chat.requests) == len(exchanges) == 3
+
+
+@pytest.mark.parametrize(
+    ("reply", "problem"),
+    [
+        (ChatReply(text=""), "empty"),
+        (ChatReply(text=" \n"), "empty"),
+        (ChatReply(text="", finish_reason="length"), "cut off"),
+        (ChatReply(text="sev", finish_reason="length"), "cut off"),
+        (ChatReply(text="no", finish_reason="refusal"), "refuses"),
+        (ChatReply(text="", finish_reason="content_filter"), "content filter"),
+    ],
+)
+def test_useless_replies_are_named(reply: ChatReply, problem: str) -> None:
+    value, chat, exchanges = asked(reply, "7")
+    assert value == 7
+    assert problem in (exchanges[0].problem or "")
+    assert problem in chat.requests[1].messages[-1].content
+
+
+def test_a_reply_that_was_cut_off_gets_more_room_once() -> None:
+    cut = ChatReply(text="", finish_reason="length")
+    _, chat, _ = asked(cut, cut, "7")
+    assert [r.room for r in chat.requests] == [1, 2, 2]
+
+
+def test_cut_off_but_complete_is_valid() -> None:
+    value, chat, _ = asked(ChatReply(text="7", finish_reason="length"))
+    assert value == 7
+    assert len(chat.requests) == 1
+
+
+def test_a_runaway_reply_is_not_quoted_in_full() -> None:
+    _, chat, _ = asked("x" * 100_000, "7")
+    assert len(chat.requests[1].messages[1].content) < 5000
+
+
+def test_no_answer_is_not_asked_again_here() -> None:
+    exchanges: list[Exchange] = []
+    chat = ScriptedChat([ChatError("nobody there"), "7"])
+    with pytest.raises(ChatError, match="nobody there"):
+        converse(chat, QUESTION, number, exchanges.append)
+    assert exchanges == []
+
+
+def test_exchanges_go_through_json() -> None:
+    _, _, exchanges = asked("seven", "7")
+    for exchange in exchanges:
+        assert Exchange.model_validate_json(exchange.model_dump_json()) == exchange

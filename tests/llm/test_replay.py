@@ -1,0 +1,47 @@
+import pytest
+
+from falsifier.errors import ChatError
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.replay import RecordedChat
+from falsifier.llm.scripted import ScriptedChat
+
+QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+
+
+def exchange(text: str | None) -> Exchange:
+    return Exchange(
+        model="openai/m",
+        messages=QUESTION.messages,
+        reply=None if text is None else ChatReply(text=text),
+        problem="nobody there" if text is None else None,
+    )
+
+
+def test_plays_what_was_recorded_and_then_asks() -> None:
+    inner = ScriptedChat(["three"], model="openai/m")
+    chat = RecordedChat([exchange("one"), exchange("two")], inner)
+    replies = [chat.complete(QUESTION) for _ in range(3)]
+    assert [r.text for r in replies] == ["one", "two", "three"]
+    assert [r.source for r in replies] == ["recording", "recording", "script"]
+    assert len(inner.requests) == 1
+
+
+def test_a_recording_alone_ends() -> None:
+    chat = RecordedChat([exchange("one")])
+    assert chat.model == "openai/m"
+    chat.complete(QUESTION)
+    with pytest.raises(ChatError, match="ends after 1 repl"):
+        chat.complete(QUESTION)
+
+
+def test_a_recorded_failure_happens_again() -> None:
+    with pytest.raises(ChatError, match="nobody there"):
+        RecordedChat([exchange(None)], ScriptedChat(["now there"])).complete(QUESTION)
+
+
+def test_script_of_a_function_and_its_end() -> None:
+    assert ScriptedChat(lambda request: request.messages[0].content).complete(QUESTION).text == "?"
+    with pytest.raises(ChatError, match="has 1 replies, 2 are asked for"):
+        chat = ScriptedChat(["only"])
+        chat.complete(QUESTION)
+        chat.complete(QUESTION)

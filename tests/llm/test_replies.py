@@ -1,0 +1,202 @@
+"""What is read from replies, and the schema that asks for them."""
+
+import json
+from typing import Any
+
+import pytest
+
+from falsifier.llm.conversation import RejectedReplyError
+from falsifier.llm.replies import ReplyForm
+from falsifier.signals import Signal
+from falsifier.space import Freedom, InputRange, ParameterRange, SearchSpace
+
+FREE = Freedom(max_control_points=200, min_interval=0.1)
+SPACE = SearchSpace(
+    (
+        InputRange("throttle", 0.0, 100.0, 3, "linear", 0.05, FREE),
+        InputRange("brake", 0.0, 325.0, 2, "constant", None, None),
+    ),
+    (ParameterRange("mass", 900.0, 1100.0),),
+    10.0,
+)
+GOOD = {
+    "rationale": "full throttle",
+    "signals": [{"name": "throttle", "values": [100, 50, 0]}, {"name": "brake", "values": [0, 325]}],
+    "parameters": [{"name": "mass", "value": 1000}],
+}
+
+
+def read(reply: Any, **form: Any) -> Any:
+    text = reply if isinstance(reply, str) else json.dumps(reply)
+    (candidate,) = ReplyForm(SPACE, **form).read(text, origin="me")
+    return candidate
+
+
+def test_signals_by_name() -> None:
+    candidate = read(GOOD)
+    assert candidate.signals["throttle"] == Signal((0, 5, 10), (100, 50, 0), "linear", 0.05)
+    assert candidate.signals["brake"] == Signal((0, 5), (0, 325), "constant", None)
+    assert candidate.parameters == {"mass": 1000}
+    assert candidate.origin == "me"
+    assert candidate.rationale == "full throttle"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Here you are:\n```json\n{}\n```\nGood luck!",
+        "{{broken {}",
+        '<think>maybe {{"signals": []}} or 3</think>{}',
+        'A draft: {{"signals": [], "rationale": "draft"}} and then the final one {}',
+        '{{"candidates": [{}]}}',
+    ],
+)
+def test_json_is_found_wherever_it_stands(text: str) -> None:
+    assert read(text.replace("{}", json.dumps(GOOD)).replace("{{", "{").replace("}}", "}")) == read(GOOD)
+
+
+def test_maps_and_superfluous_remarks_are_taken() -> None:
+    lenient = {
+        "signals": {"throttle": [100, 50, 0], "brake": [0, 325]},
+        "parameters": {"mass": 1000},
+        "confidence": "high",
+    }
+    assert read(lenient).key == read(GOOD).key
+
+
+def test_numbers_in_order() -> None:
+    assert read("I try <point>100, 50 0; 0 325\n 1e3</point>").key == read(GOOD).key
+    assert read({"point": [100, 50, 0, 0, 325, 1000], "rationale": ""}).key == read(GOOD).key
+
+
+def changed(**changes: Any) -> dict[str, Any]:
+    return {**GOOD, **changes}
+
+
+@pytest.mark.parametrize(
+    ("reply", "problem"),
+    [
+        ("nothing to see", "neither a JSON object"),
+        ('{"answer": 42}', "neither a JSON object"),
+        ("<point>1, 2, 3</point>", "expected 6 numbers, got 3"),
+        ("<point>1, two, 3, 4, 5, 6</point>", "'two'"),
+        ("<point>0 0 0 0 0 2000</point>", r"'mass': 2000 is outside its range \[900, 1100\]"),
+        ("<point>0 0 0 0 0 nan</point>", "'nan'"),
+        ("<point>0 0 0 0 0 1e999</point>", "outside its range"),
+        (changed(signals=GOOD["signals"][:1]), "'brake' is missing"),
+        (changed(signals=[*GOOD["signals"], {"name": "clutch", "values": [1]}]), "unknown input 'clutch'"),
+        (changed(signals=[*GOOD["signals"], GOOD["signals"][0]]), "'throttle' is given twice"),
+        (
+            changed(signals=[{"name": "throttle", "values": [1, 2]}, GOOD["signals"][1]]),
+            "expected 3 evenly spaced control points with linear interpolation, got 2",
+        ),
+        (
+            changed(signals=[{"name": "throttle", "values": [1, 2, 101]}, GOOD["signals"][1]]),
+            r"'throttle' at t = 10 s: 101 is outside",
+        ),
+        (changed(signals=[{"name": "throttle", "values": []}, GOOD["signals"][1]]), "has no values"),
+        (changed(signals=[{"name": "throttle", "value": 3}]), r"signals\.0\.values: Field required"),
+        (changed(signals=[{"name": "throttle", "values": ["lots"]}]), "'lots' is neither a number nor a run"),
+        (changed(parameters=[{"name": "mass", "value": float("nan")}]), "finite"),
+        (changed(parameters=[]), "'mass' is missing"),
+    ],
+)
+def test_what_is_wrong_is_told(reply: Any, problem: str) -> None:
+    with pytest.raises(RejectedReplyError, match=problem):
+        read(reply)
+
+
+def test_rounding_beyond_a_bound_is_clipped() -> None:
+    clipped = read("<point>100.00001 0 0 0 325 1000</point>")
+    assert clipped.signals["throttle"].values[0] == 100.0
+
+
+def throttle(**signal: Any) -> dict[str, Any]:
+    return changed(signals=[{"name": "throttle", **signal}, GOOD["signals"][1]])
+
+
+class TestFreeParameterization:
+    def read(self, **signal: Any) -> Signal:
+        found = read(throttle(**signal), free=True).signals["throttle"]
+        assert isinstance(found, Signal)
+        return found
+
+    def test_more_points_and_another_interpolation(self) -> None:
+        signal = self.read(interpolation="constant", times=[], values=[1, 2, 3, 4])
+        assert signal == Signal((0, 2.5, 5, 7.5), (1, 2, 3, 4), "constant", 0.05)
+
+    def test_times(self) -> None:
+        signal = self.read(interpolation="constant", times=[0, 2, 2.25], values=[0, 100, 0])
+        assert signal == Signal((0, 2, 2.25), (0, 100, 0), "constant", 0.05)
+
+    def test_pairs(self) -> None:
+        pairs = [[0, 100], [2.5, 0]]
+        expected = Signal((0, 2.5), (100, 0), "constant", 0.05)
+        assert self.read(interpolation="constant", values=pairs) == expected
+        assert self.read(interpolation="constant", points=pairs) == expected
+
+    def test_runs(self) -> None:
+        signal = self.read(interpolation="constant", values=["0 x 97", 100, "50*2"])
+        assert signal.values == (0,) * 97 + (100, 50, 50)
+
+    @pytest.mark.parametrize(
+        ("signal", "problem"),
+        [
+            ({"times": [1, 2], "values": [3, 4]}, "increase strictly from 0"),
+            ({"times": [0, 2], "values": [3]}, "2 times and 1 values"),
+            ({"times": [0, 0.01], "values": [3, 4]}, "closer than 0.1 s"),
+            ({"times": [0, 11], "values": [3, 4]}, "behind the stop time"),
+            ({"values": ["1 x 201"]}, "at most 200"),
+            ({"values": ["1 x 99999999999"]}, "longer than"),
+            ({"interpolation": "spline", "values": [1]}, "pchip"),
+        ],
+    )
+    def test_limits(self, signal: dict[str, Any], problem: str) -> None:
+        with pytest.raises(RejectedReplyError, match=problem):
+            self.read(**signal)
+
+    def test_not_where_it_was_not_offered(self) -> None:
+        with pytest.raises(RejectedReplyError, match="expected 3 evenly spaced"):
+            read(throttle(interpolation="constant", times=[0, 2], values=[3, 4]))
+
+
+def strict_subset(schema: dict[str, Any]) -> None:
+    """Fail unless a strict server takes this schema."""
+    if schema.get("type") == "object":
+        assert schema["additionalProperties"] is False
+        assert schema["required"] == list(schema["properties"])
+        for part in schema["properties"].values():
+            strict_subset(part)
+    elif schema.get("type") == "array":
+        assert set(schema) == {"type", "items"}
+        strict_subset(schema["items"])
+    elif "anyOf" in schema:
+        for part in schema["anyOf"]:
+            strict_subset(part)
+    else:
+        assert schema["type"] in ("string", "number")
+        assert set(schema) <= {"type", "enum"}
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("free", [True, False])
+@pytest.mark.parametrize("count", [1, 3])
+def test_schema_is_in_the_strict_subset(named: bool, free: bool, count: int) -> None:
+    schema = ReplyForm(SPACE, named=named, free=free, count=count).schema()
+    assert schema["type"] == "object"
+    strict_subset(schema)
+
+
+def test_schema_without_inputs_or_without_parameters() -> None:
+    only_parameters = ReplyForm(SearchSpace((), SPACE.parameters, 10.0)).schema()
+    assert list(only_parameters["properties"]) == ["rationale", "parameters"]
+    only_inputs = ReplyForm(SearchSpace(SPACE.inputs, (), 10.0)).schema()
+    assert list(only_inputs["properties"]) == ["rationale", "signals"]
+
+
+def test_several_candidates() -> None:
+    other = changed(parameters=[{"name": "mass", "value": 901}])
+    found = ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [GOOD, other]}))
+    assert [c.parameters["mass"] for c in found] == [1000, 901]
+    found = ReplyForm(SPACE, count=2).read("<point>0 0 0 0 0 950</point> <point>0 0 0 0 0 960</point>")
+    assert [c.parameters["mass"] for c in found] == [950, 960]

@@ -1,0 +1,127 @@
+"""Patience with passing failures, shared between runs."""
+
+import threading
+
+import pytest
+
+from falsifier.errors import ChatError
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.failures import TransientChatError
+from falsifier.llm.ladder import LadderChat
+from falsifier.llm.messages import ChatReply, ChatRequest, Message
+from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.scripted import ScriptedChat
+from tests.llm.server import Step, serving
+from tests.llm.test_client import REQUEST
+
+QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+
+
+class Naps:
+    """A clock that does not wait."""
+
+    def __init__(self) -> None:
+        self.taken: list[float] = []
+
+    def __call__(self, seconds: float) -> None:
+        self.taken.append(seconds)
+
+
+def test_waits_longer_each_time_and_counts_attempts() -> None:
+    naps = Naps()
+    passing = TransientChatError("busy")
+    chat = RetryingChat(ScriptedChat([passing, passing, passing, "done"]), Gate(sleep=naps))
+    reply = chat.complete(QUESTION)
+    assert reply.text == "done"
+    assert reply.attempts == 4
+    assert [round(n) for n in naps.taken] == sorted(round(n) for n in naps.taken)
+    assert 0.75 <= naps.taken[0] <= 1.25
+    assert 3 <= naps.taken[2] <= 5
+
+
+def test_gives_up_and_says_so() -> None:
+    chat = RetryingChat(ScriptedChat(lambda _: TransientChatError("busy")), Gate(sleep=Naps()), attempts=3)
+    with pytest.raises(ChatError, match=r"gave up after 3 attempts\. busy") as caught:
+        chat.complete(QUESTION)
+    assert not isinstance(caught.value, TransientChatError)
+
+
+def test_does_not_repeat_what_waiting_does_not_cure() -> None:
+    inner = ScriptedChat([ChatError("no such model"), "never"])
+    with pytest.raises(ChatError, match="no such model"):
+        RetryingChat(inner, Gate(sleep=Naps())).complete(QUESTION)
+    assert len(inner.requests) == 1
+
+
+def test_ends_when_the_server_asks_for_too_long_a_wait() -> None:
+    inner = ScriptedChat([TransientChatError("limit", retry_after=3600.0), "never"])
+    with pytest.raises(ChatError, match="3600 s"):
+        RetryingChat(inner, Gate(sleep=Naps())).complete(QUESTION)
+
+
+def test_a_rate_limit_holds_up_all_runs_of_a_gate() -> None:
+    gate = Gate()
+    limited = RetryingChat(
+        ScriptedChat([TransientChatError("limit", retry_after=0.3, for_all=True), "a"]), gate
+    )
+    answered: list[str] = []
+    thread = threading.Thread(target=lambda: answered.append(limited.complete(QUESTION).text))
+    thread.start()
+    while gate.remaining() <= 0:
+        pass
+    other = RetryingChat(ScriptedChat(["b"]), gate)
+    assert gate.remaining() > 0
+    other.complete(QUESTION)
+    assert gate.remaining() <= 0
+    thread.join()
+    assert answered == ["a"]
+
+
+def test_concurrency_is_limited() -> None:
+    with serving(*(Step("ok", delay=0.05) for _ in range(6))) as server:
+        gate = Gate(concurrency=2)
+        chats = [RetryingChat(LiteLLMChat("openai/m", api_base=server.url), gate) for _ in range(6)]
+        replies: list[ChatReply] = []
+        threads = [
+            threading.Thread(target=lambda chat=chat: replies.append(chat.complete(REQUEST)))
+            for chat in chats
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert len(replies) == 6
+    assert server.most_at_once == 2
+
+
+def test_server_restarts_while_asked() -> None:
+    steps = [
+        Step(status=429, headers={"Retry-After": "0.05"}),
+        Step(hang_up=True),
+        Step(status=502),
+        Step("back"),
+    ]
+    with serving(*steps) as server:
+        chat = RetryingChat(LiteLLMChat("openai/m", api_base=server.url), Gate(), first_delay=0.01)
+        reply = chat.complete(REQUEST)
+    assert reply.text == "back"
+    assert reply.attempts == 4
+    assert len(server.received) == 4
+
+
+def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
+    refused = Step(status=400, message="response_format is not supported")
+    with serving(refused, refused, Step("in words"), Step("again")) as server:
+        chat = LadderChat(LiteLLMChat("openai/m", api_base=server.url))
+        first, second = chat.complete(REQUEST), chat.complete(REQUEST)
+    kinds = [r.body.get("response_format", {}).get("type") for r in server.received]
+    assert kinds == ["json_schema", "json_object", None, None]
+    assert first.parameters["mode"] == "prompt"
+    assert second.text == "again"
+
+
+def test_ladder_ends_at_its_last_rung() -> None:
+    refused = Step(status=400, message="grammar is not supported")
+    with serving(refused, refused, refused) as server, pytest.raises(ChatError, match="grammar"):
+        LadderChat(LiteLLMChat("openai/m", api_base=server.url)).complete(REQUEST)
+    assert len(server.received) == 3
