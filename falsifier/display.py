@@ -104,6 +104,7 @@ def result_text(result: Result) -> str:
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += _evaluation_lines(result, shown)
+    lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     if result.spent.calls:
         lines.append(f"  language model {_model_use(result.spent)}")
@@ -125,6 +126,7 @@ def result_json(result: Result) -> str:
             "reason": result.reason,
             "counterexample": result.counterexample and _evaluation_json(result.counterexample.evaluation),
             "best": result.best and _evaluation_json(result.best),
+            "fragile": [_evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
             "not_confirmed": [c.reason for c in result.refuted],
             "spent": spent,
             "directory": result.directory and str(result.directory),

@@ -51,6 +51,7 @@ class Result:
         best: evaluation with the smallest robustness, or None when every simulation failed.
         evaluations: all evaluations in order, without trajectories except the best's.
         refuted: violations that a second simulation or the second monitor did not confirm.
+        fragile: violations that vanish at half the communication step.
         spent: what the run used.
         directory: the run directory, or None.
     """
@@ -64,6 +65,7 @@ class Result:
     refuted: tuple[Confirmation, ...]
     spent: Spent
     directory: Path | None = None
+    fragile: tuple[Confirmation, ...] = ()
 
 
 def falsify(
@@ -151,7 +153,7 @@ class _Loop:
         self.recorded = dict(enumerate(recorded_evaluations(directory, list(records))))
         self.replayed_exchanges = len(answered_exchanges(records))
         self.evaluations: list[Evaluation] = []
-        self.refuted: list[Confirmation] = []
+        self.doubtful: list[Confirmation] = []
         self.best: Evaluation | None = None
         self.counterexample: Confirmation | None = None
         earlier = [r.spent.get("seconds") or 0.0 for r in records if isinstance(r, EndedRecord)]
@@ -233,12 +235,12 @@ class _Loop:
         return evaluation
 
     def check(self, index: int, evaluation: Evaluation) -> None:
-        """Confirm a violation; a refuted one does not end the search."""
+        """Confirm a violation; a fragile or refuted one does not end the search."""
         confirmation = confirm(self.problem, evaluation)
         if confirmation.outcome == "confirmed":
             self.counterexample = confirmation
         else:
-            self.refuted.append(confirmation)
+            self.doubtful.append(confirmation)
         if self.journal is not None:
             self.journal.write(
                 ConfirmedRecord(
@@ -247,6 +249,7 @@ class _Loop:
                     robustness=confirmation.robustness,
                     reference=confirmation.reference,
                     reason=confirmation.reason,
+                    halved=confirmation.halved,
                 ),
                 at_once=True,
             )
@@ -293,9 +296,10 @@ class _Loop:
             self.counterexample,
             self.best,
             tuple(self.evaluations),
-            tuple(self.refuted),
+            tuple(c for c in self.doubtful if c.outcome == "refuted"),
             self.clock(),
             self.journal.directory if self.journal else None,
+            tuple(c for c in self.doubtful if c.outcome == "fragile"),
         )
 
 

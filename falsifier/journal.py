@@ -90,6 +90,7 @@ class ConfirmedRecord(_Record):
     robustness: float | None
     reference: float | None
     reason: str
+    halved: float | None = None
 
 
 class EndedRecord(_Record):
