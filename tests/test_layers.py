@@ -13,7 +13,22 @@ LAYERS = [
     ("meaning", ["model", "stl", "fmu", "spec", "problem", "adhoc"]),
     ("evaluate", ["evaluation", "execution"]),
     ("search", ["llm", "proposers"]),
-    ("run", ["budget", "confirm", "engine", "events", "journal", "request", "shrink"]),
+    (
+        "run",
+        [
+            "budget",
+            "check",
+            "confirm",
+            "counterexamples",
+            "engine",
+            "events",
+            "journal",
+            "neighbourhood",
+            "request",
+            "shrink",
+            "simplicity",
+        ],
+    ),
     ("campaign", ["analysis", "campaign"]),
     ("faces", ["cli", "display", "explain", "export", "plotting", "report", "testing"]),
 ]
