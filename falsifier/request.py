@@ -156,8 +156,12 @@ def execute(
 
 def resume_run(directory: Path, *, listeners: Iterable[Listener] = ()) -> Result:
     """Continue the run of a directory."""
-    request = RunRequest.model_validate(read_manifest(directory)["request"])
-    return execute(request, directory, listeners=listeners, resume=True)
+    return execute(recorded_request(directory), directory, listeners=listeners, resume=True)
+
+
+def recorded_request(directory: Path) -> RunRequest:
+    """What the run of a directory was asked for."""
+    return RunRequest.model_validate(read_manifest(directory)["request"])
 
 
 def manifest(request: RunRequest, problem: Problem) -> dict[str, Any]:

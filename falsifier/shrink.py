@@ -161,7 +161,7 @@ def fewer_changes(problem: Problem, candidate: Candidate) -> Iterator[Candidate]
     """Each signal without one of its changes: what follows, what precedes or the neighbour is made equal."""
     for r in problem.space.inputs:
         values = candidate.signals[r.name].values
-        runs = _runs(values)
+        runs = stretches(values)
         for (before, start), (_, end) in pairwise(runs):
             left, right = values[before], values[start]
             yield _with_values(candidate, r.name, (*values[:start], *(left,) * (len(values) - start)))
@@ -185,7 +185,7 @@ def simple_stretches(problem: Problem, candidate: Candidate) -> Iterator[Candida
     """Each stretch of equal values moved to rest, a bound or another value of the signal."""
     for r in problem.space.inputs:
         values = candidate.signals[r.name].values
-        for first, end in _runs(values):
+        for first, end in stretches(values):
             for new in _simple_values(problem, r, values):
                 yield _with_values(
                     candidate, r.name, (*values[:first], *(new,) * (end - first), *values[end:])
@@ -198,9 +198,9 @@ def simpler_interpolation(problem: Problem, candidate: Candidate) -> Iterator[Ca
     for r in _free(problem):
         for interpolation in ways:
             signal = replace(candidate.signals[r.name], interpolation=interpolation)
-            yield _with_signal(candidate, r.name, signal)
-            kept = [first for first, _ in _runs(signal.values)]
-            yield _with_points(_with_signal(candidate, r.name, signal), r.name, kept)
+            yield with_signal(candidate, r.name, signal)
+            kept = [first for first, _ in stretches(signal.values)]
+            yield _with_points(with_signal(candidate, r.name, signal), r.name, kept)
 
 
 def rounder_numbers(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
@@ -222,7 +222,7 @@ def rounder_numbers(problem: Problem, candidate: Candidate) -> Iterator[Candidat
             for new in rounder(time):
                 if before < new < after:
                     times = (*signal.times[:k], new, *signal.times[k + 1 :])
-                    yield _with_signal(candidate, r.name, replace(signal, times=times))
+                    yield with_signal(candidate, r.name, replace(signal, times=times))
 
 
 PASSES: tuple[Pass, ...] = (
@@ -249,6 +249,17 @@ def constant_signal(problem: Problem, r: InputRange, value: float) -> Signal:
     )
 
 
+def stretches(values: tuple[float, ...]) -> list[tuple[int, int]]:
+    """Return first index and end index of each stretch of equal values."""
+    starts = [0, *(k + 1 for k, (a, b) in enumerate(pairwise(values)) if a != b), len(values)]
+    return list(pairwise(starts))
+
+
+def with_signal(candidate: Candidate, name: str, signal: Signal) -> Candidate:
+    """Return the candidate with another signal for one input."""
+    return replace(candidate, signals={**candidate.signals, name: signal})
+
+
 def _simple_values(problem: Problem, r: InputRange, values: tuple[float, ...]) -> list[float]:
     rest = rest_value(problem, r.name)
     known = (r.low, r.high, *sorted(set(values)))
@@ -259,29 +270,19 @@ def _free(problem: Problem) -> Iterator[InputRange]:
     return (r for r in problem.space.inputs if r.free is not None)
 
 
-def _runs(values: tuple[float, ...]) -> list[tuple[int, int]]:
-    """First index and end index of each stretch of equal values."""
-    starts = [0, *(k + 1 for k, (a, b) in enumerate(pairwise(values)) if a != b), len(values)]
-    return list(pairwise(starts))
-
-
 def _with_constant(problem: Problem, candidate: Candidate, name: str, value: float) -> Candidate:
     """Return the candidate with an input constant at a value, or a parameter at it."""
     for r in problem.space.inputs:
         if r.name == name:
-            return _with_signal(candidate, name, constant_signal(problem, r, value))
+            return with_signal(candidate, name, constant_signal(problem, r, value))
     return replace(candidate, parameters={**candidate.parameters, name: value})
 
 
 def _with_values(candidate: Candidate, name: str, values: tuple[float, ...]) -> Candidate:
-    return _with_signal(candidate, name, replace(candidate.signals[name], values=values))
+    return with_signal(candidate, name, replace(candidate.signals[name], values=values))
 
 
 def _with_points(candidate: Candidate, name: str, kept: list[int]) -> Candidate:
     signal = candidate.signals[name]
     times, values = (tuple(part[k] for k in kept) for part in (signal.times, signal.values))
-    return _with_signal(candidate, name, replace(signal, times=times, values=values))
-
-
-def _with_signal(candidate: Candidate, name: str, signal: Signal) -> Candidate:
-    return replace(candidate, signals={**candidate.signals, name: signal})
+    return with_signal(candidate, name, replace(signal, times=times, values=values))

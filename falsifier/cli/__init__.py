@@ -13,6 +13,10 @@ from falsifier.errors import FalsifierError
 _COMMANDS = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
     "resume": ("falsifier.cli.run", "Continue an interrupted run."),
+    "replay": ("falsifier.cli.counterexample", "Run a stored counterexample again."),
+    "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),
+    "explain": ("falsifier.cli.counterexample", "Say why a counterexample violates and what it takes."),
+    "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
     "info": ("falsifier.cli.inspect", "Show what an FMU says of itself."),
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),

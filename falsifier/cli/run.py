@@ -12,7 +12,7 @@ from falsifier.cli.options import json_option, out_option, problem_options, prob
 from falsifier.display import make_display, result_json, result_text
 from falsifier.engine import Result
 from falsifier.export import write_counterexample
-from falsifier.request import ModelRequest, RunRequest, execute, resume_run
+from falsifier.request import ModelRequest, RunRequest, execute, recorded_request, resume_run
 
 _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 130}
 
@@ -85,10 +85,18 @@ def resume(*, directory: Path, quiet: bool, as_json: bool) -> None:
 
 
 def _finish(result: Result, *, as_json: bool) -> None:
-    if result.counterexample is not None and result.directory is not None:
-        write_counterexample(result.problem, result.counterexample, result.directory)
+    if result.directory is not None:
+        _write_counterexamples(result, result.directory)
     click.echo(result_json(result) if as_json else result_text(result))
     sys.exit(_EXIT_CODES[result.status])
+
+
+def _write_counterexamples(result: Result, directory: Path) -> None:
+    request = recorded_request(directory).problem
+    if result.counterexample is not None:
+        write_counterexample(result.problem, result.counterexample, directory, request=request)
+    for i, fragile in enumerate(result.fragile, start=1):
+        write_counterexample(result.problem, fragile, directory, request=request, name=f"fragile-{i}.json")
 
 
 def _new_directory(target: str) -> Path:

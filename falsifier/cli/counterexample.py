@@ -1,0 +1,208 @@
+"""``falsifier replay``, ``shrink``, ``explain`` and ``export``: what is done with a counterexample."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from falsifier.cli.options import json_option
+from falsifier.confirm import Confirmation, confirm, other_interface
+from falsifier.counterexamples import (
+    Database,
+    Replayed,
+    StoredCounterexample,
+    counterexample_file,
+    load,
+    problem_of,
+    to_store,
+)
+from falsifier.counterexamples import (
+    replay as replay_stored,
+)
+from falsifier.display import signal_text, warn
+from falsifier.errors import CandidateError, SpecError
+from falsifier.evaluation import Evaluation, evaluate
+from falsifier.problem import Problem
+from falsifier.space import Candidate
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _run_argument(command: F) -> F:
+    return click.argument("run", metavar="RUN", type=click.Path(path_type=Path))(command)
+
+
+@click.command()
+@_run_argument
+@click.option("--other-interface", "other", is_flag=True, help="Simulate through the FMU's other interface.")
+@json_option
+def replay(*, run: Path, other: bool, as_json: bool) -> None:
+    """Run a counterexample again, whatever has changed since; exit code 1 when it still violates.
+
+    RUN is a run directory or a counterexample file.
+    """
+    stored = load(run)
+    with _problem(stored) as problem:
+        judged = other_interface(problem) if other else problem
+        replayed = replay_stored(stored, judged)
+        judged.model.close()
+    if replayed.status == "does not fit":
+        raise CandidateError(replayed.text)
+    click.echo(json.dumps(_replayed_json(replayed), indent=2) if as_json else replayed.text)
+    sys.exit(1 if replayed.status == "violates" else 0)
+
+
+@click.command()
+@_run_argument
+@click.option("--budget", type=int, default=500, show_default=True, help="Most simulations.")
+@click.option("--margin", type=float, default=0.0, help="Keep the robustness at or below minus this.")
+@click.option("--out", type=click.Path(path_type=Path), help="File; default: shrunk.json beside RUN's.")
+@click.option(
+    "--store", type=click.Path(path_type=Path), help="Keep it in this folder of counterexamples too."
+)
+@json_option
+def shrink(
+    *, run: Path, budget: int, margin: float, out: Path | None, store: Path | None, as_json: bool
+) -> None:
+    """Make a counterexample as simple as possible while it violates; the original is kept.
+
+    RUN is a run directory or a counterexample file.
+    """
+    from falsifier.export import write_counterexample
+    from falsifier.shrink import shrink as shrink_violation
+
+    stored = load(run)
+    file = out or counterexample_file(run).with_name("shrunk.json")
+    with _problem(stored) as problem:
+        original = _simulated(stored, problem)
+        shrunk = shrink_violation(
+            problem,
+            original,
+            budget=budget,
+            margin=margin,
+            progress=lambda simpler, n: warn(f"simulation {n}: {_inputs_line(simpler)}"),
+        )
+        confirmation = confirm(problem, shrunk.evaluation)
+    if confirmation.outcome == "refuted":
+        raise SpecError(f"{run}: {confirmation.reason}")
+    written = write_counterexample(problem, confirmation, file.parent, request=stored.problem, name=file.name)
+    if store is not None:
+        written.append(Database(store).save(problem, to_store(problem, confirmation, stored.problem)))
+    end = "a local minimum" if shrunk.minimal else f"the budget of {budget} simulations is used up"
+    if as_json:
+        content = _confirmation_json(confirmation)
+        content |= {"minimal": shrunk.minimal, "simulations": shrunk.simulations}
+        click.echo(json.dumps(content | {"files": list(map(str, written))}, indent=2))
+        return
+    click.echo(f"{problem.name}: shrunk with {shrunk.simulations} simulations, {end}")
+    click.echo(f"  {confirmation.outcome:<13}  {confirmation.reason}")
+    for line in _candidate_lines(confirmation.evaluation.candidate):
+        click.echo(f"  {line}")
+    click.echo(f"  files          {', '.join(map(str, written))}")
+
+
+@click.command()
+@_run_argument
+@json_option
+def explain(*, run: Path, as_json: bool) -> None:
+    """Say in a paragraph why a counterexample violates and which inputs it takes.
+
+    RUN is a run directory or a counterexample file.
+    """
+    from falsifier.explain import explain as explain_violation
+
+    stored = load(run)
+    with _problem(stored) as problem:
+        explanation = explain_violation(problem, _simulated(stored, problem))
+    if not as_json:
+        click.echo(explanation.text)
+        return
+    effects = [
+        {
+            "name": e.name,
+            "span": e.span,
+            "instead": e.instead,
+            "at_rest": e.is_rest,
+            "robustness": e.robustness,
+            "needed": e.needed,
+        }
+        for e in explanation.effects
+    ]
+    click.echo(json.dumps({"text": explanation.text, "effects": effects}, indent=2))
+
+
+@click.command()
+@_run_argument
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Default: export beside RUN's file."
+)
+@click.option(
+    "--store", type=click.Path(path_type=Path), help="Keep it in this folder of counterexamples too."
+)
+def export(*, run: Path, out: Path | None, store: Path | None) -> None:
+    """Write a counterexample for FMPy, fmusim, OpenModelica, Simulink and pytest.
+
+    RUN is a run directory or a counterexample file.
+    """
+    from falsifier.export import export_counterexample
+
+    stored = load(run)
+    directory = out or counterexample_file(run).with_name("export")
+    with _problem(stored) as problem:
+        written = export_counterexample(problem, stored, _simulated(stored, problem), directory)
+    if store is not None:
+        written.append(Database(store).save(problem, stored))
+    for path in written:
+        click.echo(str(path))
+
+
+@contextmanager
+def _problem(stored: StoredCounterexample) -> Iterator[Problem]:
+    """Problem of a counterexample, its model closed at the end."""
+    problem = problem_of(stored)
+    try:
+        yield problem
+    finally:
+        problem.model.close()
+
+
+def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
+    evaluation = evaluate(problem, problem.space.admit(Candidate.from_json(stored.candidate)))
+    if not evaluation.violated:
+        found = evaluation.reason or f"its robustness is {evaluation.robustness:+.6g} now"
+        raise SpecError(f"the counterexample of {problem.name} does not violate any more: {found}")
+    return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
+
+
+def _candidate_lines(candidate: Candidate) -> list[str]:
+    lines = [f"input          {name} {signal_text(signal)}" for name, signal in candidate.signals.items()]
+    return lines + [f"parameter      {name} = {value:.10g}" for name, value in candidate.parameters.items()]
+
+
+def _inputs_line(evaluation: Evaluation) -> str:
+    candidate = evaluation.candidate
+    parts = [f"{name} {signal_text(signal)}" for name, signal in candidate.signals.items()]
+    parts += [f"{name} = {value:.10g}" for name, value in candidate.parameters.items()]
+    return f"{'; '.join(parts)}; robustness {evaluation.robustness:+.6g}"
+
+
+def _replayed_json(replayed: Replayed) -> dict[str, Any]:
+    return {
+        "status": replayed.status,
+        "robustness": replayed.evaluation and replayed.evaluation.robustness,
+        "text": replayed.text,
+    }
+
+
+def _confirmation_json(confirmation: Confirmation) -> dict[str, Any]:
+    return {
+        **confirmation.evaluation.candidate.to_json(),
+        "robustness": confirmation.robustness,
+        "outcome": confirmation.outcome,
+        "reason": confirmation.reason,
+    }

@@ -1,0 +1,178 @@
+"""Why a counterexample violates: what decided it, and which inputs and parameters it takes.
+
+The way from the formula to the deciding predicate comes from the monitor. Which inputs matter comes from
+ablation: each signal, each of its stretches and each parameter is put back to rest, alone, and the model is
+simulated again.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from falsifier.errors import CandidateError
+from falsifier.evaluation import Evaluation, evaluate, monitor_for
+from falsifier.problem import Problem
+from falsifier.shrink import constant_signal, stretches, with_signal
+from falsifier.signals import Signal
+from falsifier.simplicity import rest_value
+from falsifier.space import Candidate, InputRange, ParameterRange
+from falsifier.stl import Diagnosis, in_words
+
+# Stretches of one signal that are put back one by one; the longest are taken.
+_MOST_STRETCHES = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What happens when one part of a counterexample is put back.
+
+    Attributes:
+        name: of the input or parameter.
+        span: begin and end in s of what was put back; None for a parameter or a whole signal.
+        instead: the value that it was put back to.
+        is_rest: whether that is the value at rest; otherwise it is the middle of the range.
+        robustness: then; None when the simulation failed.
+    """
+
+    name: str
+    span: tuple[float, float] | None
+    instead: float
+    is_rest: bool
+    robustness: float | None
+
+    @property
+    def needed(self) -> bool:
+        """Whether the violation vanishes without this part."""
+        return self.robustness is not None and self.robustness >= 0
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What a counterexample shows.
+
+    Attributes:
+        problem: what it violates.
+        evaluation: the counterexample.
+        diagnosis: the way from the formula to the predicate that decided.
+        effects: of putting parts back: whole signals and parameters, then stretches.
+    """
+
+    problem: Problem
+    evaluation: Evaluation
+    diagnosis: Diagnosis
+    effects: tuple[Effect, ...]
+
+    @property
+    def text(self) -> str:
+        """One paragraph."""
+        requirement = self.problem.requirement
+        demand = requirement.description or in_words(requirement.formula)
+        sentences = [
+            f"{self.problem.name} demands: {demand.rstrip('.')}.",
+            f"It is violated by {-self.diagnosis.robustness:.5g}: {self.diagnosis.text}",
+            *self._effect_sentences(),
+        ]
+        return " ".join(sentences)
+
+    def _effect_sentences(self) -> Iterator[str]:
+        whole = [e for e in self.effects if e.span is None]
+        needed = sorted((e for e in whole if e.needed), key=lambda e: -(e.robustness or 0.0))
+        if needed:
+            yield f"It takes {_listed([self._part(e) for e in needed])}."
+        idle = [e for e in whole if e.robustness is not None and not e.needed]
+        if idle:
+            yield f"It does not depend on {_listed([self._without(e) for e in idle])}."
+        for name in dict.fromkeys(e.name for e in needed):
+            spans = [e for e in self.effects if e.name == name and e.span is not None]
+            decisive = [e for e in spans if e.needed]
+            if decisive and len(decisive) < len(spans):
+                yield f"Of {name}, what counts is {_listed([self._stretch(e) for e in decisive])}."
+        failed = [e.name for e in whole if e.robustness is None]
+        if failed:
+            yield f"Without {_listed(failed)} the simulation fails."
+
+    def _part(self, effect: Effect) -> str:
+        return f"{effect.name} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
+
+    def _without(self, effect: Effect) -> str:
+        return f"{effect.name} ({self._instead(effect)} it is still {effect.robustness:+.4g})"
+
+    def _stretch(self, effect: Effect) -> str:
+        start, end = effect.span or (0.0, 0.0)
+        return f"{start:.4g} to {end:.4g} s ({self._instead(effect)} {effect.robustness:+.4g})"
+
+    def _instead(self, effect: Effect) -> str:
+        unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
+        meaning = "its rest value" if effect.is_rest else "the middle of its range"
+        return f"at {effect.instead:.4g}{f' {unit}' if unit else ''}, {meaning},"
+
+
+def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
+    """Diagnose a counterexample and put its parts back one by one.
+
+    Raises:
+        ValueError: when the evaluation has no trajectory.
+    """
+    if evaluation.trajectory is None:
+        raise ValueError("a simulation that failed cannot be explained")
+    diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
+    effects = tuple(_effects(problem, evaluation.candidate))
+    return Explanation(problem, evaluation, diagnosis, effects)
+
+
+def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
+    for r in problem.space.inputs:
+        signal = candidate.signals[r.name]
+        value, is_rest = _put_back_to(problem, r, signal.values)
+        whole = with_signal(candidate, r.name, constant_signal(problem, r, value))
+        yield Effect(r.name, None, value, is_rest, _robustness(problem, whole))
+    for p in problem.space.parameters:
+        value, is_rest = _put_back_to(problem, p, (candidate.parameters[p.name],))
+        changed = replace(candidate, parameters={**candidate.parameters, p.name: value})
+        yield Effect(p.name, None, value, is_rest, _robustness(problem, changed))
+    for r in problem.space.inputs:
+        signal = candidate.signals[r.name]
+        value, is_rest = _put_back_to(problem, r, signal.values)
+        for first, end in _longest(signal):
+            values = (*signal.values[:first], *(value,) * (end - first), *signal.values[end:])
+            if values == signal.values:
+                continue
+            changed = with_signal(candidate, r.name, replace(signal, values=values))
+            span = _span(signal, first, end, problem.space.stop_time)
+            yield Effect(r.name, span, value, is_rest, _robustness(problem, changed))
+
+
+def _put_back_to(
+    problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]
+) -> tuple[float, bool]:
+    """Rest value and True; the middle of the range and False where it rests already or rest is unknown."""
+    rest = rest_value(problem, ranged.name)
+    if rest is not None and any(v != rest for v in values):
+        return rest, True
+    return (ranged.low + ranged.high) / 2, False
+
+
+def _longest(signal: Signal) -> list[tuple[int, int]]:
+    """Stretches of equal values in time order, the longest where they are many; none where there is one."""
+    found = stretches(signal.values)
+    if len(found) < 2:
+        return []
+    return sorted(sorted(found, key=lambda s: s[0] - s[1])[:_MOST_STRETCHES])
+
+
+def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float, float]:
+    """Time over which control points reach: between the neighbours that stay, or until the next step."""
+    finish = signal.times[end] if end < len(signal.times) else stop_time
+    if signal.interpolation == "constant":
+        return signal.times[first], finish
+    return signal.times[max(first - 1, 0)], finish
+
+
+def _robustness(problem: Problem, candidate: Candidate) -> float | None:
+    try:
+        return evaluate(problem, problem.space.admit(candidate)).robustness
+    except CandidateError:
+        return None
+
+
+def _listed(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

@@ -1,0 +1,102 @@
+import json
+import shutil
+import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from falsifier.cli import main
+from falsifier.problem import bundled
+from tests.command import Done
+
+
+def run(folder: Path, *arguments: str) -> Done:
+    """Run ``falsifier`` in this process, in a folder."""
+    out, err = StringIO(), StringIO()
+    with (
+        chdir(folder),
+        redirect_stdout(out),
+        redirect_stderr(err),
+        pytest.MonkeyPatch.context() as patch,
+        pytest.raises(SystemExit) as ended,
+    ):
+        patch.setattr(sys, "argv", ["falsifier", *arguments])
+        main()
+    return Done(int(ended.value.code or 0), out.getvalue(), err.getvalue())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run of AT1 that found its counterexample."""
+    folder = tmp_path_factory.mktemp("counterexample")
+    done = run(folder, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run")
+    assert done.code == 1, done.err
+    return folder
+
+
+def test_replay_of_a_run_still_violates(folder: Path) -> None:
+    done = run(folder, "replay", "run", "--json")
+    assert done.code == 1, done.err
+    assert done.json["status"] == "violates"
+    assert done.json["robustness"] == pytest.approx(-0.2133, abs=1e-3)
+
+
+def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
+    done = run(folder, "shrink", "run", "--store", "kept", "--json")
+    assert done.code == 0, done.err
+    signals = done.json["signals"]
+    assert (signals["throttle"]["values"], signals["brake"]["values"]) == ([100.0], [0.0])
+    assert done.json["minimal"]
+    assert done.json["outcome"] == "confirmed"
+    assert [str(Path(f).parent) for f in done.json["files"]] == ["run", "run", "kept/AT.AT1"]
+    assert (folder / "run" / "counterexample.json").exists()
+    assert run(folder, "replay", done.json["files"][2]).code == 1
+
+
+def test_explain_names_what_it_takes(folder: Path) -> None:
+    done = run(folder, "explain", "run")
+    assert done.code == 0, done.err
+    for part in ("AT1 demands: The speed stays below 120 mph", "at 20 s", "It takes throttle", "brake"):
+        assert part in done.out
+    effects = run(folder, "explain", "run", "--json").json["effects"]
+    assert {e["name"]: e["needed"] for e in effects} == {"throttle": True, "brake": True}
+
+
+def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
+    done = run(folder, "export", "run", "--out", "exported")
+    assert done.code == 0, done.err
+    assert {Path(line).name for line in done.out.splitlines()} == {
+        *("counterexample.json", "input.csv", "start_values.json", "start_values.ssv"),
+        *("inputs.mat", "replay.py", "replay.mos", "test_AT1.py"),
+    }
+    assert all((folder / line).is_file() for line in done.out.splitlines())
+    assert run(folder, "replay", "exported").code == 1
+
+
+def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
+    shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "AT.fmu")
+    spec = (bundled("specs") / "AT.toml").read_text().replace("../fmus/", "")
+    (tmp_path / "my.toml").write_text(spec)
+    assert run(tmp_path, "run", "my.toml:AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
+    (tmp_path / "my.toml").write_text(f"{spec}\n[parameters]\nfinalDrive = 3.0\n")
+    done = run(tmp_path, "replay", "run/counterexample.json")
+    assert done.code == 0, done.err
+    assert done.out.startswith("AT1 does not violate: robustness +")
+    refused = run(tmp_path, "shrink", "run")
+    assert (refused.code, "does not violate any more" in refused.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["replay", "gone.json"], "no such file"),
+        (["shrink", "."], "has found no confirmed counterexample"),
+        (["explain", "broken.json"], "not a counterexample file"),
+    ],
+)
+def test_wrong_files_end_with_two(tmp_path: Path, arguments: list[str], message: str) -> None:
+    (tmp_path / "broken.json").write_text(json.dumps({"format": 1}))
+    done = run(tmp_path, *arguments)
+    assert (done.code, message in done.err) == (2, True), done.err
