@@ -10,7 +10,9 @@ from falsifier.budget import Spent
 from falsifier.engine import Result
 from falsifier.evaluation import Evaluation
 from falsifier.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunStarted
+from falsifier.problem import Problem
 from falsifier.signals import Signal
+from falsifier.space import Candidate
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -146,6 +148,18 @@ def signal_text(signal: Signal) -> str:
     return f"{signal.interpolation}: {', '.join(points)}"
 
 
+def candidate_lines(problem: Problem, candidate: Candidate) -> list[str]:
+    """One line an input and a parameter, as in a result."""
+    space = problem.space
+    units = {r.name: r.unit for r in space.inputs} | {p.name: p.unit for p in space.parameters}
+    lines = [
+        f"input          {n}{_bracketed(units[n])} {signal_text(s)}" for n, s in candidate.signals.items()
+    ]
+    return lines + [
+        f"parameter      {n}{_bracketed(units[n])} = {v:.10g}" for n, v in candidate.parameters.items()
+    ]
+
+
 def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
     verdict = evaluation.verdict
     lines = []
@@ -158,12 +172,7 @@ def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
         lines.append(f"  robustness     {verdict.robustness:+.6g}")
         lines.append(f"  critical time  {verdict.critical_time:.6g} s, at {verdict.predicate}")
         lines.append(f"  values there   {values}")
-    space = result.problem.space
-    units = {r.name: r.unit for r in space.inputs} | {p.name: p.unit for p in space.parameters}
-    for name, signal in evaluation.candidate.signals.items():
-        lines.append(f"  input          {name}{_bracketed(units[name])} {signal_text(signal)}")
-    for name, value in evaluation.candidate.parameters.items():
-        lines.append(f"  parameter      {name}{_bracketed(units[name])} = {value:.10g}")
+    lines += [f"  {line}" for line in candidate_lines(result.problem, evaluation.candidate)]
     if evaluation.candidate.rationale:
         lines.append(f"  rationale      {evaluation.candidate.rationale}")
     return lines

@@ -24,7 +24,7 @@ from falsifier.counterexamples import (
 from falsifier.counterexamples import (
     replay as replay_stored,
 )
-from falsifier.display import signal_text, warn
+from falsifier.display import candidate_lines, signal_text, warn
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation import Evaluation, evaluate
 from falsifier.problem import Problem
@@ -101,7 +101,7 @@ def shrink(
         return
     click.echo(f"{problem.name}: shrunk with {shrunk.simulations} simulations, {end}")
     click.echo(f"  {confirmation.outcome:<13}  {confirmation.reason}")
-    for line in _candidate_lines(confirmation.evaluation.candidate):
+    for line in candidate_lines(problem, confirmation.evaluation.candidate):
         click.echo(f"  {line}")
     click.echo(f"  files          {', '.join(map(str, written))}")
 
@@ -177,11 +177,6 @@ def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
         found = evaluation.reason or f"its robustness is {evaluation.robustness:+.6g} now"
         raise SpecError(f"the counterexample of {problem.name} does not violate any more: {found}")
     return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
-
-
-def _candidate_lines(candidate: Candidate) -> list[str]:
-    lines = [f"input          {name} {signal_text(signal)}" for name, signal in candidate.signals.items()]
-    return lines + [f"parameter      {name} = {value:.10g}" for name, value in candidate.parameters.items()]
 
 
 def _inputs_line(evaluation: Evaluation) -> str:

@@ -1,0 +1,196 @@
+"""Requirements as tests: ``pytest --falsifier specs/`` collects each requirement of each spec file.
+
+Stored counterexamples are run first, then a bounded search looks for a new one. Ordinary tests use the
+fixture ``falsifier_check``. This module stands outside the package, so that pytest loads nothing of the
+package unless it is asked to.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from falsifier.check import Checked
+    from falsifier.problem import Problem
+
+_DEFAULT_BUDGET = 100
+_DEFAULT_DATABASE = "counterexamples"
+_OPTIONS = ("budget", "engine", "seed")
+
+
+class FalsifiedError(AssertionError):
+    """A requirement is violated; the message is all that there is to say."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options and their ini keys."""
+    group = parser.getgroup("falsifier", "requirements of FMUs")
+    group.addoption("--falsifier", action="store_true", help="collect the requirements of spec files (.toml)")
+    group.addoption(
+        "--falsifier-budget", metavar="N", type=int, help=f"simulations a requirement ({_DEFAULT_BUDGET})"
+    )
+    group.addoption("--falsifier-engine", metavar="NAME", help="search engine")
+    group.addoption("--falsifier-seed", metavar="N", type=int, help="seed of the engine (0)")
+    group.addoption(
+        "--falsifier-database",
+        metavar="DIR",
+        help=f"folder of stored counterexamples, relative to the root ({_DEFAULT_DATABASE})",
+    )
+    for name in (*_OPTIONS, "database"):
+        parser.addini(f"falsifier_{name}", f"same as --falsifier-{name}")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the marker."""
+    config.addinivalue_line(
+        "markers",
+        "falsifier(budget=, engine=, seed=): how a requirement is checked; collected requirements bear it",
+    )
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Collect spec files when --falsifier is given."""
+    if not parent.config.getoption("falsifier") or file_path.suffix != ".toml":
+        return None
+    import tomllib
+
+    try:
+        content = tomllib.loads(file_path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError):
+        return None
+    if not {"model", "requirements"} <= content.keys():
+        return None
+    return SpecFile.from_parent(parent, path=file_path)
+
+
+class SpecFile(pytest.File):
+    """A spec file; its requirements are the tests."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """Yield one item a requirement."""
+        from falsifier.errors import SpecError
+        from falsifier.spec import read_spec
+
+        try:
+            spec = read_spec(self.path)
+        except SpecError as error:
+            raise self.CollectError(str(error)) from None
+        for name in spec.requirements:
+            item = RequirementItem.from_parent(self, name=name)
+            item.add_marker(pytest.mark.falsifier)
+            yield item
+
+
+class RequirementItem(pytest.Item):
+    """One requirement."""
+
+    def runtest(self) -> None:
+        """Check it."""
+        _check(self, f"{self.path}:{self.name}", {})
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """Show what was found, without the plugin's own lines."""
+        from falsifier.errors import FalsifierError
+
+        if isinstance(excinfo.value, FalsifiedError | FalsifierError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        """Where the item stands."""
+        return self.path, None, f"{self.path.name}:{self.name}"
+
+
+@pytest.fixture
+def falsifier_check(request: pytest.FixtureRequest) -> Callable[..., "Checked"]:
+    """Fixture: ``falsifier_check(problem, budget=..., engine=..., seed=...)`` fails at a violation.
+
+    The problem is a ``Problem``, or what ``falsifier run`` takes: ``"AT1"``, ``"my.toml:REQ"``.
+    """
+
+    def check(problem: "Problem | str", **options: Any) -> "Checked":
+        __tracebackhide__ = True
+        unknown = options.keys() - set(_OPTIONS)
+        if unknown:
+            raise TypeError(f"falsifier_check: unknown {sorted(unknown)}, known: {', '.join(_OPTIONS)}")
+        return _check(request.node, problem, options)
+
+    return check
+
+
+def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) -> "Checked":
+    """Check a problem and fail where it is violated."""
+    __tracebackhide__ = True
+    from falsifier.check import check
+    from falsifier.counterexamples import Database
+    from falsifier.request import ProblemRequest
+
+    config = item.config
+    marker = item.get_closest_marker("falsifier")
+    options = {
+        **{name: _setting(config, name) for name in _OPTIONS},
+        **(marker.kwargs if marker else {}),
+        **stated,
+    }
+    request = ProblemRequest(target=problem) if isinstance(problem, str) else None
+    loaded = request.load() if request else problem
+    assert not isinstance(loaded, str)
+    folder = config.rootpath / (_setting(config, "database") or _DEFAULT_DATABASE)
+    try:
+        checked = check(
+            loaded,
+            engine=options["engine"],
+            budget=int(options["budget"] or _DEFAULT_BUDGET),
+            seed=int(options["seed"] or 0),
+            database=Database(folder),
+            request=request,
+        )
+        if checked.counterexample is not None:
+            raise FalsifiedError(_message(item, checked))
+    finally:
+        loaded.model.close()
+    return checked
+
+
+def _setting(config: pytest.Config, name: str) -> Any:
+    """Value of the command line, else of the ini file, else None."""
+    stated = config.getoption(f"falsifier_{name}")
+    return stated if stated is not None else config.getini(f"falsifier_{name}") or None
+
+
+def _message(item: pytest.Item, checked: "Checked") -> str:
+    """Counterexample, its picture and the command that runs it again."""
+    from falsifier.display import candidate_lines
+    from falsifier.explain import explain
+    from falsifier.plotting import plot_evaluation, save_figure
+
+    problem, found = checked.problem, checked.counterexample
+    assert found is not None
+    pictures = item.config.cache.mkdir("falsifier") if item.config.cache else item.config.rootpath
+    picture = pictures / f"{problem.name}.png"
+    save_figure(plot_evaluation(problem, found.evaluation), picture)
+    how = (
+        "a stored counterexample violates it" if checked.result is None else "a search found a counterexample"
+    )
+    lines = [
+        f"{problem.name} is violated: {how}",
+        f"  requirement    {problem.requirement.formula}",
+        f"  confirmed      {found.reason}",
+        *(f"  {line}" for line in candidate_lines(problem, found.evaluation.candidate)),
+        f"  picture        {picture}",
+    ]
+    if checked.file is not None:
+        lines.append(f"  stored         {checked.file}")
+        lines.append(f"  again          {_command(item, checked)}")
+    return "\n".join([*lines, "", explain(problem, found.evaluation).text])
+
+
+def _command(item: pytest.Item, checked: "Checked") -> str:
+    """Command that runs the counterexample again; of a problem made in Python, the test itself."""
+    from falsifier.counterexamples import load
+
+    assert checked.file is not None
+    loadable = load(checked.file).problem is not None
+    return f"falsifier replay {checked.file}" if loadable else f"pytest '{item.nodeid}'"

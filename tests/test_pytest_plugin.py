@@ -1,0 +1,145 @@
+"""The plugin as its users see it: pytest in another process, in a small repository of FMU and spec."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from falsifier.problem import bundled
+from tests.command import ROOT
+
+SPEC = """
+[model]
+fmu = "../fmus/AT.fmu"
+interface = "co-simulation"
+stop_time = 30.0
+output_interval = 0.05
+[inputs.throttle]
+control_points = 2
+[inputs.brake]
+control_points = 1
+[requirements.fast]
+formula = "G[0,20] (speed <= 120)"
+[requirements.impossible]
+formula = "G[0,20] (speed <= 500)"
+"""
+
+
+def run_pytest(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "pytest_falsifier", *arguments],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("repository")
+    for name in ("fmus", "specs", "tests"):
+        (folder / name).mkdir()
+    shutil.copy(bundled("fmus") / "AT.fmu", folder / "fmus" / "AT.fmu")
+    (folder / "specs" / "car.toml").write_text(SPEC)
+    (folder / "specs" / "other.toml").write_text("[tool]\nname = 'not a spec'\n")
+    (folder / "pytest.ini").write_text("[pytest]\nfalsifier_budget = 10\nfalsifier_engine = corners\n")
+    return folder
+
+
+def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_replayed(
+    repository: Path,
+) -> None:
+    first = run_pytest(repository, "--falsifier", "specs", "-rA")
+    assert first.returncode == 1, first.stdout + first.stderr
+    assert "1 failed, 1 passed" in first.stdout
+    for part in (
+        "fast is violated: a search found a counterexample",
+        "throttle [%] constant 100",
+        "brake [ft.lbf] constant 0",
+        "It takes throttle",
+        "again          falsifier replay",
+    ):
+        assert part in first.stdout
+    pictures = [line.split()[-1] for line in first.stdout.splitlines() if line.startswith("  picture ")]
+    assert Path(pictures[0]).read_bytes().startswith(b"\x89PNG")
+    stored = list((repository / "counterexamples").rglob("*.json"))
+    assert [p.parent.name for p in stored] == ["car.fast"]
+    assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
+    second = run_pytest(repository, "--falsifier", "specs", "-k", "fast")
+    assert "fast is violated: a stored counterexample violates it" in second.stdout
+    assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier").returncode == 5
+
+
+def test_distributed_tests_give_the_same(repository: Path) -> None:
+    pytest.importorskip("xdist")
+    done = run_pytest(repository, "--falsifier", "specs", "-n", "2")
+    assert "1 failed, 1 passed" in done.stdout, done.stdout
+
+
+def test_without_the_option_specs_are_no_tests(repository: Path) -> None:
+    assert run_pytest(repository, "specs").returncode == 5
+
+
+def test_a_broken_spec_is_an_error_that_names_the_key(repository: Path) -> None:
+    broken = repository / "broken.toml"
+    broken.write_text(SPEC.replace("control_points = 2", "control_pionts = 2"))
+    done = run_pytest(repository, "--falsifier", "broken.toml")
+    assert done.returncode == 2
+    assert "inputs.throttle.control_pionts: unknown key; did you mean 'control_points'" in done.stdout
+    assert "Traceback" not in done.stdout
+
+
+def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
+    (repository / "tests" / "test_lag.py").write_text(
+        """
+import pytest
+from tests.problems import lag_problem
+
+def test_holds(falsifier_check):
+    checked = falsifier_check(lag_problem("G[0,10] (x <= 2)"), budget=7)
+    assert checked.result.spent.simulations == 7
+
+@pytest.mark.falsifier(budget=3, engine="uniform")
+def test_marked(falsifier_check):
+    assert falsifier_check(lag_problem("G[0,10] (x <= 2)")).result.spent.simulations == 3
+
+def test_violated(falsifier_check):
+    falsifier_check(lag_problem("G[0,10] (x <= 0.5)"))
+
+def test_by_name(falsifier_check):
+    falsifier_check("specs/car.toml:impossible", budget=2)
+
+def test_typo(falsifier_check):
+    with pytest.raises(TypeError, match="unknown .*bugdet"):
+        falsifier_check(lag_problem(), bugdet=3)
+"""
+    )
+    done = run_pytest(repository, "tests")
+    assert "1 failed, 4 passed" in done.stdout, done.stdout
+    assert "LAG is violated: a search found a counterexample" in done.stdout
+    assert "again          pytest 'tests/test_lag.py::test_violated'" in done.stdout
+    assert "pytest_falsifier.py" not in done.stdout
+
+
+def test_importing_the_plugin_costs_little_and_loads_nothing_of_the_package() -> None:
+    code = (
+        "import pytest, sys, time; start = time.perf_counter(); import pytest_falsifier; "
+        "print(time.perf_counter() - start, {'falsifier', 'numpy'} & {m.split('.')[0] for m in sys.modules})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    seconds, modules = done.stdout.split(maxsplit=1)
+    assert float(seconds) < 0.05
+    assert modules.strip() == "set()"
