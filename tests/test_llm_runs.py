@@ -9,12 +9,12 @@ from falsifier.journal import ExchangeRecord, read_journal
 from tests.command import falsifier
 from tests.llm.server import Step, serving
 
-BRAKE_LATE = [100, 100, 100, 0, 0, 0, 0]
-FULL = [100] * 7
+BRAKE_LATE = [100.0, 100.0, 100.0, 0.0, 0.0, 0.0, 0.0]
+FULL = [100.0] * 7
 ENV = {"OPENAI_API_KEY": "sk-test-not-a-key", "XDG_CACHE_HOME": "cache"}
 
 
-def reply(throttle: list[float], brake: tuple[float, ...] = (0, 0, 0), rationale: str = "because") -> Step:
+def reply(throttle: list[float], brake: tuple[float, ...] = (0.0, 0.0, 0.0), rationale: str = "because") -> Step:
     signals = [{"name": "throttle", "values": throttle}, {"name": "brake", "values": list(brake)}]
     return Step(json.dumps({"rationale": rationale, "signals": signals}))
 
