@@ -4,7 +4,7 @@
 
     manifest.json        what was asked for, and with which versions; written once
     journal.jsonl        what happened, one JSON object a line, only ever appended to
-    trajectories/N.npz   outputs and inputs of evaluation N; in long runs of improvements only
+    trajectories/N.npz   outputs and inputs of evaluation N; which ones are kept, Keep says
     lock                 held while a process writes here
 
 Lines are written before and after every simulation and at every reply of a language model. A line that was
@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 # Longest time in s that lines may wait in the operating system's cache before they are forced to disk;
 # replies of a language model cost money and never wait.
 _SYNC_PERIOD = 1.0
-# Trajectories of the first evaluations are kept all, later ones only where they improve on the best.
+# Which trajectories are kept. history: those of the first evaluations all, later ones where they improve on
+# the best; best: only the best one's, for campaigns of very many runs.
+Keep = Literal["history", "best"]
 _KEPT_TRAJECTORIES = 200
 
 
@@ -103,19 +105,29 @@ class EndedRecord(_Record):
 
 
 Record = AskedRecord | EvaluatedRecord | ExchangeRecord | ConfirmedRecord | EndedRecord
-_RECORDS: TypeAdapter[Record] = TypeAdapter(Record)
+RECORDS: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator="kind")])
 
 
 class Journal:
-    """Writes one run directory; the only writer while it is open."""
+    """Writes one run directory; the only writer while it is open.
 
-    def __init__(self, directory: Path) -> None:
+    Args:
+        directory: made where it is missing.
+        keep: which trajectories are kept.
+        patience: how long in s to wait for another process that writes here.
+
+    Raises:
+        JournalError: when another process still writes here after that time.
+    """
+
+    def __init__(self, directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> None:
         self.directory = directory
+        self._keep = keep
         directory.mkdir(parents=True, exist_ok=True)
         (directory / "trajectories").mkdir(exist_ok=True)
         self._lock = FileLock(directory / "lock")
         try:
-            self._lock.acquire(timeout=0)
+            self._lock.acquire(timeout=patience)
         except Timeout:
             raise JournalError(f"{directory}: another process is writing this run") from None
         _drop_torn_line(directory / "journal.jsonl")
@@ -133,7 +145,8 @@ class Journal:
     def evaluated(self, index: int, evaluation: Evaluation, *, improved: bool) -> None:
         """Append an evaluation, and save its trajectory where it is one to keep."""
         name = None
-        if evaluation.trajectory is not None and (improved or index < _KEPT_TRAJECTORIES):
+        every = self._keep == "history" and index < _KEPT_TRAJECTORIES
+        if evaluation.trajectory is not None and (improved or every):
             name = f"trajectories/{index}.npz"
             evaluation.trajectory.save(self.directory / name)
         self.write(
@@ -154,6 +167,10 @@ class Journal:
                 trajectory=name,
             )
         )
+        if name is not None and self._keep == "best":
+            for path in (self.directory / "trajectories").glob("*.npz"):
+                if path != self.directory / name:
+                    path.unlink()
 
     def close(self) -> None:
         """Force everything to disk and let others write here."""
@@ -165,9 +182,9 @@ class Journal:
 
 
 @contextmanager
-def open_journal(directory: Path) -> Iterator[Journal]:
-    """Journal of a run directory, closed at the end whatever happens."""
-    journal = Journal(directory)
+def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> Iterator[Journal]:
+    """Journal of a run directory, closed at the end whatever happens; see Journal."""
+    journal = Journal(directory, keep=keep, patience=patience)
     try:
         yield journal
     finally:
@@ -187,7 +204,7 @@ def read_journal(directory: Path) -> list[Record]:
     records = []
     for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn or empty
         try:
-            records.append(_RECORDS.validate_json(line))
+            records.append(RECORDS.validate_json(line))
         except ValidationError as error:
             raise JournalError(f"{path}: line {number} is damaged: {error.errors()[0]['msg']}") from None
     return records
@@ -209,15 +226,19 @@ def read_manifest(directory: Path) -> dict[str, Any]:
 
 
 def write_manifest(directory: Path, manifest: dict[str, Any]) -> None:
-    """Write the manifest in one step, so that a crash leaves the whole of it or none."""
-    directory.mkdir(parents=True, exist_ok=True)
-    partial = directory / "manifest.json.partial"
+    """Write the manifest of a run directory."""
+    write_whole(directory / "manifest.json", json.dumps(manifest, indent=2) + "\n")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file in one step, so that a crash leaves the whole of it or none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
     with partial.open("w", encoding="utf-8") as file:
-        json.dump(manifest, file, indent=2)
-        file.write("\n")
+        file.write(text)
         file.flush()
         os.fsync(file.fileno())
-    partial.replace(directory / "manifest.json")
+    partial.replace(path)
 
 
 def answered_exchanges(records: Iterable[Record]) -> list["Exchange"]:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,6 +23,7 @@ from falsifier.events import Listener
 from falsifier.execution import local_executor
 from falsifier.journal import (
     Journal,
+    Keep,
     Record,
     answered_exchanges,
     open_journal,
@@ -31,6 +33,7 @@ from falsifier.journal import (
 )
 from falsifier.model import Interface
 from falsifier.problem import Problem, load_problem
+from falsifier.space import InputRange, ParameterRange
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Chat
@@ -45,7 +48,10 @@ class _Strict(BaseModel):
 
 
 class ProblemRequest(_Strict):
-    """Which problem: a spec's requirement, or an FMU with a formula, and changes to either."""
+    """Which problem: a spec's requirement, or an FMU with a formula, and changes to either.
+
+    The target ``python:MODULE:NAME`` is a Problem made in Python, or a function that returns one.
+    """
 
     target: str
     stl: str | None = None
@@ -71,7 +77,11 @@ class ProblemRequest(_Strict):
             output_interval=self.output_interval,
             interface=self.interface,
         )
-        if self.target.endswith(".fmu"):
+        if self.target.startswith("python:"):
+            if self.model_copy(update={"parameterization": "free"}) != ProblemRequest(target=self.target):
+                raise SpecError(f"{self.target}: a problem made in Python cannot be changed from outside")
+            problem = _python_problem(self.target)
+        elif self.target.endswith(".fmu"):
             if self.stl is None:
                 raise SpecError(f"{self.target}: give the requirement with --stl 'G[0,10] (SIGNAL <= 1)'")
             problem = adhoc_problem(Path(self.target), self.stl, changes=changes)
@@ -104,6 +114,35 @@ class RunRequest(_Strict):
     seed: int = Field(0, ge=0)
     budget: Budget = Budget()
     jobs: int = Field(1, ge=1)
+    keep: Keep = "history"
+
+
+class InputRecord(_Strict):
+    """One searched input or parameter, so that a run can be drawn without its model."""
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+    description: str = ""
+
+
+class Manifest(_Strict):
+    """What a run directory says of how it came to be."""
+
+    falsifier: str = Field(description="Version of this package.")
+    python: str
+    platform: str
+    packages: dict[str, str] = Field(description="Versions of the packages that decide numbers.")
+    started: str = Field(description="Date and time in UTC.")
+    request: RunRequest
+    source: str = Field(description="Where the problem was loaded from.")
+    requirement: dict[str, str] = Field(description="name, formula and description of the requirement.")
+    model: str = Field(description="Name of the model.")
+    inputs: tuple[InputRecord, ...]
+    parameters: tuple[InputRecord, ...]
+    stop_time: float = Field(description="End of each simulation in s.")
+    hashes: dict[str, str] = Field(description="SHA-256 by path of the FMU and the spec.")
 
 
 def fixed_parameterization(problem: Problem) -> Problem:
@@ -124,22 +163,49 @@ def execute(
         ChatError: when the language model cannot be used, before the first simulation.
     """
     problem = request.problem.load()
+    return perform(
+        request, problem, manifest(request, problem), directory, listeners=listeners, resume=resume
+    )
+
+
+def perform(
+    request: RunRequest,
+    problem: Problem,
+    described: Manifest,
+    directory: Path | None,
+    *,
+    listeners: Iterable[Listener] = (),
+    resume: bool = False,
+    patience: float = 0.0,
+) -> Result:
+    """Run a request whose problem is loaded, like execute.
+
+    Args:
+        request: what to run.
+        problem: of the request.
+        described: manifest of the request.
+        directory: of the run; None: nothing is recorded.
+        listeners: called with every event.
+        resume: go on where the directory's journal ends; start where there is none.
+        patience: how long in s to wait for another process that writes to the directory.
+    """
     with ExitStack() as stack:
         journal: Journal | None = None
         records: Sequence[Record] = ()
-        if directory is not None and resume:
-            journal = stack.enter_context(open_journal(directory))
-            _check_unchanged(directory, problem)
-            records = read_journal(directory)
-        build = proposer_builder(request, problem, records)
-        if directory is not None and not resume:  # only now: a wrong engine or a missing key leaves no folder
-            if (directory / "manifest.json").exists():
+        begun = directory is not None and (directory / "manifest.json").exists()
+        if directory is not None and begun:
+            if not resume:
                 raise JournalError(
                     f"{directory} already holds a run: choose another --out, or continue it with "
                     f"'falsifier resume {directory}'"
                 )
-            journal = stack.enter_context(open_journal(directory))
-            write_manifest(directory, manifest(request, problem))
+            journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
+            check_unchanged(directory, read_manifest(directory)["hashes"], described.hashes)
+            records = read_journal(directory)
+        build = proposer_builder(request, problem, records)
+        if directory is not None and not begun:  # only now: a wrong engine or a missing key leaves no folder
+            journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
+            write_manifest(directory, described.model_dump(mode="json"))
         executor = stack.enter_context(local_executor(request.jobs))
         stack.callback(problem.model.close)
         return search(
@@ -164,18 +230,34 @@ def recorded_request(directory: Path) -> RunRequest:
     return RunRequest.model_validate(read_manifest(directory)["request"])
 
 
-def manifest(request: RunRequest, problem: Problem) -> dict[str, Any]:
-    """What a run directory says of how it came to be."""
+def manifest(request: RunRequest, problem: Problem) -> Manifest:
+    """Describe a run before it starts."""
+    space, requirement = problem.space, problem.requirement
+    return Manifest(
+        **environment(),
+        request=request,
+        source=problem.source,
+        requirement={
+            "name": problem.name,
+            "formula": str(requirement.formula),
+            "description": requirement.description,
+        },
+        model=problem.info.name,
+        inputs=tuple(_range_record(r) for r in space.inputs),
+        parameters=tuple(_range_record(p) for p in space.parameters),
+        stop_time=space.stop_time,
+        hashes=file_hashes(problem),
+    )
+
+
+def environment() -> dict[str, Any]:
+    """Versions, platform and time, as manifests state them."""
     return {
         "falsifier": __version__,
         "python": sys.version.split()[0],
         "platform": platform.platform(),
         "packages": {name: found for name in _RECORDED_PACKAGES if (found := _version(name))},
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "request": request.model_dump(mode="json"),
-        "source": problem.source,
-        "requirement": {"name": problem.name, "formula": str(problem.requirement.formula)},
-        "hashes": file_hashes(problem),
     }
 
 
@@ -184,6 +266,17 @@ def file_hashes(problem: Problem) -> dict[str, str]:
     spec = problem.source.rpartition(":")[0]
     paths = [getattr(problem.model, "path", None), Path(spec) if spec.endswith(".toml") else None]
     return {str(p): sha256(Path(p).read_bytes()).hexdigest() for p in paths if p is not None}
+
+
+def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
+    """Refuse to continue with other files than those that a run or campaign was started with.
+
+    Raises:
+        JournalError: naming the file that has changed.
+    """
+    for path, digest in found.items():
+        if recorded.get(path, digest) != digest:
+            raise JournalError(f"{directory}: {path} has changed since this was started; start anew")
 
 
 def proposer_builder(request: RunRequest, problem: Problem, records: Sequence[Record]) -> ProposerBuilder:
@@ -224,11 +317,26 @@ def _chat(model: ModelRequest, records: Sequence[Record]) -> "Chat":
     return RecordedChat(answered_exchanges(records), chat)
 
 
-def _check_unchanged(directory: Path, problem: Problem) -> None:
-    recorded = read_manifest(directory)["hashes"]
-    for path, digest in file_hashes(problem).items():
-        if recorded.get(path, digest) != digest:
-            raise JournalError(f"{directory}: {path} has changed since this run was started; start a new run")
+def _python_problem(target: str) -> Problem:
+    _, module, name = [*target.split(":"), "", ""][:3]
+    try:
+        found = getattr(import_module(module), name)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise SpecError(f"{target}: expected python:MODULE:NAME of something importable: {error}") from None
+    problem = found() if callable(found) else found
+    if not isinstance(problem, Problem):
+        raise SpecError(f"{target}: expected a Problem or a function that returns one")
+    return replace(problem, source=problem.source or target)
+
+
+def _range_record(range_: InputRange | ParameterRange) -> InputRecord:
+    return InputRecord(
+        name=range_.name,
+        low=range_.low,
+        high=range_.high,
+        unit=range_.unit,
+        description=range_.description,
+    )
 
 
 def _version(package: str) -> str | None:

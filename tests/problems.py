@@ -62,3 +62,18 @@ def lag_problem(
     )
     model = FunctionModel(function, INFO)  # type: ignore[arg-type]
     return Problem(model, Requirement("LAG", parse(stl)), space, Experiment(STOP, STEP, ("x",)))
+
+
+def easy() -> Problem:
+    """Falsified by full input: one of the corners."""
+    return lag_problem()
+
+
+def hard() -> Problem:
+    """Falsified by random inputs now and then."""
+    return lag_problem("G[0,10] (x <= 0.6)")
+
+
+def impossible() -> Problem:
+    """Never falsified."""
+    return lag_problem("G[0,10] (x <= 2)")

@@ -1,0 +1,141 @@
+"""What a campaign runs, as values: methods, requests and names."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from hashlib import sha256
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from falsifier.budget import Budget
+from falsifier.errors import SpecError
+from falsifier.request import ModelRequest, ProblemRequest, RunRequest
+
+_HASH_DIGITS = 10
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Method:
+    """How runs search: what a table has one column or block of rows for.
+
+    Runs that differ in any of these are never counted together.
+
+    Attributes:
+        engine: name of the engine; empty when a language model leads the search.
+        model: name of the language model, or empty.
+        effort: its reasoning effort, or empty.
+        variant: its prompt variant, or empty.
+        parameterization: ``free`` or ``fixed``.
+        profile: of the specs, or empty.
+    """
+
+    engine: str = ""
+    model: str = ""
+    effort: str = ""
+    variant: str = ""
+    parameterization: str = "fixed"
+    profile: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name for people, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
+        model = " ".join(p for p in (self.model.rpartition("/")[2], self.effort, self.variant) if p)
+        name = " + ".join(p for p in (self.engine, model) if p) or "default engine"
+        extra = [self.parameterization] if self.parameterization != "fixed" else []
+        return ", ".join([name, *extra, *([self.profile] if self.profile else [])])
+
+
+class CampaignRequest(BaseModel):
+    """What a campaign runs and may spend.
+
+    Attributes:
+        runs: every run.
+        limits: what all runs together may spend; None: no limit beside the runs' own.
+        calls: most runs with a language model at a time, on all workers together. A run asks one question
+            at a time, so this limits the provider's concurrent requests too.
+        suite: name of the suite that the runs come from, or None.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    runs: tuple[RunRequest, ...] = Field(min_length=1)
+    limits: Budget | None = None
+    calls: int = Field(8, ge=1)
+    suite: str | None = None
+
+    def named(self) -> dict[str, RunRequest]:
+        """Runs by the name of their directory, in order.
+
+        Raises:
+            SpecError: when one run is asked for twice.
+        """
+        runs = {run_name(request): request for request in self.runs}
+        if len(runs) < len(self.runs):
+            raise SpecError(
+                "this campaign asks for the same run twice: give each requirement and engine once"
+            )
+        return runs
+
+
+def cross(
+    problems: Iterable[ProblemRequest],
+    methods: Iterable[Method],
+    *,
+    seeds: Iterable[int],
+    budget: Budget,
+    api_base: str | None = None,
+) -> tuple[RunRequest, ...]:
+    """All runs of problems x methods x seeds, in this order.
+
+    The method decides each problem's parameterization and profile.
+    """
+    seeds, methods = tuple(seeds), tuple(methods)
+    return tuple(
+        RunRequest(
+            problem=problem.model_copy(
+                update={"parameterization": method.parameterization, "profile": method.profile or None}
+            ),
+            engine=method.engine or None,
+            model=_model_request(method, api_base),
+            seed=seed,
+            budget=budget,
+            keep="best",
+        )
+        for problem in problems
+        for method in methods
+        for seed in seeds
+    )
+
+
+def method_of(request: RunRequest) -> Method:
+    """Method of a run."""
+    model = request.model
+    return Method(
+        request.engine or "",
+        model.name if model else "",
+        (model.effort or "") if model else "",
+        (model.variant or "") if model else "",
+        request.problem.parameterization,
+        request.problem.profile or "",
+    )
+
+
+def run_name(request: RunRequest) -> str:
+    """Name of a run's directory: readable, and different for every difference in the request."""
+    requirement = re.split(r"[:/]", request.problem.target)[-1]
+    digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
+    readable = f"{requirement}-{method_of(request).label}-{request.seed}"
+    return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable).strip('-.')}-{digest}"
+
+
+def _model_request(method: Method, api_base: str | None) -> ModelRequest | None:
+    if not method.model:
+        return None
+    return ModelRequest.model_validate(
+        {
+            "name": method.model,
+            "effort": method.effort or None,
+            "api_base": api_base,
+            "variant": method.variant or None,
+        }
+    )

@@ -1,0 +1,146 @@
+"""What a run's journal says in numbers, line by line, as it grows."""
+
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from falsifier.budget import Spent
+from falsifier.errors import JournalError
+from falsifier.journal import (
+    RECORDS,
+    AskedRecord,
+    ConfirmedRecord,
+    EndedRecord,
+    EvaluatedRecord,
+    ExchangeRecord,
+    Record,
+)
+
+RunStatus = Literal["waiting", "running", "falsified", "not falsified", "interrupted", "failed"]
+FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
+
+# Candidates are long and say nothing that is counted here.
+_ASKED = b'{"kind":"asked"'
+
+
+class Tally:
+    """Numbers of one run, kept up to date by feeding it journal lines in order.
+
+    Attributes:
+        status: ``waiting`` before the first line; ``running`` until the run has ended.
+        reason: why it ended, in words.
+        robustness: of each evaluation in order; NaN where the simulation gave none.
+        best: index of the smallest robustness, or None.
+        verdict: what the journal says of the best evaluation's verdict.
+        counterexample: index of the confirmed violation, or None.
+        unconfirmed: what was said of violations that were not confirmed.
+        trajectories: file names of kept trajectories by evaluation.
+        spent: what the run has used.
+    """
+
+    def __init__(self) -> None:
+        self.status: RunStatus = "waiting"
+        self.reason = ""
+        self.best: int | None = None
+        self.verdict: dict[str, Any] | None = None
+        self.counterexample: int | None = None
+        self.unconfirmed: dict[int, str] = {}
+        self.trajectories: dict[int, str] = {}
+        self.spent = Spent()
+        self._robustness: list[float] = []
+
+    @property
+    def robustness(self) -> NDArray[np.float64]:
+        """Robustness of each evaluation, shape (n,)."""
+        return np.array(self._robustness, dtype=np.float64)
+
+    @property
+    def best_robustness(self) -> float | None:
+        """Smallest robustness so far."""
+        return None if self.best is None else self._robustness[self.best]
+
+    def feed(self, line: bytes, where: str) -> None:
+        """Take in one complete line; where names it in errors.
+
+        Raises:
+            JournalError: when the line cannot be understood.
+        """
+        if line.startswith(_ASKED):
+            self.status = "running"
+            return
+        try:
+            self.add(RECORDS.validate_json(line))
+        except ValidationError as error:
+            raise JournalError(f"{where} is damaged: {error.errors()[0]['msg']}") from None
+
+    def add(self, record: Record) -> None:
+        """Take in one record."""
+        self.status = "running"
+        match record:
+            case EvaluatedRecord():
+                self._evaluated(record)
+            case ConfirmedRecord(outcome="confirmed"):
+                self.counterexample = record.index
+            case ConfirmedRecord():
+                self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
+            case ExchangeRecord():
+                usage = record.exchange.get("usage") or {}
+                self.spent = self.spent.plus_call(
+                    prompt=usage.get("prompt_tokens") or 0,
+                    completion=usage.get("completion_tokens") or 0,
+                    reasoning=usage.get("reasoning_tokens") or 0,
+                    cost=usage.get("cost"),
+                )
+            case EndedRecord():
+                self.status = _ended(record.status)
+                self.reason = record.reason
+                self.spent = _spent(record.spent)
+            case AskedRecord():
+                pass
+
+    def _evaluated(self, record: EvaluatedRecord) -> None:
+        value = record.verdict.robustness if record.verdict else float("nan")
+        smallest = self.best_robustness
+        if record.verdict is not None and (smallest is None or value < smallest):
+            self.best, self.verdict = record.index, record.verdict.model_dump()
+        if record.trajectory is not None:
+            self.trajectories[record.index] = record.trajectory
+        self._robustness.append(value)
+        self.spent = replace(
+            self.spent,
+            simulations=len(self._robustness),
+            simulation_seconds=self.spent.simulation_seconds + record.seconds,
+        )
+
+
+def read_candidate(directory: Path, index: int) -> dict[str, Any]:
+    """Candidate of an evaluation in its plain form, from the journal of a run directory.
+
+    Raises:
+        JournalError: when the journal holds no such candidate.
+    """
+    for line in (directory / "journal.jsonl").read_bytes().split(b"\n")[:-1]:
+        if line.startswith(_ASKED):
+            asked = json.loads(line)
+            if asked["first"] <= index < asked["first"] + len(asked["candidates"]):
+                found: dict[str, Any] = asked["candidates"][index - asked["first"]]
+                return found
+    raise JournalError(f"{directory}: the journal holds no candidate {index}")
+
+
+def _spent(recorded: dict[str, float | None]) -> Spent:
+    """Spent from its record, in which all numbers are floats."""
+    whole = {f.name for f in fields(Spent) if f.type is int}
+    numbers = {name: int(v) if name in whole and v is not None else v for name, v in recorded.items()}
+    return Spent(**numbers)  # type: ignore[arg-type]
+
+
+def _ended(status: str) -> RunStatus:
+    known: dict[str, RunStatus] = {"falsified": "falsified", "not falsified": "not falsified"}
+    known["interrupted"] = "interrupted"
+    return known.get(status, "failed")
