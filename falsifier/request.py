@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 # Engines that ask a language model.
 _MODEL_ENGINES = ("llm", "hybrid")
+
+Effort = Literal["low", "medium", "high"]
+
 _RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
 
 
@@ -99,7 +102,7 @@ class ModelRequest(_Strict):
     """Which language model, and how it is asked."""
 
     name: str
-    effort: Literal["low", "medium", "high"] | None = None
+    effort: Effort | None = None
     api_base: str | None = None
     variant: str | None = None
     cache: bool = True
@@ -111,9 +114,9 @@ class RunRequest(_Strict):
     problem: ProblemRequest
     engine: str | None = None
     model: ModelRequest | None = None
-    seed: int = Field(0, ge=0)
+    seed: int = Field(default=0, ge=0)
     budget: Budget = Budget()
-    jobs: int = Field(1, ge=1)
+    jobs: int = Field(default=1, ge=1)
     keep: Keep = "history"
 
 

@@ -55,25 +55,26 @@ def lag_problem(
     points: int = 4,
     free: Freedom | None = None,
     parameters: tuple[ParameterRange, ...] = (),
+    name: str = "LAG",
 ) -> Problem:
     """Problem over the lag: falsified only where u stays near its upper end for long."""
     space = SearchSpace(
         (InputRange("u", -1.0, 1.0, points, "linear", None, free, "V", "drive"),), parameters, STOP
     )
     model = FunctionModel(function, INFO)  # type: ignore[arg-type]
-    return Problem(model, Requirement("LAG", parse(stl)), space, Experiment(STOP, STEP, ("x",)))
+    return Problem(model, Requirement(name, parse(stl)), space, Experiment(STOP, STEP, ("x",)))
 
 
 def easy() -> Problem:
     """Falsified by full input: one of the corners."""
-    return lag_problem()
+    return lag_problem(name="EASY")
 
 
 def hard() -> Problem:
     """Falsified by random inputs now and then."""
-    return lag_problem("G[0,10] (x <= 0.6)")
+    return lag_problem("G[0,10] (x <= 0.6)", name="HARD")
 
 
 def impossible() -> Problem:
     """Never falsified."""
-    return lag_problem("G[0,10] (x <= 2)")
+    return lag_problem("G[0,10] (x <= 2)", name="NEVER")

@@ -60,7 +60,7 @@ class CampaignRequest(BaseModel):
 
     runs: tuple[RunRequest, ...] = Field(min_length=1)
     limits: Budget | None = None
-    calls: int = Field(8, ge=1)
+    calls: int = Field(default=8, ge=1)
     suite: str | None = None
 
     def named(self) -> dict[str, RunRequest]:

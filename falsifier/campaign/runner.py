@@ -189,8 +189,21 @@ class _Watch:
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemRequest, Problem]:
-    """Each problem once."""
-    return {request: request.load() for request in dict.fromkeys(r.problem for r in requests)}
+    """Load each problem once.
+
+    Raises:
+        SpecError: when two targets have a requirement of the same name, which no table could tell apart.
+    """
+    problems: dict[ProblemRequest, Problem] = {}
+    targets: dict[str, str] = {}
+    for request in dict.fromkeys(r.problem for r in requests):
+        problem = problems[request] = request.load()
+        other = targets.setdefault(problem.name, request.target)
+        if other != request.target:
+            raise SpecError(
+                f"{other} and {request.target} are both called {problem.name!r}: give one another name"
+            )
+    return problems
 
 
 def _hashes(problems: Mapping[ProblemRequest, Problem]) -> dict[str, str]:

@@ -12,11 +12,15 @@ from falsifier.errors import FalsifierError
 # name: (module, what --help says)
 _COMMANDS = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
-    "resume": ("falsifier.cli.run", "Continue an interrupted run."),
+    "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
     "replay": ("falsifier.cli.counterexample", "Run a stored counterexample again."),
     "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),
     "explain": ("falsifier.cli.counterexample", "Say why a counterexample violates and what it takes."),
     "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
+    "bench": ("falsifier.cli.campaign", "Run requirements x engines x seeds; print the protocol's table."),
+    "watch": ("falsifier.cli.campaign", "Follow a running campaign from another shell."),
+    "report": ("falsifier.cli.report", "Write a page, tables or JUnit results of a run or campaign."),
+    "validate": ("falsifier.cli.report", "Re-simulate counterexamples in the competition's format."),
     "info": ("falsifier.cli.inspect", "Show what an FMU says of itself."),
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),

@@ -74,3 +74,8 @@ def json_option(command: F) -> F:
     return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")(
         command
     )
+
+
+def quiet_option(command: F) -> F:
+    """Add --quiet."""
+    return click.option("--quiet", is_flag=True, help="No progress.")(command)

@@ -8,7 +8,9 @@ from typing import Any
 import click
 
 from falsifier.budget import Budget
-from falsifier.cli.options import json_option, out_option, problem_options, problem_request
+from falsifier.campaign.directory import is_campaign
+from falsifier.cli.campaign import executor_option, jobs_option, resume_campaign
+from falsifier.cli.options import json_option, out_option, problem_options, problem_request, quiet_option
 from falsifier.display import make_display, result_json, result_text
 from falsifier.engine import Result
 from falsifier.export import write_counterexample
@@ -33,7 +35,7 @@ _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 1
 @click.option("--max-cost", type=float, help="Most US dollars for the language model.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the engine.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Simulations at a time.")
-@click.option("--quiet", is_flag=True, help="No progress.")
+@quiet_option
 @out_option
 @json_option
 def run(
@@ -75,10 +77,36 @@ def run(
 
 @click.command()
 @click.argument("directory", type=click.Path(path_type=Path))
-@click.option("--quiet", is_flag=True, help="No progress.")
+@jobs_option
+@executor_option
+@click.option("--total-budget", type=int, help="Campaign: most simulations of all runs together.")
+@click.option("--total-seconds", type=float, help="Campaign: most wall-clock seconds from now on.")
+@click.option("--total-tokens", type=int, help="Campaign: most tokens of all runs together.")
+@click.option("--total-cost", type=float, help="Campaign: most US dollars of all runs together.")
+@quiet_option
 @json_option
-def resume(*, directory: Path, quiet: bool, as_json: bool) -> None:
-    """Continue the run in DIRECTORY; nothing that it holds is simulated or asked again."""
+def resume(
+    *,
+    directory: Path,
+    jobs: int,
+    executor: str | None,
+    total_budget: int | None,
+    total_seconds: float | None,
+    total_tokens: int | None,
+    total_cost: float | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Continue the run or campaign in DIRECTORY; nothing that it holds is simulated or asked again.
+
+    --jobs, --executor and the limits are for campaigns; the limits on simulations, tokens and
+    money count what was spent before, too.
+    """
+    if is_campaign(directory):
+        given = (total_budget, total_seconds, total_tokens, total_cost)
+        limits = Budget(*given) if any(x is not None for x in given) else None
+        resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
+        return
     with make_display(quiet=quiet) as display:
         result = resume_run(directory, listeners=[display])
     _finish(result, as_json=as_json)

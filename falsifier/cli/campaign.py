@@ -1,0 +1,216 @@
+"""``falsifier bench`` and ``falsifier watch``."""
+
+import sys
+import time
+from datetime import datetime
+from itertools import product
+from pathlib import Path
+from typing import get_args
+
+import click
+
+from falsifier.analysis import load, read_published
+from falsifier.analysis.tables import TABLES, statistics_json
+from falsifier.budget import Budget
+from falsifier.campaign import CampaignRequest, Follower, Method, Outcome, cross, run_campaign, suite
+from falsifier.campaign import resume_campaign as _resume
+from falsifier.campaign.suites import SUITES
+from falsifier.cli.options import json_option, quiet_option
+from falsifier.journal import write_whole
+from falsifier.problem import find_spec, load_problems
+from falsifier.request import Effort, ProblemRequest
+from falsifier.scoreboard import campaign_display, overall_line
+
+# Time in s between two looks of falsifier watch.
+_WATCH_PERIOD = 0.5
+
+jobs_option = click.option(
+    "--jobs", type=int, default=1, show_default=True, help="Runs at a time on this machine."
+)
+executor_option = click.option(
+    "--executor", metavar="dask:tcp://HOST:PORT", help="Run on a Dask cluster instead."
+)
+table_option = click.option(
+    "--table", "table", type=click.Choice(list(TABLES)), default="main", show_default=True
+)
+
+
+@click.command()
+@click.argument("targets", nargs=-1)
+@click.option("--suite", "suite_name", type=click.Choice(SUITES), help="A known list of requirements.")
+@click.option("--instance", type=click.Choice(["1", "2"]), help="Of the suite: its parameterization.")
+@click.option("--profile", help="Another parameterization that the specs offer.")
+@click.option(
+    "--parameterization", multiple=True, type=click.Choice(["fixed", "free"]), help="Default: fixed."
+)
+@click.option("--engine", "engines", multiple=True, metavar="NAME", help="Search engine. Repeatable.")
+@click.option("--model", "models", multiple=True, metavar="NAME[@EFFORT]", help="Language model. Repeatable.")
+@click.option("--effort", type=click.Choice(get_args(Effort)), help="Of models without one of their own.")
+@click.option("--variant", "variants", multiple=True, metavar="MP1..", help="Prompt variant. Repeatable.")
+@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
+@click.option("--runs", type=click.IntRange(1), default=10, show_default=True, help="Runs of each.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the first run; others count up.")
+@click.option("--budget", type=int, default=1500, show_default=True, help="Most simulations a run.")
+@click.option("--seconds", type=float, help="Most wall-clock seconds a run.")
+@click.option("--max-tokens", type=int, help="Most tokens of the language model a run.")
+@click.option("--max-cost", type=float, help="Most US dollars for the language model a run.")
+@click.option("--total-budget", type=int, help="Most simulations of all runs together.")
+@click.option("--total-seconds", type=float, help="Most wall-clock seconds of the campaign.")
+@click.option("--total-tokens", type=int, help="Most tokens of all runs together.")
+@click.option("--total-cost", type=float, help="Most US dollars of all runs together.")
+@click.option("--calls", type=click.IntRange(1), default=8, show_default=True, help="Model runs at a time.")
+@jobs_option
+@executor_option
+@table_option
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Default: runs/NAME-TIME.")
+@quiet_option
+@json_option
+def bench(
+    *,
+    targets: tuple[str, ...],
+    suite_name: str | None,
+    instance: str | None,
+    profile: str | None,
+    parameterization: tuple[str, ...],
+    engines: tuple[str, ...],
+    models: tuple[str, ...],
+    effort: str | None,
+    variants: tuple[str, ...],
+    api_base: str | None,
+    runs: int,
+    seed: int,
+    budget: int,
+    seconds: float | None,
+    max_tokens: int | None,
+    max_cost: float | None,
+    total_budget: int | None,
+    total_seconds: float | None,
+    total_tokens: int | None,
+    total_cost: float | None,
+    calls: int,
+    jobs: int,
+    executor: str | None,
+    table: str,
+    out: Path | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    r"""Run requirements x methods x seeds and print the protocol's table.
+
+    TARGETS are requirements (AT1), specs with all their requirements (my.toml), or none with --suite.
+
+    \b
+    falsifier bench --suite arch-comp --engine surrogate --runs 10 --budget 1500 --jobs 2
+    falsifier bench AT CC --model openai/gpt-5-nano@low --variant MP1 --variant MP4 --table ablation
+
+    Exit code 0: all runs finished; 3: some failed or were stopped.
+    """
+    if instance is not None:
+        if suite_name is None or profile is not None:
+            raise click.UsageError("--instance belongs to --suite, and goes without --profile")
+        profile = "instance2" if instance == "2" else None
+    if bool(targets) == (suite_name is not None):
+        raise click.UsageError("give requirements or specs, or --suite")
+    problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
+    limits = (total_budget, total_seconds, total_tokens, total_cost)
+    request = CampaignRequest(
+        runs=cross(
+            problems,
+            _methods(engines, models, effort, variants, parameterization or ("fixed",), profile or ""),
+            seeds=range(seed, seed + runs),
+            budget=Budget(budget, seconds, max_tokens, max_cost),
+            api_base=api_base,
+        ),
+        limits=Budget(*limits) if any(x is not None for x in limits) else None,
+        calls=calls,
+        suite=suite_name,
+    )
+    directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
+    click.echo(f"{len(request.runs)} runs in {directory}", err=True)
+    with campaign_display(quiet=quiet) as show:
+        outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
+    finish(directory, outcome, table=table, as_json=as_json)
+
+
+@click.command()
+@click.argument("directory", type=click.Path(path_type=Path))
+@click.option("--once", is_flag=True, help="Say how far it is, and end.")
+def watch(*, directory: Path, once: bool) -> None:
+    """Follow the campaign in DIRECTORY from another shell; nothing is written there."""
+    follower = Follower(directory)
+    if once:
+        click.echo(overall_line(follower.look(), None))
+        return
+    with campaign_display() as show:
+        while (progress := follower.look()).counts["running"] + progress.counts["waiting"]:
+            show(progress)
+            time.sleep(_WATCH_PERIOD)
+        show(progress)
+    click.echo(overall_line(progress, None))
+
+
+def resume_campaign(
+    directory: Path, *, jobs: int, executor: str | None, limits: Budget | None, quiet: bool, as_json: bool
+) -> None:
+    """Go on with a campaign for ``falsifier resume``."""
+    with campaign_display(quiet=quiet) as show:
+        outcome = _resume(directory, jobs=jobs, executor=executor, limits=limits, listeners=[show])
+    finish(directory, outcome, table="main", as_json=as_json)
+
+
+def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> None:
+    """Save the tables, print one, and end with the exit code."""
+    runs, published = load(directory), read_published()
+    for name, make in TABLES.items():
+        made = make(runs, published)
+        if made.rows:
+            write_whole(directory / f"table-{name}.md", made.markdown())
+            write_whole(directory / f"table-{name}.csv", made.csv())
+    data = statistics_json(runs)
+    write_whole(directory / "table.json", data)
+    click.echo(data if as_json else TABLES[table](runs, published).text(), nl=not as_json)
+    if outcome.reason:
+        click.echo(f"stopped: {outcome.reason}; go on with: falsifier resume {directory}", err=True)
+    failed = outcome.progress.counts["failed"]
+    if failed:
+        click.echo(f"{failed} runs failed; falsifier resume {directory} tries them again", err=True)
+    sys.exit(3 if failed or outcome.reason else 0)
+
+
+def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemRequest]:
+    """One request for each requirement; a spec without a requirement's name stands for all that it has."""
+    requests = []
+    for target in targets:
+        if target.startswith("python:"):
+            requests.append(ProblemRequest(target=target))
+            continue
+        path, requirement = find_spec(target)
+        names = [requirement] if requirement else [p.name for p in load_problems(target, profile=profile)]
+        requests += [ProblemRequest(target=f"{path}:{name}") for name in names]
+    return requests
+
+
+def _methods(
+    engines: tuple[str, ...],
+    models: tuple[str, ...],
+    effort: str | None,
+    variants: tuple[str, ...],
+    parameterizations: tuple[str, ...],
+    profile: str,
+) -> list[Method]:
+    """Engines alone, or engines x models x variants where a model is named; each in all parameterizations."""
+    if not models and (variants or effort):
+        raise click.UsageError("--variant and --effort need --model NAME")
+    named = [_model(model, effort) for model in models] or [("", "")]
+    return [
+        Method(engine, model, level, variant, parameterization, profile)
+        for engine, (model, level), variant, parameterization in product(
+            engines or ("",), named, variants or ("",), parameterizations
+        )
+    ]
+
+
+def _model(text: str, effort: str | None) -> tuple[str, str]:
+    """Name and effort of ``NAME`` or ``NAME@EFFORT``; other texts behind an @ belong to the name."""
+    name, _, level = text.rpartition("@")
+    return (name, level) if name and level in get_args(Effort) else (text, effort or "")

@@ -1,0 +1,45 @@
+"""HTML and SVG as text that is escaped unless it was made here."""
+
+from html import escape
+
+_VOID = frozenset({"br", "hr", "link", "meta"})
+_SELF_CLOSING = frozenset({"circle", "line", "path", "rect"})
+
+
+class Html(str):
+    """Text that is markup already."""
+
+    __slots__ = ()
+
+
+def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
+    """Element with children; texts that are not Html are escaped, attributes always.
+
+    Args:
+        tag: name of the element.
+        children: content.
+        attributes: ``class_`` stands for ``class``, other underscores for hyphens; None leaves one out.
+
+    >>> el("p", "1 < 2", class_="a")
+    '<p class="a">1 &lt; 2</p>'
+    """
+    given = "".join(
+        f' {name.rstrip("_").replace("_", "-")}="{escape(_text(value))}"'
+        for name, value in attributes.items()
+        if value is not None
+    )
+    if tag in _VOID:
+        return Html(f"<{tag}{given}>")
+    content = join(*children)
+    if tag in _SELF_CLOSING and not content:
+        return Html(f"<{tag}{given}/>")
+    return Html(f"<{tag}{given}>{content}</{tag}>")
+
+
+def join(*parts: str) -> Html:
+    """Parts one after another; those that are not Html are escaped."""
+    return Html("".join(part if isinstance(part, Html) else escape(part) for part in parts))
+
+
+def _text(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
