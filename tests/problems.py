@@ -1,6 +1,8 @@
 """Small problems of Python functions, for tests that need no FMU."""
 
+import os
 from collections.abc import Mapping
+from time import sleep
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,17 @@ def follow(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
     for k in range(1, len(times)):
         x[k] = x[k - 1] + STEP * (parameters.get("gain", 1.0) * inputs["u"][k - 1] - x[k - 1])
     return {"x": x}
+
+
+def slow(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Take long enough that a campaign can be killed in the middle."""
+    sleep(0.01)
+    return follow(times, inputs, parameters)
+
+
+def deadly(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """End the worker process."""
+    os._exit(9)
 
 
 def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
@@ -78,3 +91,28 @@ def hard() -> Problem:
 def impossible() -> Problem:
     """Never falsified."""
     return lag_problem("G[0,10] (x <= 2)", name="NEVER")
+
+
+def easy_again() -> Problem:
+    """Another problem with a requirement of the same name."""
+    return lag_problem("G[0,10] (x <= 0.8)", name="EASY")
+
+
+def unusable() -> Problem:
+    """Every simulation fails."""
+    return lag_problem(function=never, name="UNUSABLE")
+
+
+def slow_hard() -> Problem:
+    """Falsified by random inputs now and then, and slow."""
+    return lag_problem("G[0,10] (x <= 0.85)", function=slow, name="SLOW")
+
+
+def slow_impossible() -> Problem:
+    """Never falsified, and slow."""
+    return lag_problem("G[0,10] (x <= 2)", function=slow, name="SLOWER")
+
+
+def worker_killer() -> Problem:
+    """Every simulation ends the process that it runs in."""
+    return lag_problem(function=deadly, name="DEADLY")

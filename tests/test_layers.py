@@ -30,10 +30,10 @@ LAYERS = [
         ],
     ),
     ("campaign", ["analysis", "campaign"]),
-    ("faces", ["cli", "display", "explain", "export", "plotting", "report", "testing"]),
+    ("faces", ["archcomp", "cli", "display", "explain", "export", "panels", "plotting", "report", "scoreboard", "testing"]),
 ]
 RANK = {module: rank for rank, (_, modules) in enumerate(LAYERS) for module in modules}
-HEAVY = {"fmpy": "fmu", "rtamt": "stl/reference.py", "litellm": "llm", "matplotlib": "plotting.py"}
+HEAVY = {"fmpy": "fmu", "rtamt": "stl/reference.py", "litellm": "llm", "matplotlib": "plotting"}
 
 
 def imports(path: Path) -> list[tuple[str, bool]]:

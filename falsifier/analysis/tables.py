@@ -82,8 +82,9 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
             )
         )
         notes |= {_unfinished_note()} if found.unfinished else set()
+        notes |= set(_sources(published)) if others else set()
     header = ("requirement", "method", "FR", *_NUMBERS, "rank", *names.values())
-    return Table("Falsification", header, tuple(rows), (_LEGEND, *_sources(published), *sorted(notes)))
+    return Table("Falsification", header, tuple(rows), (_LEGEND, *sorted(notes)))
 
 
 def ablation_table(runs: Iterable[Run], published: Published) -> Table:

@@ -24,7 +24,7 @@ _COMMANDS = {
     "info": ("falsifier.cli.inspect", "Show what an FMU says of itself."),
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
-    "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files."),
+    "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
     "prompt": ("falsifier.cli.model", "Print what would be sent to a language model; send nothing."),
     "models": ("falsifier.cli.model", "Check a language model: its name, its key and one small round trip."),
 }

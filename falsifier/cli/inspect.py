@@ -5,7 +5,7 @@ import sys
 from dataclasses import asdict
 from os.path import relpath
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -66,11 +66,28 @@ def check(*, target: str, profile: str | None) -> None:
 
 
 @click.command()
-def schema() -> None:
-    """Print the JSON Schema of spec files, for editors."""
+@click.option(
+    "--of",
+    "what",
+    type=click.Choice(["spec", "manifest", "journal", "campaign"]),
+    default="spec",
+    show_default=True,
+    help="Spec files, or a file of run directories; journal: one line of it.",
+)
+def schema(*, what: str) -> None:
+    """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
+    click.echo(json.dumps(_schema(what), indent=2))
+
+
+def _schema(what: str) -> dict[str, Any]:
+    from falsifier.campaign.directory import CampaignRecord
+    from falsifier.journal import RECORDS
+    from falsifier.request import Manifest
     from falsifier.spec import Spec
 
-    click.echo(json.dumps(Spec.model_json_schema(), indent=2))
+    if what == "journal":
+        return RECORDS.json_schema()
+    return {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}[what].model_json_schema()
 
 
 def _existing_fmu(fmu: Path) -> Path:

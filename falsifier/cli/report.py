@@ -1,10 +1,14 @@
 """``falsifier report`` and ``falsifier validate``."""
 
+import json
 import sys
 from pathlib import Path
 
 import click
 
+from falsifier.archcomp import BUDGET, Finding, export, read_rows
+from falsifier.archcomp import validate as check_rows
+from falsifier.cli.options import json_option
 from falsifier.report import html_report, junit_report, markdown_report
 
 
@@ -27,8 +31,6 @@ def report(
         junit.write_text(junit_report(directory), encoding="utf-8")
         click.echo(f"{junit} written", err=True)
     if arch_comp is not None:
-        from falsifier.archcomp import export
-
         arch_comp.write_text(export(directory), encoding="utf-8")
         click.echo(f"{arch_comp} written", err=True)
     if markdown and out is None:
@@ -37,3 +39,36 @@ def report(
     path = out or directory / "report.html"
     path.write_text(markdown_report(directory) if markdown else html_report(directory), encoding="utf-8")
     click.echo(f"{path} written", err=True)
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.option("--budget", type=int, default=BUDGET, show_default=True, help="Most simulations a run.")
+@json_option
+def validate(*, file: Path, budget: int, as_json: bool) -> None:
+    """Re-simulate the counterexamples of FILE, ours or another tool's, and say which hold.
+
+    FILE is in the validation format of the ARCH-COMP falsification category. Exit code 0: all hold; 1: some
+    do not.
+    """
+    findings = check_rows(read_rows(file), budget=budget)
+    if as_json:
+        click.echo(json.dumps([_finding_json(f) for f in findings], indent=2))
+    else:
+        for f in findings:
+            robustness = "" if f.robustness is None else f", robustness {f.robustness:+.6g}"
+            verdict = "holds" if f.holds else "does not hold"
+            click.echo(f"row {f.row.number}: {f.row.requirement}: {verdict}: {f.reason}{robustness}")
+        click.echo(f"{sum(f.holds for f in findings)} of {len(findings)} counterexamples hold")
+    sys.exit(0 if all(f.holds for f in findings) else 1)
+
+
+def _finding_json(finding: Finding) -> dict[str, object]:
+    return {
+        "row": finding.row.number,
+        "requirement": finding.row.requirement,
+        "holds": finding.holds,
+        "robustness": finding.robustness,
+        "claimed": finding.row.robustness,
+        "reason": finding.reason,
+    }

@@ -69,7 +69,7 @@ def history_chart(runs: Sequence[Run], label: str) -> Html:
     lowest = min(float(np.nanmin(run.robustness)) for run in valid)
     highest = max(float(np.nanmax(run.robustness)) for run in valid)
     frame = _frame(0.5, most + 0.5, [lowest, highest, 0.0], 240)
-    parts = [_axes(frame, "simulation", "robustness"), _level(frame, 0.0, "zero")]
+    parts = [_axes(frame, "simulation", "robustness", whole=True), _level(frame, 0.0, "zero")]
     for run in valid:
         parts.append(el("path", d=frame.dots(*thinned(run.robustness, _DRAWN_VALUES)), class_="dots"))
     for run in valid:
@@ -89,9 +89,10 @@ def rate_chart(by_method: dict[str, list[Run]]) -> Html:
     curves = {label: falsification_curve(runs) for label, runs in by_method.items()}
     most = max((float(x[-1]) for x, _ in curves.values()), default=1.0)
     frame = _Frame(0.0, max(most, 1.0), 0.0, 1.0, 200.0)
-    parts = [_axes(frame, "simulations", "falsified runs")]
+    parts = [_axes(frame, "simulations", "falsified runs", whole=True)]
     for i, (x, y) in enumerate(curves.values()):
-        parts.append(el("path", d=frame.path(x, y, steps=True), class_=f"series s{i % SERIES_COLOURS}"))
+        d = frame.path([*x, frame.right], [*y, y[-1]], steps=True)
+        parts.append(el("path", d=d, class_=f"series s{i % SERIES_COLOURS}"))
     return _svg(frame.height, "Share of falsified runs over simulations", parts)
 
 
@@ -136,14 +137,14 @@ def _frame(left: float, right: float, values: Sequence[float], height: float) ->
     return _Frame(left, right if right > left else left + 1, low - margin, high + margin, height)
 
 
-def _axes(frame: _Frame, x_label: str, y_label: str) -> Html:
+def _axes(frame: _Frame, x_label: str, y_label: str, *, whole: bool = False) -> Html:
     bottom = frame.height - _BOTTOM
     parts = []
     for value in _ticks(frame.low, frame.high):
         y = frame.y(value)
         parts.append(el("line", x1=_LEFT, x2=_WIDTH - _RIGHT, y1=y, y2=y, class_="grid"))
         parts.append(el("text", f"{value:.6g}", x=_LEFT - 6, y=y + 4, class_="tick end"))
-    for value in _ticks(frame.left, frame.right):
+    for value in _ticks(frame.left, frame.right, whole=whole):
         parts.append(el("text", f"{value:.6g}", x=frame.x(value), y=bottom + 15, class_="tick middle"))
     parts.append(el("line", x1=_LEFT, x2=_WIDTH - _RIGHT, y1=bottom, y2=bottom, class_="axis"))
     parts.append(el("text", y_label, x=4, y=13, class_="label"))
@@ -151,9 +152,9 @@ def _axes(frame: _Frame, x_label: str, y_label: str) -> Html:
     return join(*parts)
 
 
-def _ticks(low: float, high: float) -> list[float]:
+def _ticks(low: float, high: float, *, whole: bool = False) -> list[float]:
     """Round numbers within [low, high], about as many as there is room for."""
-    raw = (high - low) / _TICKS
+    raw = max((high - low) / _TICKS, 1.0 if whole else 0.0)
     power = 10.0 ** floor(log10(raw))
     step = next((m * power for m in (1, 2, 5) if m * power >= raw), 10 * power)
     return [step * i for i in range(ceil(low / step), floor(high / step) + 1)]

@@ -126,7 +126,7 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
     robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
     heading = f"{run.method.label}, seed {run.seed}: {run.simulations} simulations, {robustness}"
     critical = verdict.critical_time if verdict else None
-    facts = [("confirmed" if run.falsified else run.status, run.reason)]
+    facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
     if verdict is not None:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in verdict.values.items())
         facts += [
