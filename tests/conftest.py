@@ -2,9 +2,13 @@
 
 import os
 import socket
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from falsifier.campaign import run_campaign
+from tests.campaigns import request, work_in_threads
 
 _real_connect = socket.socket.connect
 
@@ -27,3 +31,13 @@ def closed_network() -> Any:
         patch.delenv(name)
     yield
     patch.undo()
+
+
+@pytest.fixture(scope="session")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two requirements, one that is falsified and one that is not, two engines, two seeds."""
+    directory = tmp_path_factory.mktemp("campaigns") / "nightly"
+    with pytest.MonkeyPatch.context() as patch:
+        work_in_threads(patch)
+        run_campaign(request("hard", "impossible", engines=("uniform", "corners")), directory)
+    return directory

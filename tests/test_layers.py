@@ -30,7 +30,21 @@ LAYERS = [
         ],
     ),
     ("campaign", ["analysis", "campaign"]),
-    ("faces", ["archcomp", "cli", "display", "explain", "export", "panels", "plotting", "report", "scoreboard", "testing"]),
+    (
+        "faces",
+        [
+            "archcomp",
+            "cli",
+            "display",
+            "explain",
+            "export",
+            "panels",
+            "plotting",
+            "report",
+            "scoreboard",
+            "testing",
+        ],
+    ),
 ]
 RANK = {module: rank for rank, (_, modules) in enumerate(LAYERS) for module in modules}
 HEAVY = {"fmpy": "fmu", "rtamt": "stl/reference.py", "litellm": "llm", "matplotlib": "plotting"}

@@ -20,6 +20,7 @@ from falsifier.journal import (
     ExchangeRecord,
     Record,
 )
+from falsifier.llm.messages import Exchange
 
 RunStatus = Literal["waiting", "running", "falsified", "not falsified", "interrupted", "failed"]
 FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
@@ -89,12 +90,12 @@ class Tally:
             case ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
-                usage = record.exchange.get("usage") or {}
+                usage = Exchange.model_validate(record.exchange).usage
                 self.spent = self.spent.plus_call(
-                    prompt=usage.get("prompt_tokens") or 0,
-                    completion=usage.get("completion_tokens") or 0,
-                    reasoning=usage.get("reasoning_tokens") or 0,
-                    cost=usage.get("cost"),
+                    prompt=usage.prompt_tokens,
+                    completion=usage.completion_tokens,
+                    reasoning=usage.reasoning_tokens,
+                    cost=usage.cost,
                 )
             case EndedRecord():
                 self.status = _ended(record.status)
