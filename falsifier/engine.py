@@ -20,7 +20,6 @@ from falsifier.journal import (
     ExchangeRecord,
     Journal,
     Record,
-    answered_exchanges,
     recorded_evaluations,
 )
 from falsifier.problem import Problem
@@ -151,7 +150,7 @@ class _Loop:
         self.asked = [r for r in records if isinstance(r, AskedRecord)]
         directory = journal.directory if journal else Path()
         self.recorded = dict(enumerate(recorded_evaluations(directory, list(records))))
-        self.replayed_exchanges = len(answered_exchanges(records))
+        self.replayed_exchanges = sum(isinstance(r, ExchangeRecord) for r in records)
         self.evaluations: list[Evaluation] = []
         self.doubtful: list[Confirmation] = []
         self.best: Evaluation | None = None

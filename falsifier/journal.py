@@ -241,12 +241,11 @@ def write_whole(path: Path, text: str) -> None:
     partial.replace(path)
 
 
-def answered_exchanges(records: Iterable[Record]) -> list["Exchange"]:
-    """Recorded exchanges that were answered; one without an answer was not paid for and is asked again."""
+def recorded_exchanges(records: Iterable[Record]) -> list["Exchange"]:
+    """Recorded exchanges with a language model, in order."""
     from falsifier.llm.messages import Exchange
 
-    recorded = (Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord))
-    return [exchange for exchange in recorded if exchange.reply is not None]
+    return [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
 
 
 def recorded_evaluations(directory: Path, records: list[Record]) -> list[Evaluation]:

@@ -14,7 +14,9 @@ FULL = [100.0] * 7
 ENV = {"OPENAI_API_KEY": "sk-test-not-a-key", "XDG_CACHE_HOME": "cache"}
 
 
-def reply(throttle: list[float], brake: tuple[float, ...] = (0.0, 0.0, 0.0), rationale: str = "because") -> Step:
+def reply(
+    throttle: list[float], brake: tuple[float, ...] = (0.0, 0.0, 0.0), rationale: str = "because"
+) -> Step:
     signals = [{"name": "throttle", "values": throttle}, {"name": "brake", "values": list(brake)}]
     return Step(json.dumps({"rationale": rationale, "signals": signals}))
 

@@ -15,7 +15,7 @@ from falsifier.campaign.plan import Method, method_of
 from falsifier.campaign.tally import RunStatus, Tally
 from falsifier.errors import JournalError
 from falsifier.journal import read_manifest
-from falsifier.request import Manifest
+from falsifier.manifest import Manifest
 from falsifier.stl.verdict import Verdict
 
 if TYPE_CHECKING:

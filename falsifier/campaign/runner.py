@@ -24,8 +24,9 @@ from falsifier.campaign.work import Done, Task, unpack
 from falsifier.errors import JournalError, SpecError
 from falsifier.execution import Workers, open_workers
 from falsifier.journal import EndedRecord, open_journal, read_journal, write_manifest
+from falsifier.manifest import check_unchanged, environment, file_hashes, manifest
 from falsifier.problem import Problem
-from falsifier.request import ProblemRequest, RunRequest, check_unchanged, environment, file_hashes, manifest
+from falsifier.request import ProblemRequest, RunRequest
 
 Listener = Callable[[Progress], None]
 

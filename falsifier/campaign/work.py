@@ -21,8 +21,10 @@ from zipfile import ZipFile
 
 from falsifier.campaign.directory import STOP, campaign_mark, run_directory
 from falsifier.events import Evaluated, Event
+from falsifier.manifest import Manifest
 from falsifier.problem import Problem
-from falsifier.request import Manifest, RunRequest, perform
+from falsifier.request import RunRequest
+from falsifier.session import perform
 
 # A killed campaign's workers end within moments; whoever resumes it waits that long in s for their locks.
 _PATIENCE = 10.0

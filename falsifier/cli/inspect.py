@@ -82,7 +82,7 @@ def schema(*, what: str) -> None:
 def _schema(what: str) -> dict[str, Any]:
     from falsifier.campaign.directory import CampaignRecord
     from falsifier.journal import RECORDS
-    from falsifier.request import Manifest
+    from falsifier.manifest import Manifest
     from falsifier.spec import Spec
 
     if what == "journal":

@@ -12,13 +12,20 @@ from falsifier.cli.options import json_option, problem_options, problem_request
 @click.command()
 @problem_options
 @click.option("--variant", metavar="MP1..", help="Prompt variant; default: the one that runs use.")
+@click.option("--anonymous", is_flag=True, help="With neutral names only.")
 @click.option(
     "--run", "directory", type=click.Path(path_type=Path), help="Show the prompt behind this run's samples."
 )
 @click.option("--samples", type=int, help="With --run: only its first samples.")
 @json_option
 def prompt(
-    *, variant: str | None, directory: Path | None, samples: int | None, as_json: bool, **options: Any
+    *,
+    variant: str | None,
+    anonymous: bool,
+    directory: Path | None,
+    samples: int | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """Print exactly what would be sent next; send nothing."""
     from falsifier.journal import read_journal, recorded_evaluations
@@ -28,7 +35,7 @@ def prompt(
         raise click.UsageError("--samples needs --run DIR")
     problem = problem_request(options).load()
     evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
-    messages = preview(problem, variant=variant, evaluations=evaluations[:samples])
+    messages = preview(problem, variant=variant, evaluations=evaluations[:samples], anonymous=anonymous)
     if as_json:
         click.echo(json.dumps([message.model_dump() for message in messages], indent=2))
         return

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import click
 
-from falsifier.request import ProblemRequest
+from falsifier.request import ModelRequest, ProblemRequest
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -57,6 +57,81 @@ def problem_options(command: F) -> F:
 def problem_request(options: dict[str, Any]) -> ProblemRequest:
     """Take the problem's options out of a command's keyword arguments."""
     return ProblemRequest(**{name: options.pop(name) for name in ProblemRequest.model_fields})
+
+
+def model_options(command: F) -> F:
+    """Add everything that says which language model is asked, and how."""
+    for decorate in reversed(
+        (
+            click.option(
+                "--model",
+                metavar="NAME",
+                help="Language model, e.g. openai/gpt-5-mini, ollama_chat/gpt-oss:20b.",
+            ),
+            click.option(
+                "--effort", type=click.Choice(["low", "medium", "high"]), help="Its reasoning effort."
+            ),
+            click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
+            click.option("--variant", metavar="MP1..", help="Prompt variant."),
+            click.option(
+                "--model-option",
+                "model_options",
+                multiple=True,
+                metavar="NAME=VALUE",
+                help="Passed to the provider as it is, e.g. max_tokens=4000. Repeatable.",
+            ),
+            click.option(
+                "--price",
+                metavar="SENT:RECEIVED",
+                help="US dollars for 1000 tokens, where the price is not known.",
+            ),
+            click.option("--anonymous", is_flag=True, help="Tell the model neutral names only."),
+            click.option("--fallback", metavar="ENGINE", help="Engine that goes on when the model gives up."),
+            click.option("--no-cache", is_flag=True, help="Ask anew where the reply is already on disk."),
+        )
+    ):
+        command = decorate(command)
+    return command
+
+
+def model_request(options: dict[str, Any]) -> ModelRequest | None:
+    """Take the model's options out of a command's keyword arguments; None where no model is named."""
+    name = options.pop("model")
+    given = {key: options.pop(key) for key in ("effort", "api_base", "variant", "fallback", "anonymous")}
+    given["price"] = options.pop("price")
+    given["options"] = options.pop("model_options")
+    cache = not options.pop("no_cache")
+    if name is None:
+        stray = [key for key, value in given.items() if value]
+        if stray:
+            flags = ", ".join(
+                "--" + key.replace("_", "-").replace("options", "model-option") for key in stray
+            )
+            raise click.UsageError(f"{flags}: needs --model NAME")
+        return None
+    given["price"] = _price(given["price"])
+    given["options"] = dict(_model_option(option) for option in given["options"])
+    return ModelRequest(name=name, cache=cache, **given)
+
+
+def _price(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        sent, received = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise click.UsageError(f"--price {text}: expected SENT:RECEIVED, for example 0.25:2") from None
+    return sent, received
+
+
+def _model_option(text: str) -> tuple[str, str | float]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise click.UsageError(f"--model-option {text}: expected NAME=VALUE, for example max_tokens=4000")
+    try:
+        return name, int(value) if value.isdigit() else float(value)
+    except ValueError:
+        return name, value
 
 
 def out_option(command: F) -> F:

@@ -10,11 +10,21 @@ import click
 from falsifier.budget import Budget
 from falsifier.campaign.directory import is_campaign
 from falsifier.cli.campaign import executor_option, jobs_option, resume_campaign
-from falsifier.cli.options import json_option, out_option, problem_options, problem_request, quiet_option
+from falsifier.cli.options import (
+    json_option,
+    model_options,
+    model_request,
+    out_option,
+    problem_options,
+    problem_request,
+    quiet_option,
+)
 from falsifier.display import make_display, result_json, result_text
 from falsifier.engine import Result
 from falsifier.export import write_counterexample
-from falsifier.request import ModelRequest, RunRequest, execute, recorded_request, resume_run
+from falsifier.manifest import recorded_request
+from falsifier.request import RunRequest
+from falsifier.session import execute, resume_run
 
 _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 130}
 
@@ -22,13 +32,7 @@ _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 1
 @click.command()
 @problem_options
 @click.option("--engine", metavar="NAME", help="Search engine; see the README for the list.")
-@click.option(
-    "--model", metavar="NAME", help="Language model, e.g. openai/gpt-5-mini, ollama_chat/gpt-oss:20b."
-)
-@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
-@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
-@click.option("--variant", metavar="MP1..", help="Prompt variant.")
-@click.option("--no-cache", is_flag=True, help="Ask the model anew where its reply is already on disk.")
+@model_options
 @click.option("--budget", type=int, default=100, show_default=True, help="Most simulations.")
 @click.option("--seconds", type=float, help="Most wall-clock seconds.")
 @click.option("--max-tokens", type=int, help="Most tokens of the language model.")
@@ -41,7 +45,6 @@ _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 1
 def run(
     *,
     engine: str | None,
-    model: str | None,
     budget: int,
     seconds: float | None,
     max_tokens: int | None,
@@ -57,14 +60,10 @@ def run(
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl.
     """
-    language = {name: options.pop(name) for name in ("effort", "api_base", "variant")}
-    if model is None and any(value is not None for value in language.values()):
-        raise click.UsageError("--effort, --api-base and --variant need --model NAME")
-    language["cache"] = not options.pop("no_cache")
     request = RunRequest(
         problem=problem_request(options),
         engine=engine,
-        model=None if model is None else ModelRequest(name=model, **language),
+        model=model_request(options),
         seed=seed,
         budget=Budget(budget, seconds, max_tokens, max_cost),
         jobs=jobs,

@@ -15,7 +15,8 @@ from falsifier.journal import (
     recorded_evaluations,
     write_manifest,
 )
-from falsifier.request import ProblemRequest, RunRequest, manifest
+from falsifier.manifest import manifest
+from falsifier.request import ProblemRequest, RunRequest
 from tests.problems import easy
 
 

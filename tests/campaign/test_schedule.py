@@ -12,7 +12,8 @@ from falsifier.budget import Budget
 from falsifier.campaign.schedule import Schedule
 from falsifier.campaign.work import Done, Missing, Task
 from falsifier.execution import Workers
-from falsifier.request import ModelRequest, ProblemRequest, RunRequest, manifest
+from falsifier.manifest import manifest
+from falsifier.request import ModelRequest, ProblemRequest, RunRequest
 from tests.problems import easy
 
 PROBLEM = easy()

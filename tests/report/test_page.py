@@ -13,10 +13,11 @@ from falsifier.budget import Budget
 from falsifier.engine import search
 from falsifier.evaluation import Evaluation
 from falsifier.journal import open_journal, write_manifest
+from falsifier.manifest import manifest
 from falsifier.proposers import make_proposer
 from falsifier.report import html_report
 from falsifier.report.content import run_command
-from falsifier.request import ProblemRequest, RunRequest, manifest
+from falsifier.request import ProblemRequest, RunRequest
 from falsifier.space import Candidate
 from tests.problems import easy
 

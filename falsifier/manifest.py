@@ -1,0 +1,123 @@
+"""What a run directory says of how it came to be."""
+
+import platform
+import sys
+from datetime import UTC, datetime
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from falsifier import __version__
+from falsifier.errors import JournalError
+from falsifier.journal import read_manifest
+from falsifier.problem import Problem
+from falsifier.request import RunRequest
+from falsifier.space import InputRange, ParameterRange
+
+_RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class InputRecord(_Strict):
+    """One searched input or parameter, so that a run can be drawn without its model."""
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+    description: str = ""
+
+
+class Manifest(_Strict):
+    """What a run directory says of how it came to be."""
+
+    falsifier: str = Field(description="Version of this package.")
+    python: str
+    platform: str
+    packages: dict[str, str] = Field(description="Versions of the packages that decide numbers.")
+    started: str = Field(description="Date and time in UTC.")
+    request: RunRequest
+    source: str = Field(description="Where the problem was loaded from.")
+    requirement: dict[str, str] = Field(description="name, formula and description of the requirement.")
+    model: str = Field(description="Name of the model.")
+    inputs: tuple[InputRecord, ...]
+    parameters: tuple[InputRecord, ...]
+    stop_time: float = Field(description="End of each simulation in s.")
+    hashes: dict[str, str] = Field(description="SHA-256 by path of the FMU and the spec.")
+
+
+def recorded_request(directory: Path) -> RunRequest:
+    """What the run of a directory was asked for."""
+    return RunRequest.model_validate(read_manifest(directory)["request"])
+
+
+def manifest(request: RunRequest, problem: Problem) -> Manifest:
+    """Describe a run before it starts."""
+    space, requirement = problem.space, problem.requirement
+    return Manifest(
+        **environment(),
+        request=request,
+        source=problem.source,
+        requirement={
+            "name": problem.name,
+            "formula": str(requirement.formula),
+            "description": requirement.description,
+        },
+        model=problem.info.name,
+        inputs=tuple(_range_record(r) for r in space.inputs),
+        parameters=tuple(_range_record(p) for p in space.parameters),
+        stop_time=space.stop_time,
+        hashes=file_hashes(problem),
+    )
+
+
+def environment() -> dict[str, Any]:
+    """Versions, platform and time, as manifests state them."""
+    return {
+        "falsifier": __version__,
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "packages": {name: found for name in _RECORDED_PACKAGES if (found := _version(name))},
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def file_hashes(problem: Problem) -> dict[str, str]:
+    """SHA-256 by path of the files that decide what is simulated: the FMU and the spec."""
+    spec = problem.source.rpartition(":")[0]
+    paths = [getattr(problem.model, "path", None), Path(spec) if spec.endswith(".toml") else None]
+    return {str(p): sha256(Path(p).read_bytes()).hexdigest() for p in paths if p is not None}
+
+
+def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
+    """Refuse to continue with other files than those that a run or campaign was started with.
+
+    Raises:
+        JournalError: naming the file that has changed.
+    """
+    for path, digest in found.items():
+        if recorded.get(path, digest) != digest:
+            raise JournalError(f"{directory}: {path} has changed since this was started; start anew")
+
+
+def _range_record(range_: InputRange | ParameterRange) -> InputRecord:
+    return InputRecord(
+        name=range_.name,
+        low=range_.low,
+        high=range_.high,
+        unit=range_.unit,
+        description=range_.description,
+    )
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,94 @@
+"""From what a user asked for to the proposer that does it."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from falsifier.engine import OnExchange, ProposerBuilder
+from falsifier.errors import SpecError
+from falsifier.journal import Record, recorded_exchanges
+from falsifier.problem import Problem
+from falsifier.proposers import DEFAULT_ENGINE, make_proposer
+from falsifier.proposers.protocol import Proposer
+from falsifier.request import ModelRequest, RunRequest
+
+if TYPE_CHECKING:
+    from falsifier.llm.messages import Chat
+    from falsifier.llm.retry import Gate
+
+# Engines that ask a language model.
+_MODEL_ENGINES = ("llm", "hybrid")
+
+
+def proposer_builder(request: RunRequest, problem: Problem, records: Sequence[Record]) -> ProposerBuilder:
+    """Return what makes the request's proposer.
+
+    Names of engines and models, and the model's key, are checked here, before any simulation.
+
+    Args:
+        request: what was asked for.
+        problem: what is searched.
+        records: what the run's journal already holds; its replies are played again instead of paid for again.
+
+    Raises:
+        SpecError: for an unknown engine, or an engine and a model that do not go together.
+        ChatError: for an unknown provider or a missing key.
+    """
+    if request.model is None:
+        engine = request.engine or DEFAULT_ENGINE
+        if engine in _MODEL_ENGINES:
+            raise SpecError(f"the engine {engine!r} needs a language model: add --model NAME")
+        proposer = make_proposer(engine, problem, seed=request.seed)
+        return lambda _: proposer
+    if (request.engine or "llm") not in _MODEL_ENGINES:
+        raise SpecError(
+            f"the engine {request.engine!r} asks no language model: leave out --model, or leave out --engine"
+        )
+    return _led_by_model(request, request.model, problem, _chat(request.model, records))
+
+
+def _led_by_model(
+    request: RunRequest, model: ModelRequest, problem: Problem, chat: "Chat"
+) -> ProposerBuilder:
+    from falsifier.proposers.llm import make_llm_proposer
+
+    fallback = make_proposer(model.fallback, problem, seed=request.seed) if model.fallback else None
+
+    def build(on_exchange: OnExchange) -> Proposer:
+        return make_llm_proposer(
+            problem,
+            chat,
+            variant=model.variant,
+            on_exchange=on_exchange,
+            sample=request.seed,
+            anonymous=model.anonymous,
+            fallback=fallback,
+        )
+
+    return build
+
+
+def _chat(model: ModelRequest, records: Sequence[Record]) -> "Chat":
+    from falsifier.llm.cache import default_cache_directory
+    from falsifier.llm.connect import connect
+    from falsifier.llm.replay import RecordedChat
+    from falsifier.llm.usage import Price
+
+    chat = connect(
+        model.name,
+        effort=model.effort,
+        api_base=model.api_base,
+        options=model.options,
+        price=Price(*model.price) if model.price else None,
+        gate=_gate(model.name, model.api_base),
+        cache=default_cache_directory() if model.cache else None,
+    )
+    return RecordedChat(recorded_exchanges(records), chat)
+
+
+@lru_cache
+def _gate(model: str, api_base: str | None) -> "Gate":
+    """Return the gate that all runs of this process share on one account."""
+    from falsifier.llm.retry import Gate
+
+    return Gate()
