@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from falsifier.evaluation import Evaluation
 from falsifier.problem import Problem
+from falsifier.proposers.arrays import Array
+from falsifier.signals import even_times
 from falsifier.space import Candidate, SearchSpace
 
-Vector = NDArray[np.float64]
+Vector = Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,7 @@ class UnitBox:
         return len(self.low)
 
     @property
-    def groups(self) -> list[Vector]:
+    def groups(self) -> list[NDArray[np.intp]]:
         """Indices of the coordinates of each input and each parameter, in the space's order."""
         names = [d.name for d in self.space.dimensions]
         return [np.flatnonzero([n == name for n in names]) for name in self.space.names]
@@ -52,6 +54,15 @@ class UnitBox:
         """Candidate of a point, clipped to the box."""
         vector = self.low + self.span * np.clip(point, 0.0, 1.0)
         return self.space.decode(vector, origin=origin, rationale=rationale)
+
+    def represents(self, candidate: Candidate) -> bool:
+        """Whether all signals have the fixed parameterization, so that a point stands for the candidate."""
+        return all(
+            candidate.signals[r.name].interpolation == r.interpolation
+            and candidate.signals[r.name].times
+            == even_times(r.control_points, stop_time=self.space.stop_time, interpolation=r.interpolation)
+            for r in self.space.inputs
+        )
 
     def point(self, candidate: Candidate) -> Vector:
         """Point of a candidate; a free signal is read at the fixed control points."""
@@ -86,7 +97,8 @@ class BoxProposer(ABC):
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """See Proposer.tell."""
         for evaluation in evaluations:
-            self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
+            if self.box.represents(evaluation.candidate):
+                self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
 
     @abstractmethod
     def _propose(self, rng: np.random.Generator) -> Proposal:

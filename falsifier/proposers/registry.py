@@ -31,9 +31,17 @@ class Engine:
 
 ENGINES: Mapping[str, Engine] = MappingProxyType(
     {
+        "surrogate": Engine(
+            "falsifier.proposers.surrogate:Surrogate", "learns the dynamics and searches on what it learnt"
+        ),
         "uniform": Engine("falsifier.proposers.uniform:Uniform", "uniform random points of the box"),
-        "corners": Engine("falsifier.proposers.corners:Corners", "constant extremes first, then random"),
         "sobol": Engine("falsifier.proposers.sobol:Sobol", "scrambled Sobol sequence over the box"),
+        "corners": Engine("falsifier.proposers.corners:Corners", "constant extremes first, then random"),
+        "annealing": Engine("falsifier.proposers.annealing:Annealing", "scipy's dual annealing"),
+        "cma": Engine("falsifier.proposers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
+        "bayesian": Engine(
+            "falsifier.proposers.bayesian:Bayesian", "Gaussian process and expected improvement"
+        ),
     }
 )
 

@@ -1,6 +1,7 @@
 from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
 from falsifier.proposers.protocol import Proposer
+from falsifier.proposers.surrogate import Settings
 from falsifier.testing import ProposerContract
 
 
@@ -21,3 +22,26 @@ class TestCorners(EngineContract):
 
 class TestSobol(EngineContract):
     engine = "sobol"
+
+
+class TestAnnealing(EngineContract):
+    engine = "annealing"
+
+
+class TestCMA(EngineContract):
+    engine = "cma"
+
+
+class TestBayesian(EngineContract):
+    engine = "bayesian"
+
+
+# The contract does not depend on how thorough a plan is.
+HASTY = Settings(
+    cells=20, features=16, pool=40, children=20, generations=2, vertex_steps=1, region_start=3, trial=2
+)
+
+
+class TestSurrogate(ProposerContract):
+    def make(self, problem: Problem, seed: int) -> Proposer:
+        return make_proposer("surrogate", problem, seed=seed, settings=HASTY)

@@ -24,6 +24,7 @@ def test_additive_effects_are_found_within_one_simulation_per_input() -> None:
         costs = []
         for _ in range(5):
             levels = walk.next(rng)
+            assert levels is not None
             costs.append(float(weights @ np.array(levels)))
             walk.learn(levels, costs[-1])
         assert min(costs) == best
