@@ -42,6 +42,7 @@ ENGINES: Mapping[str, Engine] = MappingProxyType(
         "bayesian": Engine(
             "falsifier.proposers.bayesian:Bayesian", "Gaussian process and expected improvement"
         ),
+        "hybrid": Engine("falsifier.proposers.hybrid:Hybrid", "a language model and the surrogate together"),
     }
 )
 

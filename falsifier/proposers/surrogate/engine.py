@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.evaluation import Evaluation
 from falsifier.problem import Problem
@@ -78,6 +79,7 @@ class Surrogate:
         self._region: TrustRegion | None = None
         self._asked = self._planned = self._simple = 0
         self._pending: dict[object, Pending] = {}
+        self._suggested: list[Array] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """See Proposer.ask."""
@@ -91,6 +93,32 @@ class Surrogate:
             if pending is not None:
                 self._settle(pending, sample)
 
+    def predict(self, candidates: Sequence[Candidate]) -> list[float] | None:
+        """Robustness that the better model predicts for candidates, without a simulation.
+
+        None before two simulations are known. The values are in the requirement's own unit.
+        """
+        if len(self.history.samples) < 2 or not candidates:
+            return None
+        rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
+        self._fit(rng)
+        points = np.array([self.layout.point(c) for c in candidates])
+        return [float(v) for v in self.models.predictor(self.layout, self.history.plain_objective())(points)]
+
+    def suggest(self, candidates: Sequence[Candidate]) -> None:
+        """Let the next plan breed from these candidates, too."""
+        self._suggested = [self.layout.point(c) for c in candidates]
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether recent predictions were good."""
+        return self.models.is_trusted
+
+    @property
+    def misses(self) -> int:
+        """How many of the last planned inputs in a row were predicted to violate and did not."""
+        return self.models.misses
+
     def _settle(self, pending: Pending, sample: Sample | None) -> None:
         """Learn from the evaluation of a candidate of its own."""
         if pending.levels is not None:
@@ -102,7 +130,8 @@ class Surrogate:
                 cost = relaxed_cost(sample, self.history.scaled_objective())
             pending.region.tell(pending.point, cost)
         if pending.forecast is not None and sample is not None:
-            self.models.judge(pending.forecast, sample.values, self.history.scaled_objective())
+            objective = self.history.scaled_objective()
+            self.models.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
@@ -139,7 +168,8 @@ class Surrogate:
             return "model"
         costs = self.history.direct_costs()
         arms = [s.arm for s in self.history.samples]
-        names = ("model", "region", "switching") if self._windows else ("model", "region")
+        may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
+        names = ("model", "region", "switching") if may_switch else ("model", "region")
         qualities = {name: quality(name, arms, costs, window=settings.bandit_window) for name in names}
         if self.models.is_trusted and qualities["model"] == max(qualities.values()):
             return "model" if rng.random() < settings.trusted_share else "region"
@@ -155,15 +185,16 @@ class Surrogate:
     def _plan(self, rng: np.random.Generator) -> Pending:
         settings, samples = self.settings, self.history.samples
         objective = self.history.scaled_objective()
-        order = np.argsort(scaled_costs(samples, objective), kind="stable")
-        self.models.fit([s.trace for s in samples], [int(i) for i in order[: settings.best_count]], rng)
+        order = self._fit(rng)
         points, elites = self.history.points, order[: settings.elites]
+        suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
+        self._suggested = []
         asked = [p.point for p in self._pending.values() if p.layout is self.layout]
         result = plan(
             self.models.predictor(self.layout, objective),
             self.layout,
-            elites=points[elites],
-            critical=np.array([samples[i].critical for i in elites]),
+            elites=np.concatenate([suggested, points[elites]]),
+            critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
             seen=np.concatenate([points, np.array(asked).reshape(-1, self.layout.dimension)]),
             settings=settings,
             snap=settings.snap * settings.snap_decay**self._simple,
@@ -177,6 +208,14 @@ class Surrogate:
         )
         forecast = self.models.forecast(self.layout, objective, result.point)
         return Pending("model", self.layout, result.point, why, forecast=forecast)
+
+    def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
+        """Fit the models; return the indices of the samples, the least robust first."""
+        samples = self.history.samples
+        order = np.argsort(scaled_costs(samples, self.history.scaled_objective()), kind="stable")
+        best = [int(i) for i in order[: self.settings.best_count]]
+        self.models.fit([s.trace for s in samples], best, rng)
+        return order
 
     def _search(self, rng: np.random.Generator) -> Pending:
         if self._region is None or self._region.is_exhausted:

@@ -49,6 +49,7 @@ class Ensemble:
         self._settings = settings
         self._errors: dict[str, list[float]] = {name: [] for name in _MODELS}
         self._deltas: list[list[float]] = []
+        self._missed: list[bool] = []
         self._fitted: dict[str, Dynamics] = {}
         self._start: StartState | None = None
         self.chosen = ""
@@ -58,6 +59,16 @@ class Ensemble:
         """Whether the better model's recent predictions were good."""
         errors = self._recent_errors()
         return bool(errors) and min(errors.values()) < self._settings.trusted_error
+
+    @property
+    def misses(self) -> int:
+        """How many of the last forecasts in a row foretold a violation that did not happen."""
+        count = 0
+        for missed in reversed(self._missed):
+            if not missed:
+                break
+            count += 1
+        return count
 
     def fit(self, traces: Sequence[Trace], best: Sequence[int], rng: np.random.Generator) -> None:
         """Fit to traces, of which ``best`` are the least robust, and choose the model to plan on."""
@@ -84,10 +95,11 @@ class Ensemble:
         cost = float(self._corrected(objective).cost(values[self.chosen])[0])
         return Forecast(values, self.chosen, cost)
 
-    def judge(self, forecast: Forecast, true: LeafValues, objective: Objective) -> None:
+    def judge(self, forecast: Forecast, true: LeafValues, objective: Objective, *, violated: bool) -> None:
         """Compare a forecast with what the simulation gave."""
         for name, values in forecast.values.items():
             self._errors[name].append(_error(objective, values, true))
+        self._missed.append(forecast.cost < 0 and not violated)
         self._deltas.append(_deltas(objective, forecast.values[forecast.chosen], true))
 
     def _values(self, name: str, layout: Layout, objective: Objective, points: Array) -> LeafValues:

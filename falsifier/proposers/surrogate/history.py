@@ -1,7 +1,7 @@
 """What was simulated so far, as the models and the planner need it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -93,6 +93,11 @@ class History:
         """Objective with the scales of all samples."""
         assert self.objective is not None
         return self.objective.rescaled([s.values for s in self.samples])
+
+    def plain_objective(self) -> Objective:
+        """Objective in the requirement's own unit, without relaxation."""
+        assert self.objective is not None
+        return replace(self.objective, formulas=self.objective.formulas[:1])
 
     @property
     def points(self) -> Array:

@@ -57,6 +57,7 @@ def plan(
     children = np.concatenate(
         [
             random_points(layout, rng, settings.pool - bred),
+            elites,
             mutations(layout, rng, elites, bred, critical=critical),
         ]
     )

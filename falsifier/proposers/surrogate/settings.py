@@ -12,6 +12,7 @@ class Settings:
             held; enough for pieces of a hundredth of the horizon, few enough for a rollout in milliseconds.
         constants: constant extremes among the first simulations; each excites every steady state once.
         bangs: switching signals among the first simulations of a formula with nested windows.
+        most_bangs: switching signals in all; when so many drawn at random did not violate, more will not.
         probes: stepping signals instead, where a violation needs several things at once: no extreme alone
             can bring it about, and a model of the dynamics is worth more than two steady states.
         probe_pieces: levels that a stepping signal goes through.
@@ -54,6 +55,7 @@ class Settings:
     cells: int = 100
     constants: int = 2
     bangs: int = 2
+    most_bangs: int = 8
     probes: int = 2
     probe_pieces: int = 12
     features: int = 128
