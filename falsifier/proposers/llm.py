@@ -97,6 +97,20 @@ class LLMProposer:
             candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
         return candidates
 
+    def propose(self, count: int, notes: Sequence[str] = ()) -> list[Candidate]:
+        """Return up to ``count`` new candidates, at least one, of a single question.
+
+        Args:
+            count: how many are wanted.
+            notes: lines that the question carries beside problem and history.
+
+        Raises:
+            ChatError: when the model cannot be reached or gives no valid reply.
+        """
+        found = self._ask_once(count, notes)
+        self._pending += found
+        return [self._disguise.revealed(c) for c in found] if self._disguise else found
+
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, whoever proposed their candidates."""
         if self._fallback is not None:
@@ -106,12 +120,14 @@ class LLMProposer:
         self._pending = [c for c in self._pending if c.key not in keys]
         self._evaluations = _thinned([*self._evaluations, *told])
 
-    def _ask_once(self, count: int) -> list[Candidate]:
+    def _ask_once(self, count: int, notes: Sequence[str] = ()) -> list[Candidate]:
         variant = self._variant
         form = ReplyForm(
             self._view.space, named=variant.has("names"), free=variant.has("freedom"), count=count
         )
-        prompt = build_prompt(self._view, variant, self._evaluations, pending=self._pending, count=count)
+        prompt = build_prompt(
+            self._view, variant, self._evaluations, pending=self._pending, notes=notes, count=count
+        )
         request = ChatRequest(
             messages=render(trimmed(prompt, self._prompt_tokens)),
             reply_schema=form.schema(),

@@ -39,6 +39,7 @@ def build_prompt(
     evaluations: Sequence[Evaluation],
     *,
     pending: Sequence[Candidate] = (),
+    notes: Sequence[str] = (),
     count: int = 1,
 ) -> Prompt:
     """Prompt for the next candidates.
@@ -48,6 +49,7 @@ def build_prompt(
         variant: what is told.
         evaluations: what was simulated so far, in order.
         pending: candidates whose evaluations are not known yet.
+        notes: lines about the search as a whole, from whoever leads it.
         count: how many candidates are wanted.
     """
     return Prompt(
@@ -57,7 +59,7 @@ def build_prompt(
         requirement=_requirement(view, variant) if variant.has("requirement") else None,
         outputs=_outputs(view, variant) if variant.has("outputs") else None,
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
-        history=_history(view, variant, evaluations, pending),
+        history=_history(view, variant, evaluations, pending, notes),
         advice=advice(view, variant) if variant.has("advice") else None,
         reply=_reply(view, variant, count),
     )
@@ -150,20 +152,24 @@ def _parameter(p: ParameterRange) -> ParameterLine:
 
 
 def _history(
-    view: View, variant: Variant, evaluations: Sequence[Evaluation], pending: Sequence[Candidate]
+    view: View,
+    variant: Variant,
+    evaluations: Sequence[Evaluation],
+    pending: Sequence[Candidate],
+    notes: Sequence[str],
 ) -> HistoryBlock | None:
     if variant.has("selection"):
         chosen = selection.recent_best_and_different(view, evaluations)
     else:
         chosen = selection.recent(evaluations)
-    if not chosen and not pending:
+    if not chosen and not pending and not notes:
         return None
     judged = sum(e.verdict is not None or variant.has("failures") for e in evaluations)
     return HistoryBlock(
         samples=tuple(_sample(view, variant, i, mark, evaluations[i]) for i, mark in chosen.items()),
         omitted=judged - len(chosen),
         pending=tuple("; ".join(_chosen(view, variant, c)) for c in pending),
-        notes=tuple(_notes(view, evaluations)) if variant.has("observations") else (),
+        notes=(*(_notes(view, evaluations) if variant.has("observations") else ()), *notes),
     )
 
 

@@ -1,0 +1,158 @@
+"""How many simulations do the engines need? Measured beside the published numbers.
+
+Each run asks for one candidate, simulates it and tells the result, until the requirement is violated or the
+budget is used up. FR is the number of falsified runs, S the mean number of simulations over them. Seeds 100
+to 109 were not used while the engines were made. Dwell is the shortest time between two changes of a
+counterexample's inputs and switches their number, medians over the counterexamples: they say how plausible
+an input of a free parameterization is. Counterexamples are judged by the monitor alone here.
+
+    python bench/search.py                                    # default engine, free parameterization
+    python bench/search.py --parameterization fixed --requirements CC1 CC2
+    python bench/search.py --engine uniform --budget 1500 --seeds 100-109
+"""
+
+import argparse
+import os
+import sys
+import time
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import mean, median
+from typing import Any
+
+# The engines' matrices are small: threads of the linear algebra cost more than they bring.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from falsifier.evaluation import evaluate  # noqa: E402 - after the threads are limited
+from falsifier.problem import Problem, load_problem  # noqa: E402
+from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer  # noqa: E402
+from falsifier.space import Candidate  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[1]
+SYSTEMS = {
+    "AT": ("AT1", "AT2", "AT51", "AT52", "AT53", "AT54", "AT6a", "AT6b", "AT6c", "AT6abc"),
+    "NN": ("NN", "NNb", "NNx"),
+    "CC": ("CC1", "CC2", "CC3", "CC4", "CC5", "CCx"),
+    "F16": ("F16",),
+    "SC": ("SC",),
+}
+# Requirements for which the published tools need hundreds of simulations.
+LONG = {"CC4": 1500, "CCx": 1500}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One search.
+
+    Attributes:
+        simulations: until the violation, None where there was none.
+        best: smallest robustness.
+        counterexample: the violating candidate.
+        seconds: per proposal, telling included.
+    """
+
+    simulations: int | None
+    best: float
+    counterexample: Candidate | None
+    seconds: float
+
+
+def problem_of(requirement: str, *, free: bool) -> Problem:
+    """Bundled problem; with the spec's fixed parameterization alone unless ``free``."""
+    system = next(name for name, requirements in SYSTEMS.items() if requirement in requirements)
+    problem = load_problem(f"{system}:{requirement}")
+    if free:
+        return problem
+    inputs = tuple(replace(r, free=None) for r in problem.space.inputs)
+    return replace(problem, space=replace(problem.space, inputs=inputs))
+
+
+def run(problem: Problem, engine: str, seed: int, budget: int) -> Run:
+    """Search once."""
+    proposer = make_proposer(engine, problem, seed=seed)
+    best, thinking = float("inf"), 0.0
+    for count in range(1, budget + 1):
+        started = time.perf_counter()
+        (candidate,) = proposer.ask(1)
+        thinking += time.perf_counter() - started
+        evaluation = evaluate(problem, candidate)
+        if evaluation.robustness is not None:
+            best = min(best, evaluation.robustness)
+        if evaluation.violated:
+            return Run(count, best, candidate, thinking / count)
+        started = time.perf_counter()
+        proposer.tell([evaluation])
+        thinking += time.perf_counter() - started
+    return Run(None, best, None, thinking / budget)
+
+
+def row(requirement: str, runs: Sequence[Run], published: dict[str, Any]) -> str:
+    """One line of the table."""
+    counts = [r.simulations for r in runs if r.simulations is not None]
+    found = [r.counterexample for r in runs if r.counterexample is not None]
+    dwells = [s.shortest_dwell for c in found for s in c.signals.values() if s.shortest_dwell is not None]
+    switches = [sum(s.switches for s in c.signals.values()) for c in found if c.signals]
+    missed = ", ".join(f"{r.best:.3g}" for r in runs if r.simulations is None)
+    cells = [
+        requirement,
+        _published(published["best"].get(requirement)),
+        _published(published["uniform"].get(requirement)),
+        f"{len(counts)}/{len(runs)}",
+        f"{mean(counts):.1f}" if counts else "–",
+        f"{median(counts):g}" if counts else "–",
+        str(max(counts)) if counts else "–",
+        f"{median(dwells):.2g}" if dwells else "–",
+        f"{median(switches):g}" if switches else "–",
+        f"{mean(r.seconds for r in runs):.2f}",
+        missed or "–",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def _published(entry: dict[str, Any] | None) -> str:
+    if not entry:
+        return "–"
+    value = f"{entry['mean']:.1f}" if "mean" in entry else "–"
+    return f"{entry['falsified']}: {value}"
+
+
+def _seeds(text: str) -> range:
+    first, _, last = text.partition("-")
+    return range(int(first), int(last or first) + 1)
+
+
+def main() -> None:
+    """Print the table, row by row."""
+    known = [name for names in SYSTEMS.values() for name in names]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--engine", choices=sorted(set(ENGINES) - {"hybrid"}), default=DEFAULT_ENGINE)
+    parser.add_argument("--requirements", nargs="+", choices=known, default=known, metavar="NAME")
+    parser.add_argument("--seeds", type=_seeds, default=range(100, 110), help="such as 100-109")
+    parser.add_argument("--budget", type=int, help="most simulations; 300, or 1500 where tools need hundreds")
+    parser.add_argument("--parameterization", choices=["free", "fixed"], default="free")
+    options = parser.parse_args()
+    published = tomllib.loads((ROOT / "specs" / "published.toml").read_text("utf-8"))
+    print(
+        f"Engine `{options.engine}`, {options.parameterization} parameterization, seeds {options.seeds[0]}",
+        end="",
+    )
+    print(f" to {options.seeds[-1]}\n")
+    print(
+        "| requirement | best tool FR: S | uniform FR: S | FR | S | median | most | dwell [s] | switches "
+        "| s/proposal | best of the others |"
+    )
+    print(f"|{'---|' * 11}")
+    for requirement in options.requirements:
+        problem = problem_of(requirement, free=options.parameterization == "free")
+        budget = options.budget or LONG.get(requirement, 300)
+        runs = [run(problem, options.engine, seed, budget) for seed in options.seeds]
+        print(row(requirement, runs, published), flush=True)
+        problem.model.close()
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
