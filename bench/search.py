@@ -26,10 +26,10 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier.evaluation import evaluate  # noqa: E402 - after the threads are limited
-from falsifier.problem import Problem, load_problem  # noqa: E402
-from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer  # noqa: E402
-from falsifier.space import Candidate  # noqa: E402
+from falsifier.evaluation import evaluate
+from falsifier.problem import Problem, load_problem
+from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer
+from falsifier.space import Candidate
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEMS = {

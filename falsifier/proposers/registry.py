@@ -46,7 +46,7 @@ ENGINES: Mapping[str, Engine] = MappingProxyType(
     }
 )
 
-DEFAULT_ENGINE = "corners"
+DEFAULT_ENGINE = "surrogate"
 
 
 def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> Proposer:
