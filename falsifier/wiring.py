@@ -55,7 +55,7 @@ def _led_by_model(
     fallback = make_proposer(model.fallback, problem, seed=request.seed) if model.fallback else None
 
     def build(on_exchange: OnExchange) -> Proposer:
-        return make_llm_proposer(
+        led = make_llm_proposer(
             problem,
             chat,
             variant=model.variant,
@@ -64,6 +64,9 @@ def _led_by_model(
             anonymous=model.anonymous,
             fallback=fallback,
         )
+        if request.engine == "hybrid":
+            return make_proposer("hybrid", problem, seed=request.seed, adviser=led)
+        return led
 
     return build
 
