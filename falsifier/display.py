@@ -1,15 +1,16 @@
 """What people see of a run: progress on stderr, the result as text or JSON."""
 
-import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from falsifier.budget import Spent
 from falsifier.engine import Result
 from falsifier.evaluation import Evaluation
 from falsifier.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunStarted
+from falsifier.manifest import recorded_request
 from falsifier.problem import Problem
 from falsifier.signals import Signal
 from falsifier.space import Candidate
@@ -113,28 +114,48 @@ def result_text(result: Result) -> str:
     if result.directory is not None:
         lines.append(f"  files          {result.directory}")
         if result.counterexample is not None:
-            lines.append(f"  picture        {result.directory / 'counterexample.png'}")
+            lines.append(f"  picture        {_picture(result)}")
     return "\n".join(lines)
 
 
-def result_json(result: Result) -> str:
-    """Result for machines: one JSON object."""
+def results_text(results: Sequence[Result]) -> str:
+    """Results of several requirements for people, a line each."""
+    width = max(len(result.problem.name) for result in results)
+    lines = []
+    for result in results:
+        shown = result.counterexample.evaluation if result.counterexample else result.best
+        robustness = "" if shown is None else f", robustness {shown.robustness:+.6g}"
+        where = "" if result.counterexample is None else f", {_picture(result)}"
+        lines.append(
+            f"{result.problem.name:{width}}  {result.status} after {result.spent.simulations} "
+            f"simulations{robustness}{where}"
+        )
+    falsified = sum(result.counterexample is not None for result in results)
+    total = max((result.spent for result in results), key=lambda spent: spent.simulations)
+    return "\n".join([*lines, f"{falsified} of {len(results)} falsified ({_seconds(total)})"])
+
+
+def counterexample_name(result: Result) -> str:
+    """File name of a result's counterexample; several results in one directory have one each."""
+    shared = result.directory is not None and len(recorded_request(result.directory).together) > 1
+    return f"counterexample-{result.problem.name}.json" if shared else "counterexample.json"
+
+
+def result_json(result: Result) -> dict[str, Any]:
+    """Result for machines: a value that becomes one JSON object."""
     spent: dict[str, Any] = {field: getattr(result.spent, field) for field in Spent.__dataclass_fields__}
-    return json.dumps(
-        {
-            "requirement": result.problem.name,
-            "formula": str(result.problem.requirement.formula),
-            "status": result.status,
-            "reason": result.reason,
-            "counterexample": result.counterexample and _evaluation_json(result.counterexample.evaluation),
-            "best": result.best and _evaluation_json(result.best),
-            "fragile": [_evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
-            "not_confirmed": [c.reason for c in result.refuted],
-            "spent": spent,
-            "directory": result.directory and str(result.directory),
-        },
-        indent=2,
-    )
+    return {
+        "requirement": result.problem.name,
+        "formula": str(result.problem.requirement.formula),
+        "status": result.status,
+        "reason": result.reason,
+        "counterexample": result.counterexample and _evaluation_json(result.counterexample.evaluation),
+        "best": result.best and _evaluation_json(result.best),
+        "fragile": [_evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
+        "not_confirmed": [c.reason for c in result.refuted],
+        "spent": spent,
+        "directory": result.directory and str(result.directory),
+    }
 
 
 def signal_text(signal: Signal) -> str:
@@ -187,6 +208,10 @@ def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "predicate": verdict and verdict.predicate,
         "values": dict(verdict.values) if verdict else None,
     }
+
+
+def _picture(result: Result) -> Path:
+    return (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
 
 
 def _note(event: Evaluated) -> str:

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Literal
 
 from falsifier.budget import Budget, Spent
 from falsifier.confirm import Confirmation, confirm
-from falsifier.errors import ChatError, JournalError
-from falsifier.evaluation import Evaluation, evaluate
+from falsifier.errors import ChatError, JournalError, SpecError
+from falsifier.evaluation import Evaluation, evaluate, judge
 from falsifier.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
 from falsifier.execution import evaluate_all
 from falsifier.journal import (
@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 OnExchange = Callable[["Exchange"], None]
-ProposerBuilder = Callable[[OnExchange], Proposer]
+# Makes a problem's proposer, which calls what it is handed with every exchange with a language model.
+ProposerBuilder = Callable[[Problem, OnExchange], Proposer]
 
 # A model whose first simulations all fail is broken or wrongly set up; more of them would tell nothing new.
 _HOPELESS = 10
@@ -91,7 +92,7 @@ def falsify(
 
     proposer = make_proposer(engine, problem, seed=seed) if isinstance(engine, str) else engine
     limits = Budget(simulations=budget) if isinstance(budget, int) else budget
-    return search(problem, lambda _: proposer, limits, listeners=listeners)
+    return search(problem, lambda *_: proposer, limits, listeners=listeners)
 
 
 def search(
@@ -109,7 +110,7 @@ def search(
 
     Args:
         problem: what to falsify.
-        build: makes the proposer; it is handed what to call with every exchange with a language model.
+        build: makes the proposer.
         budget: limits.
         batch: how many candidates are asked for and simulated at a time.
         executor: where to simulate; None: in this process.
@@ -117,19 +118,83 @@ def search(
         records: what the journal already holds; these evaluations are told again instead of simulated again.
         listeners: called with every event.
     """
-    loop = _Loop(problem, budget, journal, records, tuple(listeners))
+    return search_together(
+        (problem,),
+        build,
+        budget,
+        batch=batch,
+        executor=executor,
+        journal=journal,
+        records=records,
+        listeners=listeners,
+    )[0]
+
+
+def search_together(
+    problems: Sequence[Problem],
+    build: ProposerBuilder,
+    budget: Budget,
+    *,
+    batch: int = 1,
+    executor: Executor | None = None,
+    journal: Journal | None = None,
+    records: Sequence[Record] = (),
+    listeners: Iterable[Listener] = (),
+) -> list[Result]:
+    """Falsify several requirements of one system: every simulation is judged against all of them.
+
+    The requirements that still hold take turns in proposing; every proposer is told every simulation. A
+    result counts the simulations until its requirement fell. Arguments are those of search; the problems
+    differ in nothing but their requirement.
+
+    Raises:
+        SpecError: when the problems differ in what is varied or in how it is simulated.
+    """
+    for problem in problems[1:]:
+        _check_alike(problems[0], problem)
+    loop = _Loop(budget, journal, records, tuple(listeners))
     try:
-        result = loop.run(build, batch, executor)
+        loop.targets = [_Target(problem, build(problem, loop.exchanged)) for problem in problems]
+        reason = loop.run(batch, executor)
+        status: ResultStatus = "failed" if loop.is_hopeless() else "not falsified"
     except KeyboardInterrupt:
-        result = loop.result("interrupted", "stopped by the user")
+        status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
-        result = loop.result("failed", str(error))
+        status, reason = "failed", str(error)
     except BaseException as error:
         loop.write_end("failed", f"{type(error).__name__}: {error}")
         raise
-    loop.write_end(result.status, result.reason)
-    loop.emit(RunEnded(result))
-    return result
+    results = [loop.result(target, status, reason) for target in loop.targets]
+    overall = "falsified" if all(r.status == "falsified" for r in results) else status
+    loop.write_end(overall, results[0].reason if len(results) == 1 else reason)
+    for result in results:
+        loop.emit(RunEnded(result))
+    return results
+
+
+@dataclass(slots=True)
+class _Target:
+    """One requirement in a running search."""
+
+    problem: Problem
+    proposer: Proposer
+    evaluations: list[Evaluation] = field(default_factory=list)
+    doubtful: list[Confirmation] = field(default_factory=list)
+    best: Evaluation | None = None
+    counterexample: Confirmation | None = None
+    spent: Spent | None = None
+
+    @property
+    def name(self) -> str:
+        return self.problem.name
+
+    def note(self, evaluation: Evaluation) -> bool:
+        """Remember an evaluation; return whether it is the best so far."""
+        improved = _smaller(evaluation, self.best)
+        if improved:
+            self.best = evaluation
+        self.evaluations.append(replace(evaluation, trajectory=None))
+        return improved
 
 
 class _Loop:
@@ -137,122 +202,143 @@ class _Loop:
 
     def __init__(
         self,
-        problem: Problem,
         budget: Budget,
         journal: Journal | None,
         records: Sequence[Record],
         listeners: tuple[Listener, ...],
     ) -> None:
-        self.problem = problem
+        self.targets: list[_Target] = []
         self.budget = budget
         self.journal = journal
         self.listeners = listeners
         self.asked = [r for r in records if isinstance(r, AskedRecord)]
         directory = journal.directory if journal else Path()
         self.recorded = dict(enumerate(recorded_evaluations(directory, list(records))))
+        self.confirmed = {(r.index, r.requirement) for r in records if isinstance(r, ConfirmedRecord)}
         self.replayed_exchanges = sum(isinstance(r, ExchangeRecord) for r in records)
-        self.evaluations: list[Evaluation] = []
-        self.doubtful: list[Confirmation] = []
-        self.best: Evaluation | None = None
-        self.counterexample: Confirmation | None = None
+        self.count = 0
         earlier = [r.spent.get("seconds") or 0.0 for r in records if isinstance(r, EndedRecord)]
         self.started = perf_counter() - max(earlier, default=0.0)
         self.spent = Spent()
 
-    def run(self, build: ProposerBuilder, batch: int, executor: Executor | None) -> Result:
-        proposer = build(self.exchanged)
-        self.emit(RunStarted(self.problem, proposer.name, self.budget, len(self.recorded)))
-        while (limit := self.budget.exceeded(self.clock())) is None:
-            candidates = self.ask(proposer, batch)
-            told = []
-            for evaluation in self.evaluate(candidates, executor):
-                told.append(evaluation)
-                if evaluation.violated and self.counterexample is None:
-                    self.check(len(self.evaluations) - 1, evaluation)
-            if self.counterexample is not None:
-                return self.result("falsified", self.counterexample.reason)
-            if len(self.evaluations) >= _HOPELESS and self.best is None:
-                break
-            proposer.tell(told)
-        if self.best is None and self.evaluations:
-            count, last = len(self.evaluations), self.evaluations[-1]
-            return self.result("failed", f"all {count} simulations failed; the last one: {last.reason}")
-        return self.result("not falsified", limit or "")
+    def run(self, batch: int, executor: Executor | None) -> str:
+        """Search until nothing is left to falsify or to spend; return why it ended."""
+        for target in self.targets:
+            self.emit(RunStarted(target.problem, target.proposer.name, self.budget, len(self.recorded)))
+        turns = 0
+        while standing := [t for t in self.targets if t.counterexample is None]:
+            limit = self.budget.exceeded(self.clock())
+            if limit is not None:
+                return limit if not self.is_hopeless() else self.hopelessness()
+            if self.count >= _HOPELESS and self.is_hopeless():
+                return self.hopelessness()
+            turn = standing[turns % len(standing)]
+            turns += 1
+            told: dict[str, list[Evaluation]] = {target.name: [] for target in standing}
+            for evaluation in self.evaluate(turn, self.ask(turn, batch), executor):
+                for target in standing:
+                    judged = evaluation if target is turn else judge(target.problem, evaluation)
+                    told[target.name].append(judged)
+                    self.consider(target, judged, first=target is turn)
+            for target in standing:
+                if target.counterexample is None:
+                    target.proposer.tell(told[target.name])
+        return "all requirements are falsified"
 
-    def ask(self, proposer: Proposer, batch: int) -> list[Candidate]:
+    def is_hopeless(self) -> bool:
+        """Whether no simulation has succeeded."""
+        return self.count > 0 and all(t.best is None for t in self.targets)
+
+    def hopelessness(self) -> str:
+        """Say in words that every simulation failed."""
+        last = self.targets[0].evaluations[-1]
+        return f"all {self.count} simulations failed; the last one: {last.reason}"
+
+    def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
         recorded = self.asked.pop(0) if self.asked else None
         started = perf_counter()
-        candidates = proposer.ask(wanted if recorded is None else recorded.n)
+        candidates = target.proposer.ask(wanted if recorded is None else recorded.n)
         seconds = perf_counter() - started
-        first = len(self.evaluations)
         if recorded is None:
             self.write_asked(
                 AskedRecord(
-                    first=first, n=wanted, candidates=[c.to_json() for c in candidates], seconds=seconds
+                    first=self.count,
+                    n=wanted,
+                    candidates=[c.to_json() for c in candidates],
+                    seconds=seconds,
+                    requirement=self.label(target),
                 )
             )
         else:
             seconds = recorded.seconds
             if [c.key for c in candidates] != [Candidate.from_json(c).key for c in recorded.candidates]:
                 raise JournalError(
-                    f"the proposer {proposer.name!r} does not repeat its candidate {first}: the journal was "
-                    "written with other settings or another version"
+                    f"the proposer {target.proposer.name!r} does not repeat its candidate {self.count}: the "
+                    "journal was written with other settings or another version"
                 )
         self.spent = replace(self.spent, proposal_seconds=self.spent.proposal_seconds + seconds)
         return candidates
 
-    def evaluate(self, candidates: Sequence[Candidate], executor: Executor | None) -> Iterable[Evaluation]:
-        first = len(self.evaluations)
-        known = [self.recorded[i] for i in range(first, first + len(candidates)) if i in self.recorded]
+    def evaluate(
+        self, target: _Target, candidates: Sequence[Candidate], executor: Executor | None
+    ) -> Iterable[Evaluation]:
+        known = [
+            self.recorded[i] for i in range(self.count, self.count + len(candidates)) if i in self.recorded
+        ]
         for evaluation in known:
-            yield self.note(self.with_trajectory(evaluation), replayed=True)
-        for evaluation in evaluate_all(self.problem, candidates[len(known) :], executor):
-            yield self.note(evaluation, replayed=False)
+            yield self.note(target, self.with_trajectory(target, evaluation), replayed=True)
+        for evaluation in evaluate_all(target.problem, candidates[len(known) :], executor):
+            yield self.note(target, evaluation, replayed=False)
 
-    def with_trajectory(self, evaluation: Evaluation) -> Evaluation:
+    def with_trajectory(self, target: _Target, evaluation: Evaluation) -> Evaluation:
         """Simulate a recorded evaluation again when its trajectory was not kept."""
         if evaluation.verdict is None or evaluation.trajectory is not None:
             return evaluation
-        return replace(evaluation, trajectory=evaluate(self.problem, evaluation.candidate).trajectory)
+        return replace(evaluation, trajectory=evaluate(target.problem, evaluation.candidate).trajectory)
 
-    def note(self, evaluation: Evaluation, *, replayed: bool) -> Evaluation:
-        """Count, record and announce one evaluation."""
-        index = len(self.evaluations)
-        improved = _smaller(evaluation, self.best)
+    def note(self, target: _Target, evaluation: Evaluation, *, replayed: bool) -> Evaluation:
+        """Count, record and announce one simulation."""
+        improved = target.note(evaluation)
         self.spent = replace(
             self.spent,
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
         )
-        if improved:
-            self.best = evaluation
-        self.evaluations.append(replace(evaluation, trajectory=None))
         if self.journal is not None and not replayed:
-            self.journal.evaluated(index, evaluation, improved=improved)
-        self.emit(Evaluated(index, evaluation, self.best, self.clock(), replayed))
+            self.journal.evaluated(self.count, evaluation, improved=improved)
+        self.emit(Evaluated(self.count, evaluation, target.best, self.clock(), replayed))
+        self.count += 1
         return evaluation
 
-    def check(self, index: int, evaluation: Evaluation) -> None:
-        """Confirm a violation; a fragile or refuted one does not end the search."""
-        confirmation = confirm(self.problem, evaluation)
+    def consider(self, target: _Target, evaluation: Evaluation, *, first: bool) -> None:
+        """Confirm a violation of one requirement; a fragile or refuted one does not end its search."""
+        if not first:
+            target.note(evaluation)
+        if not evaluation.violated or target.counterexample is not None:
+            return
+        confirmation = confirm(target.problem, evaluation)
         if confirmation.outcome == "confirmed":
-            self.counterexample = confirmation
+            target.counterexample = confirmation
+            target.spent = self.clock()
         else:
-            self.doubtful.append(confirmation)
-        if self.journal is not None:
-            self.journal.write(
-                ConfirmedRecord(
-                    index=index,
-                    outcome=confirmation.outcome,
-                    robustness=confirmation.robustness,
-                    reference=confirmation.reference,
-                    reason=confirmation.reason,
-                    halved=confirmation.halved,
-                ),
-                at_once=True,
-            )
+            target.doubtful.append(confirmation)
+        record = ConfirmedRecord(
+            index=self.count - 1,
+            outcome=confirmation.outcome,
+            robustness=confirmation.robustness,
+            reference=confirmation.reference,
+            reason=confirmation.reason,
+            halved=confirmation.halved,
+            requirement=self.label(target),
+        )
+        if self.journal is not None and (record.index, record.requirement) not in self.confirmed:
+            self.journal.write(record, at_once=True)
         self.emit(Confirmed(confirmation))
+
+    def label(self, target: _Target) -> str:
+        """Name of the requirement, where a record must say which one is meant."""
+        return target.name if len(self.targets) > 1 else ""
 
     def exchanged(self, exchange: "Exchange") -> None:
         """Count, record and announce an exchange with a language model."""
@@ -287,18 +373,28 @@ class _Loop:
             spent = {name: getattr(self.spent, name) for name in Spent.__dataclass_fields__}
             self.journal.write(EndedRecord(status=status, reason=reason, spent=spent), at_once=True)
 
-    def result(self, status: ResultStatus, reason: str) -> Result:
+    def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
+        fallen = target.counterexample
         return Result(
-            self.problem,
-            status,
-            reason,
-            self.counterexample,
-            self.best,
-            tuple(self.evaluations),
-            tuple(c for c in self.doubtful if c.outcome == "refuted"),
-            self.clock(),
+            target.problem,
+            status if fallen is None else "falsified",
+            reason if fallen is None else fallen.reason,
+            fallen,
+            target.best,
+            tuple(target.evaluations),
+            tuple(c for c in target.doubtful if c.outcome == "refuted"),
+            target.spent or self.clock(),
             self.journal.directory if self.journal else None,
-            tuple(c for c in self.doubtful if c.outcome == "fragile"),
+            tuple(c for c in target.doubtful if c.outcome == "fragile"),
+        )
+
+
+def _check_alike(one: Problem, other: Problem) -> None:
+    alike = replace(other, requirement=one.requirement, source=one.source)
+    if alike != one:
+        raise SpecError(
+            f"{one.name} and {other.name} differ in what is varied or in how it is simulated: "
+            "search for them one after the other"
         )
 
 

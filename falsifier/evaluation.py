@@ -1,6 +1,6 @@
 """One candidate in, one evaluation out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import perf_counter
 from typing import Literal
@@ -76,6 +76,16 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     except MonitorError as error:
         return Evaluation(candidate, "failed", None, str(error), None, seconds, outputs.log)
     return Evaluation(candidate, "ok", verdict, "", trajectory, seconds, outputs.log)
+
+
+def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
+    """Judge a simulation that was made for another requirement of the same system."""
+    if evaluation.trajectory is None:
+        return evaluation
+    try:
+        return replace(evaluation, verdict=monitor_for(problem).evaluate(evaluation.trajectory))
+    except MonitorError as error:
+        return replace(evaluation, status="failed", verdict=None, reason=str(error), trajectory=None)
 
 
 def monitor_for(problem: Problem) -> Monitor:

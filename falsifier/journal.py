@@ -52,6 +52,7 @@ class AskedRecord(_Record):
     n: int
     candidates: list[dict[str, Any]]
     seconds: float
+    requirement: str = Field("", description="Whose turn it was, where several are falsified together.")
 
 
 class VerdictRecord(_Record):
@@ -93,6 +94,7 @@ class ConfirmedRecord(_Record):
     reference: float | None
     reason: str
     halved: float | None = None
+    requirement: str = Field("", description="Which one, where several are falsified together.")
 
 
 class EndedRecord(_Record):

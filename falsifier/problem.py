@@ -7,6 +7,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from pathlib import Path
 
 from falsifier.errors import FormulaError, SpecError, did_you_mean
@@ -21,6 +22,7 @@ from falsifier.spec import (
     read_spec,
 )
 from falsifier.stl import Formula, Monitor, parse
+from falsifier.stl.formula import And
 
 # Share of the output interval by which the stop time may miss a whole multiple of it: 15 / (1/30) is exact
 # only up to rounding.
@@ -72,6 +74,30 @@ class Problem:
     def name(self) -> str:
         """The requirement's name."""
         return self.requirement.name
+
+
+def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
+    """Group problems that differ in nothing but their requirement; all of a group record the same signals."""
+    groups: dict[str, list[Problem]] = {}
+    for problem in problems:
+        bare = replace(problem.experiment, outputs=())
+        key = repr((problem.model, problem.space, bare, sorted(problem.parameters.items())))
+        groups.setdefault(key, []).append(problem)
+    return [_recording_alike(group) for group in groups.values()]
+
+
+def conjunction(problems: Sequence[Problem]) -> Problem:
+    """Return the problem of which the requirement is that all of these hold."""
+    if len(problems) == 1:
+        return problems[0]
+    formula = reduce(And, (p.requirement.formula for p in problems))
+    names = ", ".join(p.name for p in problems)
+    return replace(problems[0], requirement=Requirement(names, formula, "All of these together."))
+
+
+def _recording_alike(group: list[Problem]) -> list[Problem]:
+    outputs = tuple(dict.fromkeys(name for p in group for name in p.experiment.outputs))
+    return [replace(p, experiment=replace(p.experiment, outputs=outputs)) for p in group]
 
 
 def bundled(folder: str) -> Path:

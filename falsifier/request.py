@@ -1,5 +1,6 @@
 """What a user asked for, as one value: enough to run it, to record it and to run it again."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +13,8 @@ from falsifier.budget import Budget
 from falsifier.errors import SpecError
 from falsifier.journal import Keep
 from falsifier.model import Interface
-from falsifier.problem import Problem, load_problem
+from falsifier.problem import Problem, alike, find_spec, load_problem
+from falsifier.spec import read_spec
 
 Effort = Literal["low", "medium", "high"]
 
@@ -36,6 +38,23 @@ class ProblemRequest(_Strict):
     parameters: tuple[str, ...] = ()
     stop_time: float | None = None
     output_interval: float | None = None
+
+    def load_all(self, names: Sequence[str] = ()) -> list[Problem]:
+        """Return the problems of these requirements of the spec, recording alike; of all of them by default.
+
+        Raises:
+            SpecError: when the target is no spec file, or as load does.
+        """
+        if self.target.endswith(".fmu") or self.target.startswith("python:") or self.stl is not None:
+            raise SpecError(f"{self.target}: only a spec has several requirements")
+        path, requirement = find_spec(self.target)
+        if requirement is not None:
+            raise SpecError(f"{self.target}: name the spec without a requirement to falsify all of them")
+        each = (
+            self.model_copy(update={"target": f"{path}:{name}"}).load()
+            for name in names or read_spec(path).requirements
+        )
+        return [problem for group in alike(each) for problem in group]
 
     def load(self) -> Problem:
         """Return the problem.
@@ -91,6 +110,9 @@ class RunRequest(_Strict):
     """One run. Naming a language model without an engine means that the model leads the search."""
 
     problem: ProblemRequest
+    together: tuple[str, ...] = Field(
+        default=(), description="Requirements that are falsified in one search."
+    )
     engine: str | None = None
     model: ModelRequest | None = None
     seed: int = Field(default=0, ge=0)

@@ -18,16 +18,21 @@ if TYPE_CHECKING:
 
 # Engines that ask a language model.
 _MODEL_ENGINES = ("llm", "hybrid")
+# Between the seeds of the proposers of one search, which must not draw the same points; larger than any seed
+# that people count up by hand.
+_SEED_STRIDE = 1_000_003
 
 
-def proposer_builder(request: RunRequest, problem: Problem, records: Sequence[Record]) -> ProposerBuilder:
-    """Return what makes the request's proposer.
+def proposer_builder(
+    request: RunRequest, problems: Sequence[Problem], records: Sequence[Record]
+) -> ProposerBuilder:
+    """Return what makes the request's proposers.
 
     Names of engines and models, and the model's key, are checked here, before any simulation.
 
     Args:
         request: what was asked for.
-        problem: what is searched.
+        problems: what is searched.
         records: what the run's journal already holds; its replies are played again instead of paid for again.
 
     Raises:
@@ -38,23 +43,21 @@ def proposer_builder(request: RunRequest, problem: Problem, records: Sequence[Re
         engine = request.engine or DEFAULT_ENGINE
         if engine in _MODEL_ENGINES:
             raise SpecError(f"the engine {engine!r} needs a language model: add --model NAME")
-        proposer = make_proposer(engine, problem, seed=request.seed)
-        return lambda _: proposer
+        seeds = range(request.seed, request.seed + _SEED_STRIDE * len(problems), _SEED_STRIDE)
+        made = {p.name: make_proposer(engine, p, seed=s) for p, s in zip(problems, seeds, strict=True)}
+        return lambda problem, _: made[problem.name]
     if (request.engine or "llm") not in _MODEL_ENGINES:
         raise SpecError(
             f"the engine {request.engine!r} asks no language model: leave out --model, or leave out --engine"
         )
-    return _led_by_model(request, request.model, problem, _chat(request.model, records))
+    return _led_by_model(request, request.model, _chat(request.model, records))
 
 
-def _led_by_model(
-    request: RunRequest, model: ModelRequest, problem: Problem, chat: "Chat"
-) -> ProposerBuilder:
+def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> ProposerBuilder:
     from falsifier.proposers.llm import make_llm_proposer
 
-    fallback = make_proposer(model.fallback, problem, seed=request.seed) if model.fallback else None
-
-    def build(on_exchange: OnExchange) -> Proposer:
+    def build(problem: Problem, on_exchange: OnExchange) -> Proposer:
+        fallback = make_proposer(model.fallback, problem, seed=request.seed) if model.fallback else None
         led = make_llm_proposer(
             problem,
             chat,

@@ -32,7 +32,7 @@ def run(
     budget: int = 20,
     seed: int = 1,
 ) -> Result:
-    def build(_: object) -> object:
+    def build(*_: object) -> object:
         return make_proposer(engine, problem, seed=seed)
 
     if directory is None:
@@ -99,7 +99,7 @@ def test_interruption_loses_nothing(tmp_path: Path) -> None:
     with open_journal(tmp_path) as journal:
         result = search(
             problem,
-            lambda _: make_proposer("uniform", problem, seed=1),
+            lambda *_: make_proposer("uniform", problem, seed=1),
             Budget(20),
             journal=journal,
             listeners=[interrupt],
@@ -157,12 +157,12 @@ def test_batches_are_told_in_the_order_of_asking() -> None:
     with ThreadPoolExecutor(3) as executor:
         parallel = search(
             problem,
-            lambda _: make_proposer("uniform", problem, seed=5),
+            lambda *_: make_proposer("uniform", problem, seed=5),
             Budget(10),
             batch=4,
             executor=executor,
         )
-    alone = search(problem, lambda _: make_proposer("uniform", problem, seed=5), Budget(10), batch=4)
+    alone = search(problem, lambda *_: make_proposer("uniform", problem, seed=5), Budget(10), batch=4)
     assert len(parallel.evaluations) == 10
     assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
 
@@ -189,7 +189,7 @@ class Silent:
 def test_a_silent_language_model_ends_the_run_with_everything_kept(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
     with open_journal(tmp_path) as journal:
-        result = search(problem, lambda _: Silent(problem), Budget(20), journal=journal)
+        result = search(problem, lambda *_: Silent(problem), Budget(20), journal=journal)
     assert (result.status, result.reason) == ("failed", "no usable reply")
     assert len(result.evaluations) == 2
     records = read_journal(tmp_path)

@@ -92,9 +92,9 @@ def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
         in_place = campaign_mark(task.campaign) == task.mark
         campaign = task.campaign if in_place else _store() / "runs" / task.mark
         directory = run_directory(campaign, task.name)
-        result = perform(
+        (result,) = perform(
             task.request,
-            problem,
+            [problem],
             task.manifest,
             directory,
             listeners=[_StopWatch(campaign / STOP)],

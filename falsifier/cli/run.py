@@ -1,5 +1,6 @@
 """``falsifier run`` and ``falsifier resume``."""
 
+import json
 import sys
 from datetime import datetime
 from pathlib import Path
@@ -19,14 +20,15 @@ from falsifier.cli.options import (
     problem_request,
     quiet_option,
 )
-from falsifier.display import make_display, result_json, result_text
+from falsifier.display import counterexample_name, make_display, result_json, result_text, results_text
 from falsifier.engine import Result
 from falsifier.export import write_counterexample
 from falsifier.manifest import recorded_request
 from falsifier.request import RunRequest
-from falsifier.session import execute, resume_run
+from falsifier.session import execute, execute_all, resume_run
 
-_EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 130}
+# Where several requirements end differently, the first of these that occurs.
+_EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}
 
 
 @click.command()
@@ -39,6 +41,7 @@ _EXIT_CODES = {"not falsified": 0, "falsified": 1, "failed": 3, "interrupted": 1
 @click.option("--max-cost", type=float, help="Most US dollars for the language model.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the engine.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Simulations at a time.")
+@click.option("--all", "together", is_flag=True, help="All requirements of the spec in one search.")
 @quiet_option
 @out_option
 @json_option
@@ -51,6 +54,7 @@ def run(
     max_cost: float | None,
     seed: int,
     jobs: int,
+    together: bool,
     quiet: bool,
     out: Path | None,
     as_json: bool,
@@ -70,8 +74,8 @@ def run(
     )
     directory = out or _new_directory(request.problem.target)
     with make_display(quiet=quiet) as display:
-        result = execute(request, directory, listeners=[display])
-    _finish(result, as_json=as_json)
+        results = (execute_all if together else execute)(request, directory, listeners=[display])
+    _finish(results, as_json=as_json)
 
 
 @click.command()
@@ -107,23 +111,39 @@ def resume(
         resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
         return
     with make_display(quiet=quiet) as display:
-        result = resume_run(directory, listeners=[display])
-    _finish(result, as_json=as_json)
+        results = resume_run(directory, listeners=[display])
+    _finish(results, as_json=as_json)
 
 
-def _finish(result: Result, *, as_json: bool) -> None:
-    if result.directory is not None:
-        _write_counterexamples(result, result.directory)
-    click.echo(result_json(result) if as_json else result_text(result))
-    sys.exit(_EXIT_CODES[result.status])
+def _finish(results: list[Result], *, as_json: bool) -> None:
+    for result in results:
+        if result.directory is not None:
+            _write_counterexamples(result, result.directory)
+    if as_json:
+        shown = [result_json(result) for result in results]
+        click.echo(json.dumps(shown[0] if len(shown) == 1 else shown, indent=2))
+    else:
+        click.echo(result_text(results[0]) if len(results) == 1 else results_text(results))
+    statuses = {result.status for result in results}
+    sys.exit(next(code for status, code in _EXIT_CODES.items() if status in statuses))
 
 
 def _write_counterexamples(result: Result, directory: Path) -> None:
-    request = recorded_request(directory).problem
+    asked = recorded_request(directory)
+    request = asked.problem
+    if asked.together:
+        request = request.model_copy(update={"target": result.problem.source})
     if result.counterexample is not None:
-        write_counterexample(result.problem, result.counterexample, directory, request=request)
+        write_counterexample(
+            result.problem,
+            result.counterexample,
+            directory,
+            request=request,
+            name=counterexample_name(result),
+        )
     for i, fragile in enumerate(result.fragile, start=1):
-        write_counterexample(result.problem, fragile, directory, request=request, name=f"fragile-{i}.json")
+        name = counterexample_name(result).replace("counterexample", f"fragile-{i}")
+        write_counterexample(result.problem, fragile, directory, request=request, name=name)
 
 
 def _new_directory(target: str) -> Path:

@@ -107,7 +107,7 @@ def talked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     request = RunRequest(problem=ProblemRequest(target="python:tests.problems:easy"), engine="corners")
     with open_journal(directory) as journal:
         write_manifest(directory, manifest(request, easy()).model_dump(mode="json"))
-        search(easy(), lambda _: Talker(), Budget(5), journal=journal)
+        search(easy(), lambda *_: Talker(), Budget(5), journal=journal)
     return directory
 
 
