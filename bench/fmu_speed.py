@@ -1,7 +1,7 @@
 """Time spent inside the bundled FMUs for one run: set inputs, doStep, get outputs in a compiled loop.
 
-Usage: python bench/fmu_speed.py [fmus/AT.fmu ...]; without names all FMI 2.0 FMUs of fmus/ are measured and the table
-is printed. Committed result: bench/fmu_speed.md.
+Usage: python bench/fmu_speed.py [fmus/AT.fmu ...]; without names all FMI 2.0 FMUs of fmus/ are measured and the
+table is printed. Committed result: bench/fmu_speed.md.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def measure(path: Path) -> list[Row]:
     fmu.instantiate()
     loop = make_loop(fmu.dll)
     experiment = description.defaultExperiment
-    stop, step = float(experiment.stopTime), float(experiment.stepSize)
+    stop, step = float(experiment.stopTime), float(experiment.stepSize or 0.01)
     chosen = {
         kind: [v for v in description.modelVariables if v.causality == kind] for kind in ("input", "output")
     }
@@ -141,20 +141,20 @@ def main() -> None:
 
     given = [Path(name) for name in sys.argv[1:]] or sorted((ROOT / "fmus").glob("*.fmu"))
     paths = [path for path in given if read_model_description(str(path)).fmiVersion == "2.0"]
+    processor = platform.processor() or platform.machine()
     print("# Time inside the FMUs\n")
     print(
-        "`python bench/fmu_speed.py`: set inputs, doStep, get outputs in a numba loop on one core; no Python in between."
+        "`python bench/fmu_speed.py`: set inputs, doStep, get outputs in a numba loop on one core, no Python"
     )
     print(
-        f"{RUNS} runs each, random inputs of {CONTROL_POINTS} control points (pchip), {platform.processor() or platform.machine()}.\n"
+        f"in between. {RUNS} runs each, random inputs of {CONTROL_POINTS} control points (pchip); {processor}.\n"
     )
     print("| FMU | run | communication step | inputs | fastest ms | median ms |")
     print("|---|---|---|---|---|---|")
     for path in paths:
         for row in measure(path):
-            print(
-                f"| {row.name} | {row.stop:g} s | {row.step:g} s | {row.inputs} | {row.fastest:.2f} | {row.median:.2f} |"
-            )
+            cells = [row.name, f"{row.stop:g} s", f"{row.step:g} s", row.inputs]
+            print("| " + " | ".join([*cells, f"{row.fastest:.2f}", f"{row.median:.2f}"]) + " |")
 
 
 if __name__ == "__main__":

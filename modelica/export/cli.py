@@ -8,17 +8,20 @@ import sys
 import tomllib
 from pathlib import Path
 
-from .emit_c import System, lay_out, model_c, sizes_h
-from .evaluate import Evaluator
-from .flatten import flatten
-from .instance import Scope
-from .library import absolute, load
-from .model_description import fmi2, fmi3, model_identifier
-from .package import PLATFORMS, Contents, build, c_files
-from .sort import sort, sort_initial, states_of
-from .syntax import ExportError
+from .emit.model import model_c, sizes_h
+from .flat.evaluate import Evaluator
+from .flat.flatten import flatten
+from .flat.instance import Scope
+from .order.layout import System, lay_out
+from .order.sort import sort, sort_initial, states_of
+from .pack.description import fmi2, fmi3, model_identifier
+from .pack.fmu import PLATFORMS, Contents, build, c_files
+from .read.library import absolute, load
+from .read.syntax import ExportError
 
 HERE = Path(__file__).parent
+
+
 SYSTEMS = HERE / "systems.toml"
 
 

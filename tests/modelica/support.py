@@ -1,4 +1,4 @@
-"""Drives FMUs for the tests: co-simulation through fmpy's thin wrappers, model exchange by a small integrator."""
+"""Drives FMUs for the tests: co-simulation through fmpy, model exchange by a small integrator."""
 
 from __future__ import annotations
 

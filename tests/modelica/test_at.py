@@ -1,8 +1,9 @@
-"""The bundled automatic transmission against golden figures of an independent integration and of publications."""
+"""The bundled automatic transmission against golden figures: an independent integration, publications."""
 
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ def robustness(rows: Floats) -> dict[str, float]:
     for number in (1, 2, 3, 4):
         short = any(
             gear[a] == number and (a - 1) * STEP <= 30 and (b - a) * STEP <= 2.5 + 1e-9
-            for a, b in zip(changes, changes[1:], strict=False)
+            for a, b in pairwise(changes)
         )
         found[f"AT5{number}"] = -0.5 if short else 0.5
     return found

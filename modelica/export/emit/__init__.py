@@ -1,0 +1,1 @@
+"""Ordered model -> C."""

@@ -1,0 +1,1 @@
+"""Syntax tree -> flat model of scalar equations."""

@@ -1,0 +1,314 @@
+"""What flattening produces: scalar expressions, equations and variables without any class structure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+from ..read.syntax import Class, Place
+
+Type = Literal["Real", "Integer", "Boolean"]
+
+
+@dataclass(frozen=True, slots=True)
+class Lit:
+    """A known value."""
+
+    value: float | int | bool
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Var:
+    """The value of a scalar variable."""
+
+    name: str
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Pre:
+    """Its value before the present event."""
+
+    name: str
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Der:
+    """The time derivative of a state."""
+
+    name: str
+    type: Type = "Real"
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """The simulation time."""
+
+    type: Type = "Real"
+
+
+@dataclass(frozen=True, slots=True)
+class Initial:
+    """True during initialization."""
+
+    type: Type = "Boolean"
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """True at the instants start + k * interval, in the first iteration of the event."""
+
+    start: Scalar
+    interval: Scalar
+    type: Type = "Boolean"
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """When-condition number `index` has just become true."""
+
+    index: int
+    type: Type = "Boolean"
+
+
+@dataclass(frozen=True, slots=True)
+class Op:
+    """An operator or built-in function without events."""
+
+    name: str
+    args: tuple[Scalar, ...]
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """A comparison that makes a state or time event when it changes and is frozen between events."""
+
+    name: str
+    left: Scalar
+    right: Scalar
+    type: Type = "Boolean"
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """The largest whole number not above `arg`; makes an event when it changes."""
+
+    arg: Scalar
+    type: Type = "Real"
+
+
+@dataclass(frozen=True, slots=True)
+class Cond:
+    """If-expression."""
+
+    condition: Scalar
+    then: Scalar
+    otherwise: Scalar
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Pick:
+    """An array element whose subscripts are known only during simulation."""
+
+    array: Tensor
+    subscripts: tuple[Scalar, ...]
+    type: Type
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionCall:
+    """A call of a Modelica function with one scalar result."""
+
+    function: str
+    args: tuple[Tensor, ...]
+    type: Type
+
+
+Scalar = (
+    Lit | Var | Pre | Der | Time | Initial | Tick | Edge | Op | Relation | Floor | Cond | Pick | FunctionCall
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Tensor:
+    """Scalars in row-major order; a scalar has no dimensions."""
+
+    dims: tuple[int, ...]
+    items: tuple[Scalar, ...]
+    type: Type
+
+
+def children(node: Scalar) -> Iterator[Scalar]:
+    """The direct operands of an expression."""
+    match node:
+        case Op():
+            yield from node.args
+        case Relation():
+            yield node.left
+            yield node.right
+        case Floor():
+            yield node.arg
+        case Cond():
+            yield node.condition
+            yield node.then
+            yield node.otherwise
+        case Pick():
+            yield from node.subscripts
+            yield from node.array.items
+        case FunctionCall():
+            for tensor in node.args:
+                yield from tensor.items
+        case Tick():
+            yield node.start
+            yield node.interval
+
+
+def walk(node: Scalar) -> Iterator[Scalar]:
+    """The expression and everything in it."""
+    yield node
+    for child in children(node):
+        yield from walk(child)
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """`left = right`; `discrete` where it stems from a when clause."""
+
+    left: Scalar
+    right: Scalar
+    place: Place
+    discrete: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """When-condition number `index`."""
+
+    index: int
+    value: Scalar
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """`targets = function(args)`: every output of the function, None for one that is not used."""
+
+    targets: tuple[tuple[str, ...] | None, ...]
+    function: str
+    args: tuple[Tensor, ...]
+    place: Place
+    discrete: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Reinit:
+    """A state jumps to `value` where `condition` holds."""
+
+    state: str
+    condition: Scalar
+    value: Scalar
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Assert:
+    """An error with `message` where `condition` does not hold."""
+
+    condition: Scalar
+    message: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """Statement `name := value`."""
+
+    name: str
+    value: Scalar
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """If-statement."""
+
+    branches: tuple[tuple[Scalar, tuple[Statement, ...]], ...]
+    otherwise: tuple[Statement, ...]
+    place: Place
+
+
+Statement = Set | Branch | Outputs | Reinit | Assert | Condition
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """An algorithm section of a model."""
+
+    statements: tuple[Statement, ...]
+    place: Place
+
+
+Flat = Equation | Condition | Outputs | Reinit | Assert | Section
+
+
+@dataclass(slots=True)
+class Variable:
+    """A scalar variable of the flat model."""
+
+    name: str
+    type: Type
+    variability: Literal["parameter", "continuous", "discrete"]
+    causality: Literal["input", "output", "local"]
+    public: bool
+    final: bool
+    place: Place
+    description: str = ""
+    unit: str | None = None
+    display_unit: str | None = None
+    quantity: str | None = None
+    minimum: float | int | None = None
+    maximum: float | int | None = None
+    nominal: float | None = None
+    fixed: bool = False
+    start: Scalar | None = None
+    binding: Scalar | None = None  # parameters only
+
+
+@dataclass(slots=True)
+class FlatModel:
+    """A model without structure."""
+
+    name: str
+    description: str
+    variables: dict[str, Variable] = field(default_factory=dict)
+    equations: list[Flat] = field(default_factory=list)
+    initial_equations: list[Equation] = field(default_factory=list)
+    functions: dict[str, Class] = field(default_factory=dict)
+    structural: set[str] = field(default_factory=set)
+    conditions: int = 0
+    stop_time: float | None = None
+    interval: float | None = None
+    tolerance: float | None = None
+    solver: dict[str, float | str | bool] = field(default_factory=dict)
+
+
+def names_in(node: Scalar, keep: Callable[[Scalar], bool] = lambda _: True) -> set[str]:
+    """Names of variables and derivatives (`der(x)`) whose present value an expression needs."""
+    found = set()
+    for part in walk(node):
+        if isinstance(part, Var) and keep(part):
+            found.add(part.name)
+        elif isinstance(part, Der):
+            found.add(f"der({part.name})")
+        elif isinstance(part, Edge):
+            found.add(f"when({part.index})")
+    return found
+
+
+REAL_ZERO = Lit(0.0, "Real")

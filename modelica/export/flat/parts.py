@@ -1,0 +1,96 @@
+"""What equations, when clauses and algorithm sections have in common."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..read.library import find_class
+from ..read.syntax import Body, Call, ExportError, Expr, Place, Several, Text, When
+from . import fold
+from .calls import arguments, function_outputs, lifted
+from .evaluate import Evaluator
+from .ir import Assert, Lit, Outputs, Reinit, Scalar, Tensor, Var
+from .tensors import fitted
+
+TRUE = Lit(value=True, type="Boolean")
+
+
+def loop_values(over: Expr, here: Evaluator, place: Place) -> list[Scalar]:
+    """The values that the index of a for loop takes."""
+    values = here.value(over)
+    if len(values.dims) != 1:
+        raise ExportError(place, "a for loop runs over a range or a vector: 'for i in 1:n loop'")
+    return [here.static(item, place) for item in values.items]
+
+
+def with_index(here: Evaluator, index: str, value: Scalar) -> Evaluator:
+    """The same scope with a value for a loop index."""
+    scope = here.scope.with_local(index, Tensor((), (value,), value.type))
+    return here.at(scope, events=here.events, sink=here.sink)
+
+
+def outputs(item: Several, here: Evaluator) -> Outputs:
+    """`(a, b) = f(x)`."""
+    if not isinstance(item.right, Call):
+        raise ExportError(item.place, "the right side of '(a, b) =' needs to be a function call")
+    function = find_class(item.right.name, here.scope.cls, item.place)
+    results = function_outputs(function, item.right)
+    if len(item.left) > len(results):
+        raise ExportError(item.place, f"'{function.name}' has {len(results)} outputs, not {len(item.left)}")
+    args = arguments(here, function, item.right)
+    model = here.model
+    model.functions[function.full_name] = function
+    made: list[Outputs] = []
+    auxiliary = lifted(here.at(here.scope, sink=made.append), function, args, item.place)
+    for name in (n for target in made[0].targets if target for n in target):
+        del model.variables[name]
+    targets: list[tuple[str, ...] | None] = []
+    for k, result in enumerate(auxiliary):
+        ref = item.left[k] if k < len(item.left) else None
+        targets.append(None if ref is None else _target_names(here.value(ref), result, item.place))
+    return replace(made[0], targets=tuple(targets))
+
+
+def _target_names(target: Tensor, result: Tensor, place: Place) -> tuple[str, ...]:
+    if target.dims != result.dims or target.type != result.type:
+        raise ExportError(
+            place, f"{target.type}{list(target.dims)} cannot take {result.type}{list(result.dims)}"
+        )
+    return tuple(name_of(item, place) for item in target.items)
+
+
+def name_of(item: Scalar, place: Place) -> str:
+    """The name of a variable on a left side."""
+    if not isinstance(item, Var):
+        raise ExportError(place, "a variable needs to stand on the left side")
+    return item.name
+
+
+def refuse_when(body: Body) -> None:
+    """No when clause may stand inside of if."""
+    for item in body:
+        if isinstance(item, When):
+            raise ExportError(
+                item.place, "'when' inside of 'if' is not supported; put the condition into the when clause"
+            )
+
+
+def reinit(call: Call, here: Evaluator, guard: Scalar) -> list[Reinit]:
+    """`reinit(x, value)`."""
+    if len(call.arguments) != 2:
+        raise ExportError(call.place, "'reinit' takes two arguments: reinit(state, value)")
+    target, value = (here.value(text) for text in call.arguments)
+    value = fitted(value, target.dims, "Real", call.place)
+    pairs = zip(target.items, value.items, strict=True)
+    return [Reinit(name_of(one, call.place), guard, other, call.place) for one, other in pairs]
+
+
+def assertion(call: Call, here: Evaluator, guard: Scalar) -> Assert:
+    """`assert(condition, message)`."""
+    if len(call.arguments) < 2 or not isinstance(call.arguments[1], Text):
+        raise ExportError(call.place, "'assert' needs a condition and a literal message")
+    with here.without_events():
+        condition = here.scalar(call.arguments[0])
+    if guard is not TRUE:
+        condition = fold.logic("or", (fold.logic("not", (guard,), call.place), condition), call.place)
+    return Assert(condition, call.arguments[1].value, call.place)

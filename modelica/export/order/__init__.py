@@ -1,0 +1,1 @@
+"""Flat model -> equations in the order of computation, variables in their places."""

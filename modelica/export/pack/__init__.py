@@ -1,0 +1,1 @@
+"""Description and C sources -> FMU."""

@@ -1,0 +1,1 @@
+"""Modelica text -> syntax tree."""

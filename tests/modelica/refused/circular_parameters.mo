@@ -1,0 +1,5 @@
+model M
+  parameter Real p = q;  // error: depends on itself
+  parameter Real q = p;
+equation
+end M;

@@ -1,0 +1,5 @@
+model M
+  Real x if true;  // error: conditional components
+equation
+  x = 1;
+end M;

@@ -1,0 +1,5 @@
+model M
+  Real x;
+equation
+  connect(x, x);  // error: connect
+end M;

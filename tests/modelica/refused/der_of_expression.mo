@@ -1,0 +1,5 @@
+model M
+  Real x;
+equation
+  der(2 * x) = 1;  // error: needs a variable
+end M;

@@ -1,0 +1,5 @@
+model M
+  input Real u;
+equation
+  u = 1;  // error: no unknown variable
+end M;

@@ -1,0 +1,5 @@
+model M
+  flow Real x;  // error: 'flow'
+equation
+  x = 1;
+end M;

@@ -1,0 +1,5 @@
+model M
+  Real x = time;
+  parameter Real p = x;  // error: may only depend on parameters
+equation
+end M;

@@ -1,0 +1,5 @@
+model M
+  parameter Real p;  // error: has no value
+  Real x = p;
+equation
+end M;

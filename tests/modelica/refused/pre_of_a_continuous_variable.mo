@@ -1,0 +1,5 @@
+model M
+  Real x = time;
+  Real y = pre(x);  // error: when clause
+equation
+end M;

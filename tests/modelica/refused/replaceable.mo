@@ -1,0 +1,5 @@
+model M
+  replaceable Real x;  // error: 'replaceable' is not supported
+equation
+  x = 1;
+end M;

@@ -1,0 +1,5 @@
+model M
+  Boolean b;
+equation
+  b = sample(0, 1);  // error: 'sample'
+end M;

@@ -1,0 +1,5 @@
+model M
+  Real x
+equation  // error: syntax error
+  x = 1;
+end M;

@@ -1,0 +1,5 @@
+model M
+  Real x = 1;
+equation
+  annotation(__falsifier_solver(stepp = 0.1));  // error: stepp
+end M;

@@ -1,0 +1,116 @@
+"""modelDescription.xml, the contents of the archives, reproducible builds."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+from tests.modelica.conftest import ROOT, Build, run_exporter
+
+FMUS = sorted((ROOT / "fmus").glob("*.fmu"))
+AT = ROOT / "fmus" / "AT.fmu"
+
+
+@pytest.mark.parametrize("path", FMUS, ids=lambda path: path.name)
+def test_the_validator_has_no_complaint(path: Path) -> None:
+    assert validate_fmu(str(path)) == []
+    description = read_model_description(str(path), validate=True)
+    assert description.coSimulation is not None
+    assert description.modelExchange is not None
+    assert len(description.description.split()) > 8
+    for variable in description.modelVariables:
+        if variable.causality in ("input", "output", "parameter"):
+            assert variable.description, variable.name
+        if variable.causality == "input":
+            assert variable.min is not None and variable.max is not None and variable.start is not None
+
+
+@pytest.mark.parametrize(
+    ("model", "fmi"),
+    [("Decay", 2), ("Ball", 2), ("Counter", 2), ("Arrays", 2), ("Starts", 2), ("Switched", 3), ("Arrays", 3)],
+)
+def test_the_validator_accepts_every_kind_of_variable(build: Build, model: str, fmi: int) -> None:
+    assert validate_fmu(str(build(model, fmi=fmi))) == []
+
+
+def test_hashes_are_listed() -> None:
+    lines = (ROOT / "fmus" / "SHA256SUMS").read_text().splitlines()
+    expected = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}" for path in FMUS]
+    assert lines == expected
+
+
+def test_every_fmu_of_the_table_is_there() -> None:
+    table = tomllib.loads((ROOT / "modelica" / "export" / "systems.toml").read_text())
+    assert sorted(entry["file"] for entry in table.values()) == [path.name for path in FMUS]
+
+
+def test_units_ranges_and_descriptions_of_the_transmission() -> None:
+    description = read_model_description(str(AT))
+    variables = {v.name: v for v in description.modelVariables}
+    throttle = variables["throttle"]
+    assert (throttle.unit, float(throttle.min), float(throttle.max), throttle.causality) == (
+        "%",
+        0,
+        100,
+        "input",
+    )
+    assert "Throttle" in throttle.description
+    gear = variables["gear"]
+    assert (gear.type, gear.causality, gear.variability, int(gear.min), int(gear.max)) == (
+        "Integer", "output", "discrete", 1, 4,
+    )  # fmt: skip
+    assert [v.name for v in description.modelVariables if v.causality == "output"] == ["speed", "rpm", "gear"]
+    assert variables["waitTicks"].variability == "tunable"
+    experiment = description.defaultExperiment
+    assert (float(experiment.stopTime), float(experiment.stepSize)) == (50, 0.01)
+    assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
+
+
+def test_parameters_are_fixed_tunable_or_constant(build: Build) -> None:
+    found = {}
+    for model in ("Decay", "Counter", "Arrays"):
+        for v in read_model_description(str(build(model))).modelVariables:
+            found[model, v.name] = (v.causality, v.variability)
+    assert found["Decay", "k"] == ("parameter", "tunable")
+    assert found["Decay", "x0"] == ("parameter", "fixed")
+    assert found["Decay", "twice"] == ("calculatedParameter", "tunable")
+    assert found["Counter", "period"] == ("parameter", "fixed")
+    assert found["Arrays", "n"] == ("local", "constant")  # decides sizes
+    assert found["Counter", "held"] == ("output", "discrete")
+
+
+def test_states_and_their_derivatives_are_linked(build: Build) -> None:
+    description = read_model_description(str(build("Arrays")))
+    derivatives = {v.name: v.derivative.name for v in description.modelVariables if v.derivative}
+    names = ["x[1]", "x[2]", "tank[1].y", "tank[2].y", "tank[3].y"]
+    assert derivatives == {f"der({name})": name for name in names}
+    assert len(description.derivatives) == 5
+
+
+def test_sources_and_binaries_for_three_platforms() -> None:
+    names = set(zipfile.ZipFile(AT).namelist())
+    assert {"binaries/linux64/AT.so", "binaries/win64/AT.dll", "binaries/darwin64/AT.dylib"} <= names
+    assert {"sources/model.c", "sources/fmi2.c", "sources/integrate.c", "sources/sizes.h"} <= names
+    names = set(zipfile.ZipFile(ROOT / "fmus" / "AT_fmi3.fmu").namelist())
+    assert "binaries/x86_64-linux/AT.so" in names
+    assert "sources/buildDescription.xml" in names
+
+
+def test_the_same_sources_give_the_same_bytes(build: Build, tmp_path: Path) -> None:
+    again = tmp_path / "again.fmu"
+    source = str(ROOT / "tests" / "modelica" / "Features")
+    done = run_exporter("Features.Decay", "--source", source, "--output", str(again), "--platform", "linux64")
+    assert done.returncode == 0, done.stderr
+    assert again.read_bytes() == build("Decay").read_bytes()
+
+
+def test_the_bundled_description_is_the_one_of_the_sources(build: Build) -> None:
+    rebuilt = build("ArchComp.AT", ROOT / "modelica" / "ArchComp")
+    for name in ("modelDescription.xml", "sources/model.c"):
+        assert zipfile.ZipFile(AT).read(name) == zipfile.ZipFile(rebuilt).read(name)
