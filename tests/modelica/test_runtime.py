@@ -104,6 +104,26 @@ def test_model_exchange_agrees_with_co_simulation(
     assert inside[-1]
 
 
+def test_ticks_between_two_steps_see_the_new_input(build: Build) -> None:
+    with opened(build("Sampler")) as [fmu]:
+        rows = fmu.start().run(["x"], 1, 0.1, lambda t: {"u": 1 + round(10 * t)})
+    assert rows[:, 1] == pytest.approx([0.1 * sum(range(1, k + 1)) for k in range(11)])
+
+
+def test_but_not_where_they_have_been_seen_already(build: Build) -> None:
+    with opened(build("SeenSampler")) as [fmu]:
+        rows = fmu.start().run(["x", "seen"], 1, 0.1, lambda t: {"u": 1 + round(10 * t)})
+    assert np.array_equal(rows[:, 2], range(1, 12))
+    # The tick at the start is repeated with the first input; each later one has the input of the step it ends.
+    assert rows[:, 1] == pytest.approx([0, *(0.1 * (1 + sum(range(1, k + 1))) for k in range(10))])
+
+
+def test_events_without_end_are_an_error(build: Build, capfd: pytest.CaptureFixture[str]) -> None:
+    with opened(build("Chatter")) as [fmu], pytest.raises(FMICallException):
+        fmu.start().step(1.0)
+    assert "events follow each other without end" in "".join(capfd.readouterr())
+
+
 def test_values_of_the_initial_system_can_be_read_and_starts_set_again(build: Build) -> None:
     with opened(build("Starts")) as [fmu]:
         fmu.fmu.setupExperiment(startTime=0.0)
