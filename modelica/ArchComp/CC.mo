@@ -1,5 +1,6 @@
 within ArchComp;
-model CC "Chasing cars: five cars in a row drive towards negative y. Car 1 leads (y1, driven by throttle and brake), car 5 is last; y(i+1) - yi is the gap between a car and the one ahead of it, 10 m at the start"
+model CC "Chasing cars: five cars in a row drive towards negative y. Car 1 leads (y1, driven by throttle and
+brake), car 5 is last; y(i+1) - yi is the gap between a car and the one ahead of it, 10 m at the start"
   input Real throttle(start = 0, min = 0, max = 1, unit = "1")
     "Throttle of the leading car: pushes it towards negative y";
   input Real brake(start = 0, min = 0, max = 1, unit = "1")
@@ -25,6 +26,7 @@ equation
   y3 = car3.y;
   y4 = car4.y;
   y5 = car5.y;
+  // Between events the cars move at constant acceleration or nearly so: one step per communication step is exact.
   annotation(
     experiment(StopTime = 100, Interval = 0.01, Tolerance = 1e-6),
     __falsifier_solver(method = "fixed", step = 0.01));

@@ -1,5 +1,6 @@
 within ArchComp;
-model CCFollower "A car of the row: keeps, chases or brakes by its gap to the car ahead; every change of mode is a located state event"
+model CCFollower "A car of the row: keeps, chases or brakes by its
+gap to the car ahead; every change of mode is a located state event"
   constant Integer Keeping = 1 "Drifts away from the car ahead at constant speed";
   constant Integer Chasing = 2 "Closes up, ever faster";
   constant Integer Braking = 3 "Closes up, ever slower";

@@ -1,8 +1,11 @@
 within ArchComp;
-model F16 "F-16 with a ground-collision-avoidance autopilot: starts in a dive at 2338 ft with the attitude (roll, pitch, yaw), rolls its wings level, then pulls up at 5 g; altitude is in feet above the ground, and negative altitude is a crash"
+model F16 "F-16 with a ground-collision-avoidance autopilot: starts in a dive at
+2338 ft with the attitude (roll, pitch, yaw), rolls its wings level, then pulls up
+at 5 g; altitude is in feet above the ground, and negative altitude is a crash"
   import ArchComp.F16Aerodynamics;
   import ArchComp.F16Engine;
-  parameter Real roll(min = -3.15, max = 3.15, unit = "rad") = 0.75 "Roll angle at the start, positive is right wing down";
+  parameter Real roll(min = -3.15, max = 3.15, unit = "rad") = 0.75
+    "Roll angle at the start, positive is right wing down";
   parameter Real pitch(min = -1.57, max = 1.57, unit = "rad") = -1.2 "Pitch angle at the start, negative is nose down";
   parameter Real yaw(min = -3.15, max = 3.15, unit = "rad") = -0.8 "Heading at the start, 0 is north";
   parameter Real altitudeStart(min = 0, max = 35000, unit = "ft") = 2338 "Altitude at the start";

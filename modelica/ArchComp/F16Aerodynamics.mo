@@ -1,7 +1,9 @@
 within ArchComp;
-package F16Aerodynamics "Force and moment coefficients of the F-16: Morelli's polynomials (1998), with the damping table of Stevens and Lewis added on top"
-  // The polynomials hold the damping already; adding the table counts it twice. The benchmark does so, and its figures depend on it.
-  // Angles and surface deflections in rad; pHat, qHat, rHat are body rates normalised by span or chord over twice the speed.
+package F16Aerodynamics "Force and moment coefficients of the F-16: Morelli's
+polynomials (1998), with the damping table of Stevens and Lewis added on top"
+  // The polynomials hold the damping already; adding the table counts it twice. The benchmark does so, and its
+  // figures depend on it. Angles and surface deflections in rad; pHat, qHat, rHat are body rates normalised by
+  // span or chord over twice the speed.
   // Each letter is the coefficient vector of the same letter in Morelli's paper.
   constant Real a[7] = {-0.01943367, 0.2136104, -0.2903457, -0.003348641, -0.2060504, 0.6988016, -0.9035381} "CX";
   constant Real b[5] = {0.4833383, 8.644627, 11.31098, -74.22961, 60.75776} "CX of the pitch rate";
@@ -10,17 +12,23 @@ package F16Aerodynamics "Force and moment coefficients of the F-16: Morelli's po
   constant Real e[4] = {0.8071648, 0.1189633, 4.177702, -9.162236} "CY of the yaw rate";
   constant Real f[6] = {-0.1378278, -4.211369, 4.775187, -10.26225, 8.399763, -0.4354} "CZ";
   constant Real g[5] = {-30.54956, -41.32305, 329.2788, -684.8038, 408.0244} "CZ of the pitch rate";
-  constant Real h[8] = {-0.105853, -0.5776677, -0.01672435, 0.1357256, 0.2172952, 3.464156, -2.835451, -1.098104} "Cl";
+  constant Real h[8] = {
+    -0.105853, -0.5776677, -0.01672435, 0.1357256, 0.2172952, 3.464156, -2.835451, -1.098104} "Cl";
   constant Real i[4] = {-0.4126806, -0.1189974, 1.247721, -0.7391132} "Cl of the roll rate";
   constant Real j[5] = {0.06250437, 0.6067723, -1.101964, 9.100087, -11.92672} "Cl of the yaw rate";
-  constant Real k[7] = {-0.1463144, -0.0407391, 0.03253159, 0.4851209, 0.297885, -0.3746393, -0.3213068} "Cl of the ailerons";
-  constant Real l[7] = {0.02635729, -0.0219291, -0.003152901, -0.05817803, 0.4516159, -0.4928702, -0.01579864} "Cl of the rudder";
-  constant Real m[8] = {-0.0202937, 0.04660702, -0.6012308, -0.08062977, 0.08320429, 0.5018538, 0.6378864, 0.4226356} "Cm";
+  constant Real k[7] = {
+    -0.1463144, -0.0407391, 0.03253159, 0.4851209, 0.297885, -0.3746393, -0.3213068} "Cl of the ailerons";
+  constant Real l[7] = {
+    0.02635729, -0.0219291, -0.003152901, -0.05817803, 0.4516159, -0.4928702, -0.01579864} "Cl of the rudder";
+  constant Real m[8] = {
+    -0.0202937, 0.04660702, -0.6012308, -0.08062977, 0.08320429, 0.5018538, 0.6378864, 0.4226356} "Cm";
   constant Real n[6] = {-5.19153, -3.554716, -35.98636, 224.7355, -412.0991, 241.175} "Cm of the pitch rate";
   constant Real o[7] = {0.2993363, 0.06594004, -0.2003125, -0.06233977, -2.107885, 2.14142, 0.8476901} "Cn";
   constant Real p[5] = {0.02677652, -0.3298246, 0.1926178, 4.013325, -4.404302} "Cn of the roll rate";
   constant Real q[3] = {-0.3698756, -0.1167551, -0.7641297} "Cn of the yaw rate";
-  constant Real r[10] = {-0.03348717, 0.04276655, 0.006573646, 0.3535831, -1.373308, 1.237582, 0.2302543, -0.2512876, 0.1588105, -0.5199526} "Cn of the ailerons";
+  constant Real r[10] = {
+    -0.03348717, 0.04276655, 0.006573646, 0.3535831, -1.373308, 1.237582, 0.2302543, -0.2512876, 0.1588105,
+    -0.5199526} "Cn of the ailerons";
   constant Real s[6] = {-0.08115894, -0.0115658, 0.02514167, 0.2038748, -0.3337476, 0.1004297} "Cn of the rudder";
   constant Real degPerRad = 180 / 3.141592653589793;
   // Damping derivatives over the angle of attack in deg

@@ -1,5 +1,6 @@
 within ArchComp;
-package F16Engine "Thrust and power lag of the F-16's engine (Stevens and Lewis); power runs from 0 to 100 percent, 50 is military power"
+package F16Engine "Thrust and power lag of the F-16's engine (Stevens
+and Lewis); power runs from 0 to 100 percent, 50 is military power"
   constant Real machs[6] = {0, 0.2, 0.4, 0.6, 0.8, 1};
   constant Real altitudes[6](each unit = "ft") = {0, 10000, 20000, 30000, 40000, 50000};
   // Thrust in lbf; rows: Mach number, columns: altitude

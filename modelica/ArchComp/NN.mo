@@ -1,5 +1,7 @@
 within ArchComp;
-model NN "Magnetic levitation: a ball of position Pos floats above an electromagnet whose current a sampled neural controller (NARMA-L2) sets every 10 ms so that Pos follows the reference Ref; the current swings between its limits, so Pos ripples around Ref"
+model NN "Magnetic levitation: a ball of position Pos floats above an electromagnet whose
+current a sampled neural controller (NARMA-L2) sets every 10 ms so that Pos follows the
+reference Ref; the current swings between its limits, so Pos ripples around Ref"
   input Real Ref(start = 2, min = 0.5, max = 4, unit = "1") "Reference: wanted position of the ball";
   output Real Pos(unit = "1", start = 0.5, fixed = true) "Position of the ball above the magnet";
   discrete output Real NNPos(unit = "1", start = 0, fixed = true)
@@ -18,7 +20,8 @@ protected
   constant Real minCurrent = -0.97682887932966278 "Current that is -1 for the network";
   constant Real maxCurrent = 3.9954019738068034 "Current that is +1 for the network";
   constant Real fGain = 0.9921675075327889 "Gain of the layer behind f";
-  constant Real gGain = 0.0004116938262844689 * 0.5996797859290577 * (-0.8613021600806045) "Gains of the three layers behind g";
+  constant Real gGain = 0.0004116938262844689 * 0.5996797859290577 * (-0.8613021600806045)
+    "Gains of the three layers behind g";
   constant Real fBias = 0.9079050764793414;
   constant Real gBias = 0.8636776698074995;
   constant Real fIn[9, 4] = {
@@ -32,8 +35,12 @@ protected
     {-0.011364174849476511, 0.17210174153872684, -0.06300334133173585, 0.0163566809393993},
     {1.9115353490253353, -1.69282907428, 0.2613911596451783, -0.0835215908808596}}
     "Input weights of the nine hidden units of f";
-  constant Real fOffset[9] = {-2.0540485030510767, -0.28204565482768396, -1.4224984046874725, 0.011980000365264734, -3.283305517615781, 1.1020848049883287, 2.2616940700361274, -0.14165422591960777, 1.088976924112505};
-  constant Real fOut[9] = {5.755548244449744e-05, 2.194101728771453, -0.00044492281828180147, -0.0003923797112020545, 1.8234323877817899e-06, 0.042708432151687514, 0.0002533004910055188, 4.7927194580095165, 0.41991364122019326};
+  constant Real fOffset[9] = {
+    -2.0540485030510767, -0.28204565482768396, -1.4224984046874725, 0.011980000365264734, -3.283305517615781,
+    1.1020848049883287, 2.2616940700361274, -0.14165422591960777, 1.088976924112505};
+  constant Real fOut[9] = {
+    5.755548244449744e-05, 2.194101728771453, -0.00044492281828180147, -0.0003923797112020545,
+    1.8234323877817899e-06, 0.042708432151687514, 0.0002533004910055188, 4.7927194580095165, 0.41991364122019326};
   constant Real gIn[9, 4] = {
     {2.094012153469472, 4.139161749460294, 0.46017743638858905, 1.4212453617040688},
     {-0.8698291152927357, -0.9121639326327016, -1.7725276755524564, -1.8256681774546808},
@@ -45,8 +52,12 @@ protected
     {-1.7962091138833456, 0.3300424895644986, 1.1996735804361836, -0.7584644175666946},
     {1.6085665816521635, -0.6596001199307706, 2.0409314507416925, 1.3008341987199021}}
     "Input weights of the nine hidden units of g";
-  constant Real gOffset[9] = {-0.9982247397611276, -1.125845792332043, 1.0030562696131118, 3.602065551304344, -0.02518596436748236, 1.276393628529973, -2.274010065287341, -3.0720977283302817, 1.7835104510380932};
-  constant Real gOut[9] = {1.179622915707438, 1.4349048600431937, -0.8972572979998953, -2.338627041684287, -0.09669294243932744, -0.6343859921507877, -2.737919464469502, 3.0145214892072625, 2.1741978843496215};
+  constant Real gOffset[9] = {
+    -0.9982247397611276, -1.125845792332043, 1.0030562696131118, 3.602065551304344, -0.02518596436748236,
+    1.276393628529973, -2.274010065287341, -3.0720977283302817, 1.7835104510380932};
+  constant Real gOut[9] = {
+    1.179622915707438, 1.4349048600431937, -0.8972572979998953, -2.338627041684287, -0.09669294243932744,
+    -0.6343859921507877, -2.737919464469502, 3.0145214892072625, 2.1741978843496215};
 
   function hiddenLayer "Weighted sum of nine tanh units over the regressor"
     input Real x[4] "Regressor";
@@ -96,6 +107,7 @@ equation
     u = normalise(current, minCurrent, maxCurrent);
     uBefore = pre(u);
   end when;
+  // A sample at the end of a communication step is repeated with the inputs that follow: it sees Ref without delay.
   annotation(
     experiment(StopTime = 40, Interval = 0.01, Tolerance = 1e-6),
     __falsifier_solver(method = "fixed", step = 0.005, repeatTicks = "always"));

@@ -1,5 +1,7 @@
 within ArchComp;
-model SC "Steam condenser: cooling water condenses the incoming steam Fs; a recurrent neural controller sets the cooling flow Fcw so that pressure, as the sensor sees it, follows its set point, which drops from 90 to 87 kPa at 2 s"
+model SC "Steam condenser: cooling water condenses the incoming steam Fs; a
+recurrent neural controller sets the cooling flow Fcw so that pressure, as the
+sensor sees it, follows its set point, which drops from 90 to 87 kPa at 2 s"
   import ArchComp.Tables.linear;
   input Real Fs(start = 4, min = 3.5, max = 4.5, unit = "kg/s") "Steam flow into the condenser";
   output Real T(unit = "degC", start = 80, fixed = true) "Temperature of the cooling water at the outlet";
@@ -75,8 +77,8 @@ equation
     der(first[i]) = hidden[i] - pole * first[i];
     der(second[i]) = first[i] - pole * second[i];
   end for;
-  correction = (outputOffset + outputWeight[1] * hidden[1] + outputWeight[2] * hidden[2] + outputWeight[3] * hidden[3] + 1)
-    * (flowMax - flowMin) / 2 + flowMin;
+  correction = flowMin + (flowMax - flowMin) / 2 * (1 + outputOffset
+    + outputWeight[1] * hidden[1] + outputWeight[2] * hidden[2] + outputWeight[3] * hidden[3]);
   annotation(
     experiment(StopTime = 35, Interval = 0.01, Tolerance = 1e-8),
     __falsifier_solver(method = "fixed", step = 0.01));
