@@ -161,6 +161,8 @@ def load_problem(
     """
     path, requirement = find_spec(target)
     spec = read_spec(path)
+    if requirement is None and path.stem in spec.requirements:
+        requirement = path.stem  # NN is a spec and one of its requirements
     if requirement is None:
         if len(spec.requirements) > 1:
             raise SpecError(

@@ -55,6 +55,11 @@ def test_instance_2_of_nnx_is_over_after_three_seconds() -> None:
     assert problem.space.bounds.tolist() == [[1.95, 2.05]] * 3
 
 
+def test_requirement_named_as_its_system_is_meant_by_that_name() -> None:
+    assert load_problem("NN").name == "NN"
+    assert [p.name for p in load_problems("NN")] == ["NN", "NNb", "NNx"]
+
+
 def test_samples_of_f16_are_those_of_its_autopilot() -> None:
     problem = load_problem("F16")
     assert problem.experiment.samples == 451
