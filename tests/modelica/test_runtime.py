@@ -114,7 +114,7 @@ def test_but_not_where_they_have_been_seen_already(build: Build) -> None:
     with opened(build("SeenSampler")) as [fmu]:
         rows = fmu.start().run(["x", "seen"], 1, 0.1, lambda t: {"u": 1 + round(10 * t)})
     assert np.array_equal(rows[:, 2], range(1, 12))
-    # The tick at the start is repeated with the first input; each later one has the input of the step it ends.
+    # The tick at the start is repeated with the first input, each later one has that of the step it ends.
     assert rows[:, 1] == pytest.approx([0, *(0.1 * (1 + sum(range(1, k + 1))) for k in range(10))])
 
 
