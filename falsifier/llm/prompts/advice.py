@@ -3,7 +3,7 @@
 from falsifier.llm.prompts.blocks import AdviceBlock
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
-from falsifier.stl.formula import Always, Implies
+from falsifier.stl.formula import Implies
 
 
 def advice(view: View, variant: Variant) -> AdviceBlock:
@@ -25,7 +25,7 @@ def advice(view: View, variant: Variant) -> AdviceBlock:
 
 
 def _on_observations(view: View) -> list[str]:
-    lines = ["Constant extremes and single switches between them are cheap first samples."]
+    lines = ["Extremes of the ranges are cheap first samples; for signals also one switch between them."]
     formula = view.requirement.formula
     units = {view.unit(name) for name in formula.signals}
     if len(formula.predicates) > 1 and len(units) > 1:
@@ -33,14 +33,11 @@ def _on_observations(view: View) -> list[str]:
             "Robustness values of different parts are in the units of their signals: a small number in one "
             "unit may be harder to move than a large one in another."
         )
-    parts = list(formula.walk())
-    if any(isinstance(part, Implies) for part in parts):
+    if any(isinstance(part, Implies) for part in formula.walk()):
         lines.append(
             "An implication is violated only where its condition holds and its consequence fails: bring "
             "about the condition first."
         )
-    if any(isinstance(part, Always) and part.window is not None for part in parts):
-        lines.append("One moment inside the window is enough to violate an always (G).")
     lines.append(
         "Do not only repeat the best sample with small changes: when samples stop improving, try another "
         "strategy."

@@ -24,7 +24,7 @@ from falsifier.llm.prompts.blocks import (
 from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
 from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import View, told_unit
 from falsifier.signals import even_times
 from falsifier.space import Candidate, InputRange, ParameterRange
 from falsifier.stl import in_words
@@ -129,7 +129,7 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     freedom = r.free if free else None
     return InputLine(
         name=r.name,
-        unit=r.unit,
+        unit=told_unit(r.unit),
         description=r.description,
         kind=view.kind(r.name),
         low=low,
@@ -147,7 +147,7 @@ def _parameter(p: ParameterRange) -> ParameterLine:
     low, high = bounds(p.low, p.high)
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
-        name=p.name, unit=p.unit, description=p.description, low=low, high=high, nominal=nominal
+        name=p.name, unit=told_unit(p.unit), description=p.description, low=low, high=high, nominal=nominal
     )
 
 

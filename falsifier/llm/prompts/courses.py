@@ -41,15 +41,13 @@ class Oscillation:
         start: begin in s.
         end: end in s.
         period: median period in s.
-        low: lowest turning point.
-        high: highest turning point.
+        swing: median distance from one turning point to the next.
     """
 
     start: float
     end: float
     period: float
-    low: float
-    high: float
+    swing: float
 
 
 def is_discrete(column: Array, *, kind: str) -> bool:
@@ -147,13 +145,11 @@ def oscillation(times: Array, column: Array, *, slower_than: float) -> Oscillati
     inside = [k for k in turns if fast[0] <= times[k] <= fast[1]]
     if len(inside) < _FEWEST_TURNS:
         return None
-    values = column[inside]
     return Oscillation(
         start=fast[0],
         end=fast[1],
         period=2 * float(np.median(np.diff(times[inside]))),
-        low=float(values.min()),
-        high=float(values.max()),
+        swing=float(np.median(np.abs(np.diff(column[inside])))),
     )
 
 

@@ -20,7 +20,7 @@ from falsifier.llm.prompts.courses import (
 )
 from falsifier.llm.prompts.numbers import decimals_for, number, plain, signed
 from falsifier.llm.prompts.view import View
-from falsifier.stl import Diagnosis, Formula, Monitor
+from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
 from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
 from falsifier.trajectory import Trajectory
 
@@ -33,6 +33,8 @@ _GRID_VALUES = 21
 # Share of the stop time, around the critical time, that is told densely, and in how many steps.
 _BURST_SHARE = 1 / 25
 _BURST_STEPS = 20
+_BURST_VALUES = 40
+_VALUES_PER_PERIOD = 8
 # Signals whose course is told, those of the formula first.
 _MOST_SIGNALS = 16
 
@@ -74,7 +76,7 @@ def details(view: View, evaluation: Evaluation) -> Iterator[str]:
     yield f"values every {number(step)} s from t = 0:"
     for name, column in columns.items():
         yield from _course(view, name, column, trajectory.times, grid, verdict.robustness)
-    yield from _burst(view, columns, trajectory.times, verdict.critical_time, verdict.robustness)
+    yield from _burst(view, columns, trajectory.times, verdict)
 
 
 def monitor_for(view: View) -> Monitor:
@@ -190,32 +192,48 @@ def _course(
     yield f"{name}: {samples_at(times, column, grid.tolist(), decimals=usual)}; {seen}"
     fast = oscillation(times, column, slower_than=float(grid[1] - grid[0]))
     if fast is not None:
+        span = f"from {plain(fast.start, clock)} to {plain(fast.end, clock)} s"
         yield (
-            f"{name} oscillates with a period of about {number(float(f'{fast.period:.2g}'))} s between "
-            f"{plain(fast.low, usual)} and {plain(fast.high, usual)} from {plain(fast.start, clock)} to "
-            f"{plain(fast.end, clock)} s, which the values above are too far apart to show"
+            f"{name} oscillates {span} with a period of about {fast.period:.2g} s, swinging by about "
+            f"{fast.swing:.2g}: the values above are too far apart to show it"
         )
 
 
-def _burst(
-    view: View, columns: Mapping[str, Array], times: Array, critical: float, robustness: float
-) -> Iterator[str]:
-    """Signals of the formula and its terms, densely around the critical time."""
-    interval = view.experiment.output_interval
-    width = view.space.stop_time * _BURST_SHARE
-    step = max(1, round(width / _BURST_STEPS / interval)) * interval
-    first = max(0, ceil((critical - width / 2) / step - 1e-9))
-    last = min(floor(view.space.stop_time / step + 1e-9), floor((critical + width / 2) / step + 1e-9))
-    moments = [k * step for k in range(first, last + 1)]
-    told = {*view.formula_outputs, *(str(e) for e in view.requirement.formula.expressions)}
-    lines = [
-        f"{name}: {samples_at(times, column, moments, decimals=_decimals(view, column, name, robustness))}"
+def _burst(view: View, columns: Mapping[str, Array], times: Array, verdict: Verdict) -> Iterator[str]:
+    """Signals and terms of the deciding predicate, densely around the critical time."""
+    told = {
+        name: column
         for name, column in columns.items()
-        if name in told and not is_discrete(column, kind=view.kind(name)) and np.ptp(column) > 0
-    ]
-    if lines and len(moments) > 1:
-        yield f"values every {number(round(step, 9))} s from t = {number(round(moments[0], 9))} s:"
-        yield from lines
+        if name in _deciding(view, verdict) and not is_discrete(column, kind=view.kind(name))
+    }
+    if not told or all(np.ptp(column) == 0 for column in told.values()):
+        return
+    interval = view.experiment.output_interval
+    step = max(1, round(_burst_step(view, told, times) / interval)) * interval
+    usual_reach = max(view.space.stop_time * _BURST_SHARE, _BURST_STEPS * step) / 2
+    reach = min(usual_reach, _BURST_VALUES // 2 * step)
+    first = max(0, ceil((verdict.critical_time - reach) / step - 1e-9))
+    last = floor(min(view.space.stop_time, verdict.critical_time + reach) / step + 1e-9)
+    moments = [k * step for k in range(first, last + 1)]
+    yield f"values every {number(step, 6)} s from t = {number(moments[0], 6)} s:"
+    for name, column in told.items():
+        decimals = _decimals(view, column, name, verdict.robustness)
+        yield f"{name}: {samples_at(times, column, moments, decimals=decimals)}"
+
+
+def _burst_step(view: View, columns: Mapping[str, Array], times: Array) -> float:
+    """Distance in s that shows the fastest oscillation, or divides the burst evenly."""
+    usual = view.space.stop_time * _BURST_SHARE / _BURST_STEPS
+    found = [oscillation(times, column, slower_than=4 * usual) for column in columns.values()]
+    return min([usual, *(fast.period / _VALUES_PER_PERIOD for fast in found if fast is not None)])
+
+
+def _deciding(view: View, verdict: Verdict) -> set[str]:
+    """Names of the signals and terms that the deciding predicate compares."""
+    formula = view.requirement.formula
+    deciding = [p for p in formula.predicates if str(p) == verdict.predicate] or list(formula.predicates)
+    sides = {str(side) for p in deciding for side in (p.left, p.right)}
+    return sides | {name for p in deciding for name in p.signals}
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
@@ -233,4 +251,4 @@ def _clock(view: View) -> int:
 
 def _unit(view: View, name: str) -> str:
     unit = view.unit(name)
-    return f" {unit}" if unit and unit != "1" else ""
+    return f" {unit}" if unit else ""

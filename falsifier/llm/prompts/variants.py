@@ -54,7 +54,7 @@ def _variants() -> Mapping[str, Variant]:
 
 
 VARIANTS = _variants()
-DEFAULT_VARIANT = "MP4"
+DEFAULT_VARIANT = "MP5"
 
 
 def variant_named(name: str | None) -> Variant:

@@ -29,8 +29,8 @@ class View:
         return cls(problem.info, problem.requirement, problem.space, problem.experiment)
 
     def unit(self, name: str) -> str:
-        """Unit of a signal, empty where unknown."""
-        return self.info[name].unit if name in self.info else ""
+        """Unit of a signal, empty where unknown or without dimension."""
+        return told_unit(self.info[name].unit) if name in self.info else ""
 
     def description(self, name: str) -> str:
         """Description of a signal, empty where there is none."""
@@ -44,3 +44,8 @@ class View:
     def formula_outputs(self) -> tuple[str, ...]:
         """Signals of the formula that are not searched inputs, in order of appearance."""
         return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)
+
+
+def told_unit(unit: str) -> str:
+    """Unit as prompts tell it: FMUs give dimensionless variables the unit 1."""
+    return "" if unit == "1" else unit

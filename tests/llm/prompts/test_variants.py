@@ -1,0 +1,271 @@
+"""What each variant tells, on the transmission and on small problems."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.evaluation import Evaluation, evaluate
+from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
+from falsifier.model import Variable
+from falsifier.problem import Problem, Requirement, load_problem
+from falsifier.signals import Signal
+from falsifier.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.stl import Verdict, parse
+from falsifier.trajectory import Trajectory
+from tests.problems import lag_problem
+
+FIRST = (100, 100, 100, 0, 0, 0, 0, 0, 0, 0)
+
+
+@cache
+def transmission(name: str = "AT1") -> tuple[Problem, Evaluation]:
+    problem = load_problem(name)
+    return problem, evaluate(problem, problem.space.decode(FIRST))
+
+
+def told(problem: Problem, variant: str, evaluations: Sequence[Evaluation] = ()) -> tuple[str, str]:
+    prompt = build_prompt(View.of(problem), variant_named(variant), evaluations)
+    standing, changing = render(prompt)
+    assert (standing.role, changing.role) == ("system", "user")
+    return standing.content, changing.content
+
+
+def test_variants_only_add_parts_up_to_mp4() -> None:
+    parts = [VARIANTS[f"MP{i}"].parts for i in range(1, 5)]
+    assert all(a < b for a, b in pairwise(parts))
+    assert variant_named("mp3").name == "MP3"
+    assert variant_named(None).name == DEFAULT_VARIANT
+    with pytest.raises(SpecError, match="did you mean 'MP5'"):
+        variant_named("MP55")
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_an_empty_history_is_not_described(variant: str) -> None:
+    problem, _ = transmission()
+    _, changing = told(problem, variant)
+    assert changing == "Propose the first sample."
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_zero_is_no_violation_and_ranges_are_told(variant: str) -> None:
+    standing, _ = told(transmission()[0], variant)
+    assert "exactly 0 is not" in standing
+    assert "from 0 to 325" in standing
+
+
+def test_mp1_names_nothing() -> None:
+    problem, evaluation = transmission()
+    text = "\n".join(told(problem, "MP1", [evaluation]))
+    for name in ("throttle", "brake", "speed", "rpm", "gear", "120", "mph", "AT"):
+        assert name not in text
+    assert "point = [100, 100, 100, 0, 0, 0, 0, 0, 0, 0]" in text
+    assert "robustness +0.419" in text
+    assert '"point": [' in text
+
+
+def test_mp2_adds_formula_and_meanings() -> None:
+    problem, evaluation = transmission()
+    standing, changing = told(problem, "MP2", [evaluation])
+    assert "G[0,20] (speed <= 120)" in standing
+    assert "Output signals: speed" in standing
+    assert "2: throttle at t = 8.33 s, from 0 to 100" in standing
+    assert "throttle = [100, 100, 100, 0, 0, 0, 0]; brake = [0, 0, 0]" in changing
+    assert "rpm" not in standing
+    assert "82.5" not in changing
+
+
+def test_mp3_adds_values_at_the_control_points() -> None:
+    problem, evaluation = transmission()
+    standing, changing = told(problem, "MP3", [evaluation])
+    assert "82.5 at 8.3 s" in changing
+    assert "81.5 at 50.0 s" in changing
+    assert "25.0 s" in changing
+    assert "work out how each input moves the outputs" in standing
+    assert "decided" not in changing
+
+
+def test_mp4_adds_the_critical_time() -> None:
+    problem, evaluation = transmission()
+    _, changing = told(problem, "MP4", [evaluation])
+    assert "decided at t = 20.0 s with speed = 119.6" in changing
+    assert "82.5 at 8.3 s" in changing
+
+
+def test_published_variants_tell_the_ten_most_recent_in_order() -> None:
+    problem = lag_problem()
+    evaluations = [evaluate(problem, problem.space.decode([0.05 * i] * 4)) for i in range(14)]
+    evaluations[12] = replace(evaluations[12], verdict=None, status="failed", reason="diverged")
+    _, changing = told(problem, "MP4", evaluations)
+    numbers = [line.split()[1] for line in changing.splitlines() if line.startswith("Sample ")]
+    assert numbers == [f"{i}:" for i in (4, 5, 6, 7, 8, 9, 10, 11, 12, 14)]
+    assert "10 of 13" in changing
+    assert "diverged" not in changing
+
+
+def test_free_samples_are_told_at_the_fixed_times_by_published_variants() -> None:
+    problem = lag_problem(free=Freedom(50, 0.1))
+    candidate = problem.space.admit(Candidate({"u": Signal((0.0, 5.0), (0.25, -0.75), "constant")}))
+    _, changing = told(problem, "MP4", [evaluate(problem, candidate)])
+    assert "u = [0.25, 0.25, -0.75, -0.75]" in changing
+
+
+class TestMP5:
+    """Everything that the model description and the monitor know."""
+
+    def test_system_units_and_meanings(self) -> None:
+        standing, _ = told(transmission()[0], "MP5")
+        assert "Car with an engine" in standing
+        assert "- speed [mph]: " in standing
+        assert "- gear, integer: " in standing
+        assert "input signal throttle [%]: " in standing
+        assert "In words: At all times from 0 to 20 s, speed is at most 120." in standing
+        assert "pchip (monotone cubic) interpolation; sampled and held every 0.05 s" in standing
+
+    def test_freedom_is_offered_where_it_is_allowed(self) -> None:
+        problem, _ = transmission()
+        standing, _ = told(problem, "MP5")
+        assert "at most 500, at least 0.1 s apart" in standing
+        assert '"times": []' in standing
+        fixed = replace(
+            problem,
+            space=replace(problem.space, inputs=tuple(replace(r, free=None) for r in problem.space.inputs)),
+        )
+        standing, _ = told(fixed, "MP5")
+        assert "Instead you may choose" not in standing
+        assert '"times"' not in standing
+
+    def test_what_decided_and_everything_there(self) -> None:
+        problem, evaluation = transmission()
+        _, changing = told(problem, "MP5", [evaluation])
+        assert "robustness +0.418" in changing
+        assert "was worst at 20 s, where speed = 119.581 <= 120" in changing
+        assert "all signals at t = 20 s: speed = 119.581 mph, rpm = " in changing
+        assert "gear: 1, then 2 from 2.56 s, 3 from 6.16 s, 4 from 12.32 s" in changing
+        assert "values every 2.5 s from t = 0:" in changing
+        assert "throttle: pchip, 7 evenly spaced values [100, 100, 100, 0, 0, 0, 0]" in changing
+        assert "brake: constant 0" in changing
+
+    def test_conjuncts_and_sides_of_an_implication(self) -> None:
+        problem, evaluation = transmission("AT6a")
+        _, changing = told(problem, "MP5", [evaluation])
+        line = next(x for x in changing.splitlines() if "condition and consequence" in x)
+        assert "G[0,30] (rpm <= 3000) robustness -" in line
+        assert "rev/min; G[0,4] (speed <= 35) robustness -" in line
+        assert line.endswith("mph")
+
+    def test_discrete_requirements_get_stays_and_a_flat_robustness_is_said(self) -> None:
+        problem, first = transmission("AT51")
+        second = evaluate(problem, problem.space.decode((50,) * 7 + (0,) * 3))
+        standing, changing = told(problem, "MP5", [first, second])
+        assert "gear stays: 1: never entered again" in changing
+        assert "The robustness is flat: it was +0.5 in all 2 samples" in changing
+        assert "bring about the condition first" in standing
+
+    def test_terms_are_signals_of_their_own(self) -> None:
+        problem = lag_problem("G[0,10] (abs(x - u) <= 0.9)")
+        evaluation = evaluate(problem, problem.space.decode([0, 1, 0, 1]))
+        standing, changing = told(problem, "MP5", [evaluation])
+        assert "Terms that are told like signals of their own: abs(x - u)" in standing
+        assert "\n  abs(x - u): 0, " in changing
+        assert "abs(x - u) <= 0.9: always true, least margin" in changing
+
+    def test_failed_samples_with_their_reason(self) -> None:
+        problem = lag_problem()
+        candidate = problem.space.decode([1, 1, 1, 1])
+        _, changing = told(problem, "MP5", [Evaluation(candidate, "crashed", reason="division by zero")])
+        assert "no verdict, the simulation crashed: division by zero" in changing
+
+    def test_best_and_most_different_beside_the_recent(self) -> None:
+        problem = lag_problem()
+        points: list[list[float]] = [[-1, -1, -1, 0.1], [0.8] * 4, *([0.01 * i] * 4 for i in range(15))]
+        evaluations = [evaluate(problem, problem.space.decode(p)) for p in points]
+        _, changing = told(problem, "MP5", evaluations)
+        assert "Sample 2 (best so far)" in changing
+        assert "Sample 1 (kept because it differs most from the others)" in changing
+        shown = [line for line in changing.splitlines() if line.startswith("Sample ")]
+        assert len(shown) == 13
+        assert "13 of 17" in changing
+
+    def test_parameters_are_plain_numbers(self) -> None:
+        problem = lag_problem(parameters=(ParameterRange("x0", -0.5, 1 / 3, 0.0, "m", "start"),))
+        standing, changing = told(
+            problem, "MP5", [evaluate(problem, problem.space.decode([0, 0, 0, 0, 0.25]))]
+        )
+        assert "- number x0 [m]: start; from -0.5 to 0.3333333333, usually 0; one value" in standing
+        assert "x0 = 0.25" in changing
+
+    def test_aliasing_is_said_and_shown_densely(self) -> None:
+        problem = lag_problem()
+        times = problem.experiment.times
+        x = 0.5 * np.sin(2 * np.pi * times / 0.8)
+        candidate = problem.space.decode([0, 0, 0, 0])
+        trajectory = Trajectory(times, {"x": x, "u": 0 * times})
+        verdict = Verdict(0.4, float(times[int(x.argmax())]), "x <= 0.9", {"x": 0.5})
+        evaluation = Evaluation(candidate, "ok", verdict, "", trajectory)
+        _, changing = told(problem, "MP5", [evaluation])
+        assert "x oscillates from" in changing
+        assert "period of about 0.8 s, swinging by about 1" in changing
+        assert "values every 0.1 s from t = " in changing
+
+    def test_only_parameters(self) -> None:
+        problem = lag_problem(parameters=(ParameterRange("x0", -1.0, 1.0),))
+        problem = replace(problem, space=SearchSpace((), problem.space.parameters, 10.0))
+        standing, _ = told(problem, "MP5")
+        assert '"signals"' not in standing
+        assert '"parameters": [{"name": "x0", "value": 0.0}]' in standing
+        assert "control points" not in standing
+
+    def test_free_signals_are_told_as_they_were_written(self) -> None:
+        problem = lag_problem(free=Freedom(400, 0.02))
+        pulse = problem.space.admit(Candidate({"u": Signal((0.0, 2.0, 2.5), (0.0, 1.0, 0.0), "constant")}))
+        long = problem.space.admit(
+            Candidate({"u": Signal.evenly([0.0] * 99 + [1.0], stop_time=10.0, interpolation="constant")})
+        )
+        _, changing = told(problem, "MP5", [evaluate(problem, c) for c in (pulse, long)])
+        assert "u: constant pieces from [time, value] points [[0, 0], [2, 1], [2.5, 0]]" in changing
+        assert 'u: constant pieces, 100 evenly spaced values ["0 x 99", 1]' in changing
+
+    def test_whole_numbers_are_asked_for(self) -> None:
+        problem = lag_problem()
+        info = replace(problem.info, variables=(Variable("u", kind="integer", causality="input"),))
+        view = replace(View.of(problem), info=info)
+        text = render(build_prompt(view, variant_named("MP5"), []))[0].content
+        assert "integer values from -1 to 1" in text
+
+    def test_several_candidates_and_pending_ones(self) -> None:
+        problem = lag_problem()
+        pending = [problem.space.decode([0.5] * 4)]
+        prompt = build_prompt(View.of(problem), variant_named("MP5"), [], pending=pending, count=3)
+        standing, changing = (m.content for m in render(prompt))
+        assert "3 different candidates" in standing
+        assert '{"candidates": [{' in standing
+        assert "Already proposed, results not known yet:\nu: constant 0.5" in changing
+        assert "Propose the next 3 different samples" in changing
+
+
+def test_requirements_over_inputs_only() -> None:
+    problem = lag_problem("G[0,10] (u <= 0.5)")
+    for variant in VARIANTS:
+        evaluation = evaluate(problem, problem.space.decode([0, 0, 0, 0]))
+        assert told(problem, variant, [evaluation])
+
+
+def test_an_evaluation_without_trajectory_is_told_from_its_verdict() -> None:
+    problem = lag_problem()
+    evaluation = replace(evaluate(problem, problem.space.decode([0.5] * 4)), trajectory=None)
+    for variant in ("MP4", "MP5"):
+        _, changing = told(problem, variant, [evaluation])
+        assert "+0.4" in changing
+        assert "decided at t = 10" in changing
+
+
+def test_long_inputs_do_not_fill_the_prompt() -> None:
+    space = SearchSpace((InputRange("u", -1.0, 1.0, 400, "constant"),), (), 10.0)
+    problem = replace(lag_problem(), space=space, requirement=Requirement("R", parse("G[0,10] (x <= 0.9)")))
+    standing, _ = told(problem, "MP5")
+    assert "400 control points at t = 0, 0.025, 0.05, ..., 9.975 s" in standing
