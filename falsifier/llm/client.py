@@ -112,12 +112,13 @@ class LiteLLMChat:
     ) -> ChatReply:
         choice = response.choices[0]
         refusal = _refusal(choice.message)
-        text = choice.message.content or refusal
+        refused = bool(refusal) and not choice.message.content
+        text = _storable(choice.message.content or refusal)
         reported = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         return ChatReply(
             text=text,
-            reasoning=getattr(choice.message, "reasoning_content", None) or "",
-            finish_reason="refusal" if refusal and text is refusal else choice.finish_reason or "",
+            reasoning=_storable(getattr(choice.message, "reasoning_content", None) or ""),
+            finish_reason="refusal" if refused else choice.finish_reason or "",
             usage=usage_of(
                 getattr(response, "usage", None),
                 request=request,
@@ -145,6 +146,11 @@ class LiteLLMChat:
         if "max_tokens" in effective:
             effective["max_tokens"] = arguments["max_tokens"]
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
+
+
+def _storable(text: str) -> str:
+    """Text without the halves of surrogate pairs, which no file can hold."""
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _refusal(message: Any) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
@@ -96,7 +96,7 @@ class ReplyForm:
                 raise RejectedReplyError(f"input {signal.name!r} is given twice")
             signals[signal.name] = self._signal(signal)
         parameters = {p.name: p.value for p in reply.parameters}
-        return self._admitted(Candidate(signals, parameters, origin, reply.rationale[:_LONGEST_RATIONALE]))
+        return self._admitted(Candidate(signals, parameters, origin, reply.rationale))
 
     def _allowed(self) -> SearchSpace:
         """Search space with only those freedoms that the reply was offered."""
@@ -125,7 +125,7 @@ class ReplyForm:
 
     def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:
         try:
-            return self.space.decode(numbers, origin=origin, rationale=rationale[:_LONGEST_RATIONALE])
+            return self.space.decode(numbers, origin=origin, rationale=rationale)
         except CandidateError as error:
             raise RejectedReplyError(str(error)) from None
 
@@ -193,12 +193,17 @@ def _parameters_by_name(found: Any) -> Any:
     return [{"name": k, "value": v} for k, v in found.items()] if isinstance(found, dict) else found
 
 
+def _storable(text: str) -> str:
+    """At most so much text, without the halves of surrogate pairs, which no file can hold."""
+    return text.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_RATIONALE]
+
+
 class CandidateReply(BaseModel):
     """One candidate, as a model writes it; a superfluous remark is no reason to pay for another reply."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
-    rationale: str = ""
+    rationale: Annotated[str, AfterValidator(_storable)] = ""
     signals: Annotated[list[SignalReply], BeforeValidator(_signals_by_name)] = Field(default_factory=list)
     parameters: Annotated[list[ParameterReply], BeforeValidator(_parameters_by_name)] = Field(
         default_factory=list

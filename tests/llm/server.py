@@ -52,6 +52,7 @@ class Server:
     def __init__(self, script: list[Step]) -> None:
         self.script = script
         self.received: list[Received] = []
+        self.asides: list[Received] = []
         self.most_at_once = 0
         self._at_once = 0
         self._lock = threading.Lock()
@@ -63,6 +64,9 @@ class Server:
             def do_POST(self) -> None:
                 length = int(self.headers.get("content-length", 0))
                 body = json.loads(self.rfile.read(length) or b"{}")
+                if self.path.endswith("/api/show"):  # what Ollama knows of a model, asked in the background
+                    self._not_found(body)
+                    return
                 with outer._lock:
                     outer.received.append(Received(self.path, dict(self.headers), body))
                     step = outer.script.pop(0) if outer.script else Step(status=410, message="script ended")
@@ -95,8 +99,11 @@ class Server:
                     self.wfile.write(payload)
 
             def do_GET(self) -> None:
+                self._not_found({})
+
+            def _not_found(self, body: dict[str, Any]) -> None:
                 with outer._lock:
-                    outer.received.append(Received(self.path, dict(self.headers), {}))
+                    outer.asides.append(Received(self.path, dict(self.headers), body))
                 self.send_response(404)
                 self.send_header("content-length", "0")
                 self.end_headers()

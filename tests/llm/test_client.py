@@ -4,10 +4,12 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+import falsifier
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
@@ -139,7 +141,7 @@ WIRES = [
 def test_what_is_sent(wire: Wire) -> None:
     with serving(Step("an answer")) as server:
         reply = chat_for(wire, server).complete(REQUEST)
-    (received,) = [r for r in server.received if r.body]
+    (received,) = server.received
     assert reply.text == "an answer"
     assert received.path == wire.path
     assert {k: received.body.get(k) for k in wire.body} == wire.body
@@ -304,10 +306,51 @@ def test_importing_the_layer_does_not_import_litellm() -> None:
     assert done.stdout.split() == ["False", "False"]
 
 
-def test_litellm_is_told_to_stay_off_the_network() -> None:
-    from falsifier.llm.library import load_litellm
+_QUIET = """
+import socket, sys
+reached = []
+connect, resolve = socket.socket.connect, socket.getaddrinfo
 
-    load_litellm()
-    assert os.environ["LITELLM_LOCAL_MODEL_COST_MAP"] == "True"
-    assert os.environ["LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS"] == "True"
-    assert os.environ["LITELLM_MODE"] == "PRODUCTION"
+def watched_connect(self, address):
+    if self.family in (socket.AF_INET, socket.AF_INET6) and address[0] != "127.0.0.1":
+        reached.append(address)
+        raise OSError("closed")
+    return connect(self, address)
+
+def watched_resolve(host, *args, **kwargs):
+    if host not in ("127.0.0.1", "localhost", None):
+        reached.append(host)
+        raise OSError("closed")
+    return resolve(host, *args, **kwargs)
+
+socket.socket.connect, socket.getaddrinfo = watched_connect, watched_resolve
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.messages import ChatRequest, Message
+request = ChatRequest(messages=(Message(role="user", content="?"),))
+for model, base in zip(sys.argv[1::2], sys.argv[2::2]):
+    LiteLLMChat(model, effort="low", api_base=base).complete(request)
+import os, time
+time.sleep(0.5)
+print(reached, os.environ.get("FROM_DOTENV"))
+"""
+
+
+def test_nothing_else_is_reached_printed_or_read(tmp_path: Path) -> None:
+    """No price list, no telemetry, no .env: only the server that was named hears of us."""
+    (tmp_path / ".env").write_text("FROM_DOTENV=read\n")
+    (tmp_path / "quiet.py").write_text(_QUIET)
+    with serving(Step("a"), Step("b"), Step("c")) as server:
+        models = ["openai/gpt-5-mini", server.url, "anthropic/claude-sonnet-4-5", server.root]
+        models += ["ollama_chat/qwen3", server.root]
+        root = str(Path(falsifier.__file__).parent.parent)
+        done = subprocess.run(
+            [sys.executable, "quiet.py", *models],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": root, "ANTHROPIC_API_KEY": "sk-ant-none"},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert len(server.received) == 3
+    assert done.stdout == "[] None\n"
+    assert done.stderr == ""

@@ -4,6 +4,8 @@ import json
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.replies import ReplyForm
@@ -200,3 +202,40 @@ def test_several_candidates() -> None:
     assert [c.parameters["mass"] for c in found] == [1000, 901]
     found = ReplyForm(SPACE, count=2).read("<point>0 0 0 0 0 950</point> <point>0 0 0 0 0 960</point>")
     assert [c.parameters["mass"] for c in found] == [950, 960]
+
+
+def test_a_rationale_is_something_that_a_file_can_hold() -> None:
+    candidate = read(json.dumps(changed(rationale="half a pair: \ud800" + 5000 * "x")))
+    assert candidate.rationale.encode("utf-8").startswith(b"half a pair: ?x")
+    assert len(candidate.rationale) <= 2000
+
+
+keys = st.sampled_from(
+    ["signals", "parameters", "point", "candidates", "name", "values", "times", "points", "rationale",
+     "throttle", "brake", "mass", "value", "interpolation"]
+)  # fmt: skip
+anything = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.just(10**400) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(keys, inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.dictionaries(keys, anything, max_size=4), st.booleans())
+def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
+    try:
+        found = ReplyForm(SPACE, free=free).read(json.dumps(reply))
+    except RejectedReplyError as rejection:
+        assert str(rejection)
+    else:
+        assert all(SPACE.admit(c).key == c.key for c in found)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.text(alphabet='{}[]":,0123456789.-+eEx <>/pointsignalk`\n\\', max_size=60))
+def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
+    try:
+        ReplyForm(SPACE).read(f"{text}<point>{text}</point>")
+    except RejectedReplyError as rejection:
+        assert str(rejection)

@@ -5,7 +5,6 @@ Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +154,7 @@ def oscillation(times: Array, column: Array, *, slower_than: float) -> Oscillati
 
 def samples_at(times: Array, column: Array, moments: Sequence[float], *, decimals: int) -> str:
     """Values nearest to these moments, separated by commas."""
-    indices = np.abs(times[None, :] - np.asarray(moments)[:, None]).argmin(axis=1)
+    indices = np.interp(moments, times, np.arange(len(times))).round().astype(int)
     return ", ".join(plain(float(column[k]), decimals) for k in indices)
 
 
@@ -173,7 +172,7 @@ def _turning_points(column: Array) -> list[int]:
     least = _RIPPLE_SHARE * float(np.ptp(column))
     slopes = np.sign(np.diff(column))
     moving = np.flatnonzero(slopes)
-    candidates = [int(b) for a, b in pairwise(moving) if slopes[a] != slopes[b]]
+    candidates = moving[1:][slopes[moving[1:]] != slopes[moving[:-1]]].tolist()
     turns: list[int] = []
     for k in candidates:
         if not turns or abs(column[k] - column[turns[-1]]) > least:
