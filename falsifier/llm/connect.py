@@ -12,7 +12,7 @@ from falsifier.llm.library import check_name, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Usage
 from falsifier.llm.modes import Mode
 from falsifier.llm.providers import find_key, first_mode, key_variable
-from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate, RetryingChat
 from falsifier.llm.usage import Price
 
 _HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word ready."),))
@@ -38,6 +38,7 @@ def connect(
     timeout: float = DEFAULT_TIMEOUT,
     mode: Mode | None = None,
     gate: Gate | None = None,
+    attempts: int = DEFAULT_ATTEMPTS,
     cache: Path | None = None,
 ) -> Chat:
     """Chat with a model; nothing is sent yet.
@@ -51,6 +52,7 @@ def connect(
         timeout: seconds to wait for one answer.
         mode: how to ask for JSON at first; None: what the provider is known to take.
         gate: shared by all runs on the same account; None: one of its own.
+        attempts: most requests for one answer, where failures may pass.
         cache: directory of kept replies; None: nothing is kept.
 
     Raises:
@@ -66,7 +68,7 @@ def connect(
         price=price,
         mode=mode or first_mode(model),
     )
-    chat: Chat = RetryingChat(LadderChat(client), gate or Gate())
+    chat: Chat = RetryingChat(LadderChat(client), gate or Gate(), attempts=attempts)
     return chat if cache is None else CachedChat(chat, cache)
 
 
@@ -104,7 +106,7 @@ def check_model(
     Raises:
         ChatError: naming what is wrong.
     """
-    chat = connect(model, effort=effort, api_base=api_base, price=price, timeout=timeout)
+    chat = connect(model, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
     reply = chat.complete(_HELLO)
     listed = listed_price(model) if api_base is None else None
     return ModelCheck(

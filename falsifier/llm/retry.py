@@ -13,6 +13,10 @@ from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest
 
 
+# With doubling delays the last request goes out about a minute after the first: a server may restart meanwhile.
+DEFAULT_ATTEMPTS = 7
+
+
 class Gate:
     """How many requests may be under way at a time, and until when all of them wait.
 
@@ -62,7 +66,7 @@ class RetryingChat:
 
     inner: Chat
     gate: Gate = field(default_factory=Gate)
-    attempts: int = 7
+    attempts: int = DEFAULT_ATTEMPTS
     first_delay: float = 1.0
     longest_delay: float = 120.0
 
