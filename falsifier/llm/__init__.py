@@ -9,6 +9,6 @@ wrappers, each with one concern::
     LadderChat      the way of asking for JSON that works here    ladder
     LiteLLMChat     one request, one answer or one clear error    client
 
-``ScriptedChat`` plays a script instead. ``converse`` asks until a reply is valid; ``prompts`` says what is told
-and ``replies`` what is read. Nothing here knows what searches.
+``ScriptedChat`` plays a script instead. ``converse`` asks until a reply is valid; ``prompts`` says what is
+told and ``replies`` what is read. Nothing here knows what searches.
 """

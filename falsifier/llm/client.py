@@ -43,7 +43,7 @@ class LiteLLMChat:
     def parameters(self) -> Mapping[str, Any]:
         """What is sent beside the messages, without secrets."""
         stated = {"effort": self.effort, "api_base": self.api_base and redact(self.api_base)}
-        options = {k: v for k, v in self.options.items() if k not in _SECRET_OPTIONS}
+        options = {k: v for k, v in self._options().items() if k not in _SECRET_OPTIONS}
         return {**{k: v for k, v in stated.items() if v is not None}, **options}
 
     def complete(self, request: ChatRequest) -> ChatReply:
@@ -80,6 +80,9 @@ class LiteLLMChat:
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Keep nothing."""
 
+    def _options(self) -> dict[str, Any]:
+        return {**known(self.model).defaults, **self.options}
+
     def _secret_options(self) -> list[str]:
         found: list[str] = []
         for name in _SECRET_OPTIONS & self.options.keys():
@@ -89,7 +92,7 @@ class LiteLLMChat:
 
     def _arguments(self, request: ChatRequest) -> dict[str, Any]:
         provider = known(self.model)
-        arguments: dict[str, Any] = dict(self.options)
+        arguments = self._options()
         if provider.openai_client:
             arguments["max_retries"] = 0  # the client would retry twice without saying so
         if self.effort is not None:

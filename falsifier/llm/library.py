@@ -1,6 +1,7 @@
 """litellm, imported here and nowhere else, and only when a model is used."""
 
 import os
+import warnings
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -35,6 +36,8 @@ def load_litellm() -> Any:
     except ImportError as error:
         raise ChatError(f"litellm cannot be imported ({error}): pip install litellm") from None
     litellm.suppress_debug_info = True
+    # Its types make pydantic warn of something that is none of the user's business.
+    warnings.filterwarnings("ignore", message=".*`ReadOnly` qualifier", category=UserWarning)
     return litellm
 
 

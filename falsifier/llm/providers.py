@@ -2,8 +2,9 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any, Literal
 
 from falsifier.errors import ChatError
 from falsifier.llm.modes import MODES, Mode
@@ -17,6 +18,7 @@ class Provider:
         keys: environment variables that may hold its key, the usual one first; empty: none is needed.
         local: runs on the user's own machine, so that a price of zero is true.
         openai_client: served through the OpenAI client, which retries unasked unless told not to.
+        defaults: parameters that are sent unless the user states them.
         effort: how reasoning effort is passed: ``native``, or ``allowed`` where the client library must be
             told to let it through.
     """
@@ -24,8 +26,13 @@ class Provider:
     keys: tuple[str, ...] = ()
     local: bool = False
     openai_client: bool = False
-    effort: str = "native"
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+    effort: Literal["native", "allowed"] = "native"
 
+
+# Ollama cuts off the beginning of a prompt that is longer than its context, without a word. Its own default
+# is shorter than most prompts with a history.
+_OLLAMA = MappingProxyType({"num_ctx": 32_768})
 
 PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     {
@@ -40,8 +47,8 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
         "openrouter": Provider(("OPENROUTER_API_KEY",)),
         "together_ai": Provider(("TOGETHERAI_API_KEY", "TOGETHER_API_KEY")),
         "xai": Provider(("XAI_API_KEY",)),
-        "ollama": Provider(local=True),
-        "ollama_chat": Provider(local=True),
+        "ollama": Provider(local=True, defaults=_OLLAMA),
+        "ollama_chat": Provider(local=True, defaults=_OLLAMA),
         "lm_studio": Provider(local=True, openai_client=True, effort="allowed"),
         "hosted_vllm": Provider(),
         "llamafile": Provider(local=True, openai_client=True),

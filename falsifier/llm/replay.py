@@ -1,11 +1,32 @@
 """Recorded conversations, played again: resumed runs pay for nothing twice, notebooks need no key."""
 
+import json
 import threading
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange
+
+
+def read_recording(path: Path) -> list[Exchange]:
+    """Exchanges of a file with one per line, such as a run's ``journal.jsonl``; other lines are passed over.
+
+    Raises:
+        ChatError: when the file cannot be read, or an exchange in it cannot be understood.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        found = [json.loads(line) for line in lines if line.strip()]
+        exchanges = [record.get("exchange", record) for record in found if _is_exchange(record)]
+        return [Exchange.model_validate(exchange) for exchange in exchanges]
+    except (OSError, ValueError) as error:
+        raise ChatError(f"{path}: no recording that can be played: {error}") from None
+
+
+def _is_exchange(record: Any) -> bool:
+    return isinstance(record, dict) and ("exchange" in record or {"messages", "reply"} <= record.keys())
 
 
 class RecordedChat:
@@ -24,10 +45,10 @@ class RecordedChat:
 
     @property
     def model(self) -> str:
-        """Name of the model that is asked, or was recorded."""
+        """Name of the model that is asked; without one, that this is a recording, and of what."""
         if self._inner is not None:
             return self._inner.model
-        return self._exchanges[0].model if self._exchanges else "recorded"
+        return f"recording of {self._exchanges[0].model}" if self._exchanges else "empty recording"
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -53,7 +74,7 @@ class RecordedChat:
                 raise ChatError(recorded.problem or "no answer came")
             return recorded.reply.model_copy(update={"source": "recording"})
         if self._inner is None:
-            raise ChatError(f"the recording of {self.model} ends after {len(self._exchanges)} replies")
+            raise ChatError(f"the {self.model} ends after {len(self._exchanges)} replies")
         return self._inner.complete(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:

@@ -12,8 +12,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest
 
-
-# With doubling delays the last request goes out about a minute after the first: a server may restart meanwhile.
+# With doubling delays the last request goes out about a minute after the first, so that a server may restart.
 DEFAULT_ATTEMPTS = 7
 
 

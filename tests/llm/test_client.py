@@ -95,7 +95,7 @@ WIRES = [
     ),
     Wire(
         "ollama_chat/gpt-oss:20b",
-        {"model": "gpt-oss:20b", "think": "low"},
+        {"model": "gpt-oss:20b", "think": "low", "options": {"num_ctx": 32_768}},
         path="/api/chat",
         header=None,
         absent=("format", "max_retries"),
@@ -103,10 +103,11 @@ WIRES = [
     ),
     Wire(
         "ollama_chat/qwen3",
-        {"model": "qwen3", "format": SCHEMA},
+        {"model": "qwen3", "format": SCHEMA, "options": {"num_ctx": 8192}},
         path="/api/chat",
         header=None,
         base="",
+        options={"num_ctx": 8192},
     ),
     Wire(
         "lm_studio/gpt-oss-20b",

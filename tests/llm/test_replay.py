@@ -1,8 +1,10 @@
+from pathlib import Path
+
 import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import RecordedChat
+from falsifier.llm.replay import RecordedChat, read_recording
 from falsifier.llm.scripted import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
@@ -28,7 +30,7 @@ def test_plays_what_was_recorded_and_then_asks() -> None:
 
 def test_a_recording_alone_ends() -> None:
     chat = RecordedChat([exchange("one")])
-    assert chat.model == "openai/m"
+    assert chat.model == "recording of openai/m"
     chat.complete(QUESTION)
     with pytest.raises(ChatError, match="ends after 1 repl"):
         chat.complete(QUESTION)
@@ -45,3 +47,20 @@ def test_script_of_a_function_and_its_end() -> None:
         chat = ScriptedChat(["only"])
         chat.complete(QUESTION)
         chat.complete(QUESTION)
+
+
+def test_recordings_are_read_from_journals_and_from_plain_lines(tmp_path: Path) -> None:
+    first, second = exchange("one"), exchange("two")
+    lines = ['{"kind": "asked", "n": 1}', f'{{"kind": "exchange", "exchange": {first.model_dump_json()}}}']
+    path = tmp_path / "journal.jsonl"
+    path.write_text("\n".join([*lines, "", second.model_dump_json()]))
+    assert read_recording(path) == [first, second]
+
+
+@pytest.mark.parametrize("content", ["{", '{"exchange": {"model": 3}}', None])
+def test_an_unreadable_recording_names_its_file(tmp_path: Path, content: str | None) -> None:
+    path = tmp_path / "talk.jsonl"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(ChatError, match=r"talk\.jsonl: no recording"):
+        read_recording(path)

@@ -103,12 +103,14 @@ def grid_step(stop_time: float) -> float:
 
 def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
     """Robustness of both sides of every connective on the way to what decided."""
-    told: set[Formula] = set()
+    above: type[Formula] | None = None
     for step in diagnosis.path:
-        if step.formula in told or not isinstance(step.formula, And | Or | Implies | Iff):
+        kind = type(step.formula)
+        is_link = kind is above and kind in (And, Or)  # of a chain that was told at its head
+        above = kind
+        if is_link or not isinstance(step.formula, And | Or | Implies | Iff):
             continue
         sides = _sides(step.formula)
-        told.update(step.formula.walk() if isinstance(step.formula, And | Or) else ())
         found = monitor.robustness(trajectory, step.time)
         words = (
             f"{side} robustness {signed(found[side], 4)}{_scale(view, side)}"
@@ -116,7 +118,7 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
             if side in found
         )
         name = {And: "conjuncts", Or: "alternatives", Implies: "condition and consequence", Iff: "sides"}
-        yield f"{name[type(step.formula)]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
+        yield f"{name[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
 
 
 def _sides(formula: Formula) -> list[Formula]:

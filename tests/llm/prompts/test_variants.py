@@ -158,6 +158,14 @@ class TestMP5:
         assert "rev/min; G[0,4] (speed <= 35) robustness -" in line
         assert line.endswith("mph")
 
+    def test_connectives_inside_a_chain_are_told_too_and_links_of_it_once(self) -> None:
+        formula = "G[0,9] (x <= 0.9) and G[0,9] (x <= 0.8) and G[0,9] (x >= 0.1 -> u <= 0.5)"
+        problem = lag_problem(formula)
+        _, changing = told(problem, "MP5", [evaluate(problem, problem.space.decode([0.8] * 4))])
+        (chain,) = (line for line in changing.splitlines() if line.startswith("  conjuncts"))
+        assert chain.count("robustness") == 3
+        assert "condition and consequence at t = 0.7 s: x >= 0.1 robustness" in changing
+
     def test_discrete_requirements_get_stays_and_a_flat_robustness_is_said(self) -> None:
         problem, first = transmission("AT51")
         second = evaluate(problem, problem.space.decode((50,) * 7 + (0,) * 3))
