@@ -70,21 +70,22 @@ class ReplyForm:
         return _object(**parts)
 
     def read(self, text: str, *, origin: str = "") -> list[Candidate]:
-        """Candidates of a reply.
+        """Candidates of a reply: the valid ones among several.
 
         Raises:
-            RejectedReplyError: telling what is wrong with it.
+            RejectedReplyError: telling what is wrong, when none is valid.
         """
         text = _THOUGHT.sub("", text)
-        replies = [_validated(found) for found in _candidate_objects(text)]
-        if replies:
-            candidates = [self._candidate(reply, origin) for reply in replies]
-        else:
-            candidates = [self._decoded(found, "", origin) for found in _points(text)]
+        found = _candidate_objects(text) or [{"point": numbers} for numbers in _points(text)]
+        candidates, problems = [], []
+        for one in found:
+            try:
+                candidates.append(self._candidate(_validated(one), origin))
+            except RejectedReplyError as rejection:
+                problems.append(str(rejection))
         if not candidates:
-            raise RejectedReplyError(
-                "it holds neither a JSON object with a candidate nor <point> ... </point>"
-            )
+            nothing = "it holds neither a JSON object with a candidate nor <point> ... </point>"
+            raise RejectedReplyError(problems[0] if problems else nothing)
         return candidates
 
     def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:

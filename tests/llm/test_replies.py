@@ -84,7 +84,7 @@ def changed(**changes: Any) -> dict[str, Any]:
         ("<point>1, two, 3, 4, 5, 6</point>", "'two'"),
         ("<point>0 0 0 0 0 2000</point>", r"'mass': 2000 is outside its range \[900, 1100\]"),
         ("<point>0 0 0 0 0 nan</point>", "'nan'"),
-        ("<point>0 0 0 0 0 1e999</point>", "outside its range"),
+        ("<point>0 0 0 0 0 1e999</point>", "finite number"),
         (changed(signals=GOOD["signals"][:1]), "'brake' is missing"),
         (changed(signals=[*GOOD["signals"], {"name": "clutch", "values": [1]}]), "unknown input 'clutch'"),
         (changed(signals=[*GOOD["signals"], GOOD["signals"][0]]), "'throttle' is given twice"),
@@ -202,6 +202,13 @@ def test_several_candidates() -> None:
     assert [c.parameters["mass"] for c in found] == [1000, 901]
     found = ReplyForm(SPACE, count=2).read("<point>0 0 0 0 0 950</point> <point>0 0 0 0 0 960</point>")
     assert [c.parameters["mass"] for c in found] == [950, 960]
+
+
+def test_one_bad_candidate_among_several_costs_nothing_but_itself() -> None:
+    bad = changed(parameters=[{"name": "mass", "value": 1}])
+    assert len(ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, GOOD]}))) == 1
+    with pytest.raises(RejectedReplyError, match="'mass': 1 is outside"):
+        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, bad]}))
 
 
 def test_a_rationale_is_something_that_a_file_can_hold() -> None:
