@@ -54,7 +54,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
         chat = LiteLLMChat("openai/gpt-5-mini", effort="high", api_base=server.url)
         exchanges: list[Exchange] = []
 
-        def build(on_exchange: Callable[[Exchange], None]) -> Proposer:
+        def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Proposer:
             def both(exchange: Exchange) -> None:
                 exchanges.append(exchange)
                 on_exchange(exchange)
@@ -242,7 +242,7 @@ def recorded_run(problem: Problem, chat: Chat, directory: Path) -> Result:
     records = read_journal(directory)
     recorded = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
 
-    def build(on_exchange: Callable[[Exchange], None]) -> Proposer:
+    def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Proposer:
         return make_llm_proposer(
             problem, RecordedChat(recorded, chat), variant="MP5", on_exchange=on_exchange
         )
@@ -309,7 +309,7 @@ def test_money_limit_with_unknown_price_is_an_error() -> None:
         with pytest.raises(SpecError, match="price of this language model is unknown"):
             search(
                 problem,
-                lambda on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
+                lambda problem, on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
                 Budget(simulations=5, cost=1.0),
             )
 
@@ -320,7 +320,7 @@ def test_token_budget_ends_a_run() -> None:
         chat = LiteLLMChat("openai/m", api_base=server.url)
         result = search(
             problem,
-            lambda on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
+            lambda problem, on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
             Budget(simulations=50, tokens=300),
         )
     assert result.status == "not falsified"
