@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from falsifier.fmu.ports import Table
 from falsifier.fmu.stepping import (
+    C0,
     DONE,
     EVENT,
     SETTING,
+    START,
     STEPPING,
     STUCK,
     TERMINATED,
@@ -23,6 +25,8 @@ from falsifier.fmu.stepping import (
     compiled,
     exchange_values,
     put,
+    rounding,
+    value_at,
 )
 
 # Rows of the table of function addresses.
@@ -32,9 +36,6 @@ COMPLETED_STEP, ENTER_EVENT_MODE, UPDATE, ENTER_CONTINUOUS = range(7, 11)
 # Rows of Memory.clock (s) and of Memory.counts.
 TIME, NEXT_STEP, NEXT_EVENT = range(3)
 COLUMN, IMPLICIT, STIFF_HITS, OTHER_HITS, EVENTS, JACOBIAN_KNOWN, INDICATORS_KNOWN = range(7)
-
-# Columns of a piece of an input: start time in s, then coefficients of 1, dt, dt**2, dt**3.
-START, C0, C1, C2, C3 = range(5)
 
 _MOST_ROUNDS = 1000
 Floats = NDArray[np.float64]
@@ -165,19 +166,6 @@ def _update_2(_typing, f, instance, info):  # type: ignore[no-untyped-def]
 @intrinsic
 def _update_3(_typing, f, instance, again, end, nominals, states, defined, time):  # type: ignore[no-untyped-def]
     return call_signature("ppppppp")
-
-
-@compiled
-def rounding(time):  # type: ignore[no-untyped-def]
-    """Times closer than this are one time; s."""
-    return 1e-11 * max(1.0, abs(time))
-
-
-@compiled
-def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
-    """One input at a time within (or at the end of) its piece p."""
-    dt = time - pieces[j, p, START]
-    return ((pieces[j, p, C3] * dt + pieces[j, p, C2]) * dt + pieces[j, p, C1]) * dt + pieces[j, p, C0]
 
 
 @compiled

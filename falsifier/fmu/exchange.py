@@ -26,10 +26,19 @@ from falsifier.fmu.continuous import (
     get_indicators,
     handle_event,
     next_break,
-    rounding,
 )
 from falsifier.fmu.integrators import explicit_step, implicit_step, interpolate
-from falsifier.fmu.stepping import DONE, EVENT, GETTING, STEPPING, STUCK, TERMINATED, compiled, read_row
+from falsifier.fmu.stepping import (
+    DONE,
+    EVENT,
+    GETTING,
+    STEPPING,
+    STUCK,
+    TERMINATED,
+    compiled,
+    read_row,
+    rounding,
+)
 
 # Constants of Hairer and Wanner: so many steps with h times rate above the bound (the method is stable up to
 # 3.3) make a problem stiff, and so many others in between do not.

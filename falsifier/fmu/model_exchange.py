@@ -12,9 +12,9 @@ from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.ports import make_ports
 from falsifier.fmu.room import Room
-from falsifier.fmu.stepper import Stepper, check_range
+from falsifier.fmu.stepper import Stepper
+from falsifier.model import Variable
 
 _STEPS_PER_CLOCK_LOOK = 2000
 _DEFAULT_TOLERANCE = 1e-6
@@ -62,25 +62,10 @@ class ModelExchange(Stepper):
     ) -> None:
         super().__init__(description, library, plan, room)
         self._lifecycle = lifecycle
-        kinds = {v.name: v for v in description.info.variables}
-        held = np.array(
-            [kinds[n].variability != "continuous" or kinds[n].kind != "real" for n in plan.inputs], dtype=bool
-        )
-        self._held_rows, self._other_rows = np.flatnonzero(held), np.flatnonzero(~held)
-        self._inputs = make_ports(description, [plan.inputs[k] for k in self._other_rows], self._setters)
-        self._held_inputs = make_ports(description, [plan.inputs[k] for k in self._held_rows], self._setters)
         addresses = [library.address(name) if name else 0 for name in _NAMES[description.major]]
         self._functions = np.array([0, description.major, *addresses], dtype=np.int64)
         self._states, self._indicators = self._sizes(description)
         self._tolerance = plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE
-
-    def set_first_inputs(self) -> None:
-        """Set the inputs at time 0."""
-        for ports, rows in ((self._inputs, self._other_rows), (self._held_inputs, self._held_rows)):
-            pieces = self._pieces(rows)
-            values = np.where(np.isfinite(pieces[:, :, continuous.START]), pieces[:, :, continuous.C0], 0.0)
-            check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
-            self._write(ports, values, "inputs")
 
     def advance(self, deadline: float) -> None:
         """Solve to the stop time; see Stepper.advance."""
@@ -148,8 +133,8 @@ class ModelExchange(Stepper):
         status = function(self._library.component, values.ctypes.data, values.size)
         self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
 
-    def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        return self._room.inputs[rows].reshape(len(rows), self._plan.pieces, 5)
+    def _is_held(self, variable: Variable) -> bool:
+        return variable.kind != "real" or variable.variability != "continuous"
 
     def _sizes(self, description: Description) -> tuple[int, int]:
         """Number of states and of event indicators."""

@@ -94,8 +94,8 @@ def enter_step_mode(functions: Table) -> tuple[int, int]:
 
 def co_simulate(
     functions: Table, set_calls: Table, set_places: Table, event_calls: Table, event_places: Table,
-    get_calls: Table, get_places: Table, inputs: Floats, discrete: Floats, outputs: Floats, step: float,
-    first: int, last: int, every: int, report: Table,
+    get_calls: Table, get_places: Table, pieces: Floats, event_pieces: Floats, current: Table, values: Floats,
+    outputs: Floats, step: float, first: int, last: int, every: int, report: Table,
 ) -> None:  # fmt: skip
     """Do the communication steps first..last-1; see stepping.co_simulate."""
     instance, version = int(functions[INSTANCE]), int(functions[FMI_VERSION])
@@ -103,17 +103,19 @@ def co_simulate(
     for k in range(first, last):
         report[STEP] = k
         if len(set_calls):
-            status = write_row(instance, version, set_calls, set_places, inputs, k)
+            _put_inputs(set_places, pieces, k * step)
+            status = exchange_values(instance, version, set_calls)
             if status > 1:
                 report[:2] = status, SETTING
                 return
-        if len(event_calls) and k > 0 and (discrete[:, k] != discrete[:, k - 1]).any():
-            for place, number in zip(event_places, discrete[:, k], strict=True):
-                put(place, number)
-            status, where = _event_3(functions, event_calls)
-            if where != DONE:
-                report[:2] = status, where
-                return
+        if len(event_calls):
+            new_values = _put_inputs(event_places, event_pieces, k * step)
+            if k > 0 and (new_values != values[len(set_places) :]).any():
+                status, where = _event_3(functions, event_calls)
+                if where != DONE:
+                    report[:2] = status, where
+                    return
+            values[len(set_places) :] = new_values
         status, where, ends = _advance(functions, version, k * step, (k + 1) * step, step, event_calls[:0])
         report[:2] = status, where
         if where != DONE:
@@ -127,6 +129,18 @@ def co_simulate(
         if ends:
             report[WHERE] = TERMINATED
             return
+
+
+def _put_inputs(places: Table, pieces: Floats, time: float) -> Floats:
+    """Put all inputs of a table at a time into its buffers; returns their values."""
+    values = np.zeros(len(places))
+    for j, place in enumerate(places):
+        begun = pieces[j, pieces[j, :, 0] <= time + 1e-11 * max(1.0, abs(time))]
+        start, c0, c1, c2, c3 = begun[-1].tolist()
+        dt = time - start
+        values[j] = ((c3 * dt + c2) * dt + c1) * dt + c0
+        put(place, values[j])
+    return values
 
 
 def _advance(

@@ -3,9 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu.description import Description
 from falsifier.model import Experiment
@@ -25,7 +22,7 @@ class Plan:
         stop_time: end in s.
         samples: number of points of the output grid.
         every: communication steps per output interval (co-simulation).
-        pieces: room for this many pieces of each input (model exchange), 0 for co-simulation.
+        pieces: room for this many pieces of each input, see Signal.pieces.
         max_step: largest step of the solver in s (model exchange).
         tolerance: relative tolerance, None for the model's own.
         time_limit: wall-clock seconds for one simulation.
@@ -47,16 +44,6 @@ class Plan:
         """Number of communication steps."""
         return (self.samples - 1) * self.every
 
-    @property
-    def width(self) -> int:
-        """Numbers per input: a value per communication step, or the pieces of a piecewise cubic."""
-        return 5 * self.pieces if self.pieces else self.steps
-
-    @property
-    def times(self) -> NDArray[np.float64]:
-        """Communication points in s at which inputs are set, shape (steps,)."""
-        return np.arange(self.steps, dtype=np.float64) * np.float64(self.stop_time / self.steps)
-
 
 def make_plan(
     description: Description,
@@ -64,7 +51,7 @@ def make_plan(
     inputs: Iterable[str],
     parameters: Iterable[str],
     *,
-    pieces: int = 0,
+    pieces: int = 1,
 ) -> Plan:
     """Look up and check everything that the simulations of a search have in common.
 

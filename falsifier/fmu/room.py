@@ -14,8 +14,8 @@ class Room:
 
     Attributes:
         parameters: values to set, shape (parameters,).
-        inputs: values by input and communication step, shape (inputs, steps), or the pieces of
-            each input as a piecewise cubic, shape (inputs, 5 * pieces).
+        inputs: each input as a piecewise cubic (Signal.pieces), shape (inputs, 5 * pieces); pieces that are
+            not there start at inf.
         outputs: recorded values by output and sample, shape (outputs, samples).
     """
 
@@ -26,17 +26,17 @@ class Room:
     @staticmethod
     def size(plan: Plan) -> int:
         """Number of float64 that a plan needs."""
-        rows = len(plan.inputs) * plan.width + len(plan.outputs) * plan.samples
+        rows = len(plan.inputs) * 5 * plan.pieces + len(plan.outputs) * plan.samples
         return len(plan.parameters) + rows
 
     @classmethod
     def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
         """Lay a plan's arrays over a flat array of at least ``size`` float64."""
         a = len(plan.parameters)
-        b = a + len(plan.inputs) * plan.width
+        b = a + len(plan.inputs) * 5 * plan.pieces
         c = b + len(plan.outputs) * plan.samples
         return cls(
             memory[:a],
-            memory[a:b].reshape(len(plan.inputs), plan.width),
+            memory[a:b].reshape(len(plan.inputs), 5 * plan.pieces),
             memory[b:c].reshape(len(plan.outputs), plan.samples),
         )

@@ -58,22 +58,16 @@ class FmuModel:
         Inputs are set at each communication point to the signal's value there. Integer, Boolean and
         enumeration inputs get the nearest number.
         """
-        if self.interface == "co-simulation":
-            task = _task(self, experiment, tuple(signals), tuple(parameters), 0)
-            rows = [signal.sample(task.points) for signal in signals.values()]
-        else:
-            tables = self._pieces(signals, experiment)
-            most = max(map(len, tables), default=1)
-            # Room for a power of two, so that few plans serve candidates with any number of control points.
-            task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (most - 1).bit_length())
-            rows = [table.ravel() for table in tables]
+        tables = self._pieces(signals, experiment)
+        most = max(map(len, tables), default=1)
+        # Room for a power of two, so that few plans serve candidates with any number of control points.
+        task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (most - 1).bit_length())
 
         def fill(room: Room) -> None:
             room.parameters[:] = list(parameters.values())
-            for row, numbers in zip(room.inputs, rows, strict=True):
-                row[: len(numbers)] = numbers
-                # Pieces that are not there start at inf.
-                row[len(numbers) :] = np.inf
+            for row, table in zip(room.inputs, tables, strict=True):
+                row[: table.size] = table.ravel()
+                row[table.size :] = np.inf
 
         outputs, log = _runner(self).simulate(task.plan, fill)
         columns = dict(zip(task.plan.outputs, outputs, strict=True))
@@ -89,7 +83,9 @@ class FmuModel:
             in_process.drop(self.sha256, self.interface)
 
     def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
-        """Inputs as piecewise cubics; numbers that cannot vary continuously are held on the output grid."""
+        """Inputs as piecewise cubics; a solver holds what cannot vary continuously on the output grid."""
+        if self.interface == "co-simulation":
+            return [signal.pieces(experiment.stop_time) for signal in signals.values()]
         kinds = {v.name: v for v in self.info.inputs}
         tables = []
         for name, signal in signals.items():
@@ -110,7 +106,6 @@ class _Task:
     """What all simulations of one search share in the process that asks for them."""
 
     plan: Plan
-    points: NDArray[np.float64]
     times: NDArray[np.float64]
     units: Mapping[str, str]
 
@@ -128,7 +123,7 @@ def _task(
     times = experiment.times
     times.flags.writeable = False
     units = {v.name: v.unit for v in description.info.variables if v.unit and v.name in plan.outputs}
-    return _Task(plan, plan.times, times, units)
+    return _Task(plan, times, units)
 
 
 def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from falsifier.fmu.library import Library, load_binding, status_name
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.room import Room
+from falsifier.model import Variable
 
 
 class Stepper(ABC):
@@ -30,9 +31,14 @@ class Stepper(ABC):
         self._loops = loops()
         self._name = description.info.name
         self._library, self._plan, self._room = library, plan, room
-        self._setters = library.setters()
-        self._parameters = make_ports(description, plan.parameters, self._setters)
+        setters = library.setters()
+        self._parameters = make_ports(description, plan.parameters, setters)
         self._outputs = make_ports(description, plan.outputs, library.getters())
+        kinds = {v.name: v for v in description.info.variables}
+        held = np.array([self._is_held(kinds[name]) for name in plan.inputs], dtype=bool)
+        self._held_rows, self._other_rows = np.flatnonzero(held), np.flatnonzero(~held)
+        self._inputs = make_ports(description, [plan.inputs[k] for k in self._other_rows], setters)
+        self._held_inputs = make_ports(description, [plan.inputs[k] for k in self._held_rows], setters)
 
     def set_parameters(self) -> None:
         """Set the plan's parameters and start values."""
@@ -40,9 +46,25 @@ class Stepper(ABC):
         check_range(self._name, names, self._parameters, values)
         self._write(self._parameters, values, "parameters")
 
-    @abstractmethod
     def set_first_inputs(self) -> None:
         """Set the inputs at time 0."""
+        for ports, rows in ((self._inputs, self._other_rows), (self._held_inputs, self._held_rows)):
+            if len(rows):
+                # Interpolation never leaves the range of the values at the ends of the pieces.
+                pieces = self._pieces(rows)
+                values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
+                check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
+                self._write(ports, values, "inputs")
+
+    def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Pieces of some inputs, shape (rows, pieces, 5)."""
+        inputs = self._room.inputs
+        chosen = inputs if len(rows) == len(inputs) else inputs[rows]
+        return chosen.reshape(len(rows), self._plan.pieces, 5)
+
+    @abstractmethod
+    def _is_held(self, variable: Variable) -> bool:
+        """Whether an input may change at events only."""
 
     @abstractmethod
     def advance(self, deadline: float) -> None:
@@ -141,9 +163,26 @@ def warm_up() -> None:
     compiled = loops()
     calls, places = np.zeros((0, 5), dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
     rows, report = np.zeros((0, 1)), np.zeros(3, dtype=np.int64)
+    pieces, current, values = np.zeros((0, 1, 5)), np.zeros(0, dtype=np.int64), np.zeros(0)
     functions = np.zeros(7, dtype=np.int64)
     compiled.write_row(0, 2, calls, places, rows, 0)
     compiled.read_row(0, 2, calls, places, rows, 0)
     compiled.co_simulate(
-        functions, calls, places, calls, places, calls, places, rows, rows, rows, 1.0, 0, 0, 1, report
+        functions,
+        calls,
+        places,
+        calls,
+        places,
+        calls,
+        places,
+        pieces,
+        pieces,
+        current,
+        values,
+        rows,
+        1.0,
+        0,
+        0,
+        1,
+        report,
     )

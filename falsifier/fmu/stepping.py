@@ -24,6 +24,9 @@ INSTANCE, DO_STEP, ENTER_EVENT_MODE, UPDATE_DISCRETE_STATES, ENTER_STEP_MODE, FM
     7
 )
 
+# Columns of a piece of an input: start time in s, then coefficients of 1, dt, dt**2, dt**3 (Signal.pieces).
+START, C0, C1, C2, C3 = range(5)
+
 # Early returns at one time before the FMU counts as stuck, and rounds of one event iteration.
 _MOST_ROUNDS = 1000
 
@@ -219,11 +222,35 @@ def write_row(instance, version, calls, places, rows, column):  # type: ignore[n
 
 
 @compiled
-def _differs(rows, column):  # type: ignore[no-untyped-def]
-    changes = 0
-    for j in range(rows.shape[0]):
-        changes += rows[j, column] != rows[j, column - 1]
-    return changes > 0
+def rounding(time):  # type: ignore[no-untyped-def]
+    """Times closer than this are one time; s."""
+    return 1e-11 * max(1.0, abs(time))
+
+
+@compiled
+def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
+    """Input j at a time within (or at the end of) its piece p."""
+    dt = time - pieces[j, p, START]
+    return ((pieces[j, p, C3] * dt + pieces[j, p, C2]) * dt + pieces[j, p, C1]) * dt + pieces[j, p, C0]
+
+
+@compiled
+def _put_inputs(places, pieces, current, first, time, values):  # type: ignore[no-untyped-def]
+    """Put all inputs of a table at a time into its buffers; whether any differs from before.
+
+    ``current[first:]`` are the pieces that the inputs are in, ``values[first:]`` what was put last.
+    """
+    changed = False
+    for j in range(places.shape[0]):
+        p = current[first + j]
+        while p + 1 < pieces.shape[1] and pieces[j, p + 1, START] <= time + rounding(time):
+            p += 1
+        current[first + j] = p
+        value = value_at(pieces, j, p, time)
+        changed = changed or value != values[first + j]
+        values[first + j] = value
+        put(places[j], value)
+    return changed
 
 
 @compiled
@@ -316,20 +343,22 @@ def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore
 @compiled
 def co_simulate(  # type: ignore[no-untyped-def]
     functions, set_calls, set_places, event_calls, event_places, get_calls, get_places,
-    inputs, discrete, outputs, step, first, last, every, report,
+    pieces, event_pieces, current, values, outputs, step, first, last, every, report,
 ):  # fmt: skip
     """Do the communication steps first..last-1.
 
     Args:
         functions: addresses and facts, int64[7].
-        set_calls: inputs that are set before each step, see Ports.
+        set_calls: inputs that are set before each step, see ports.Ports.
         set_places: their places.
         event_calls: inputs that are set in event mode only (FMI 3 with event mode).
         event_places: their places.
         get_calls: recorded variables.
         get_places: their places.
-        inputs: values by input and step, shape (n, steps).
-        discrete: values of the event-mode inputs, shape (m, steps).
+        pieces: inputs as piecewise cubics, shape (n, pieces, 5); pieces that are not there start at inf.
+        event_pieces: the same for the event-mode inputs, shape (m, pieces, 5).
+        current: pieces that the inputs are in, int64[n + m]; zeros at the start.
+        values: what the inputs were set to last, shape (n + m,).
         outputs: receives the recorded variables, shape (k, samples); column 0 is the caller's.
         step: communication step in s.
         first: first step to do.
@@ -341,20 +370,23 @@ def co_simulate(  # type: ignore[no-untyped-def]
     flags = np.zeros(8, dtype=np.uint8)
     reached = np.zeros(2)
     no_calls = event_calls[:0]
+    n = set_places.shape[0]
     report[STATUS], report[WHERE], report[STEP] = 0, DONE, first
     for k in range(first, last):
         report[STEP] = k
-        if set_calls.shape[0]:
-            report[STATUS] = write_row(instance, version, set_calls, set_places, inputs, k)
+        if n:
+            _put_inputs(set_places, pieces, current, 0, k * step, values)
+            report[STATUS] = exchange_values(instance, version, set_calls)
             if report[STATUS] > 1:
                 report[WHERE] = SETTING
                 return
-        if event_calls.shape[0] and k > 0 and _differs(discrete, k):
-            for j in range(event_places.shape[0]):
-                put(event_places[j], discrete[j, k])
-            report[STATUS], report[WHERE] = _event_3(functions, flags, reached, event_calls)
-            if report[WHERE] != DONE:
-                return
+        if event_calls.shape[0]:
+            changed = _put_inputs(event_places, event_pieces, current, n, k * step, values)
+            # Initialisation has set their first values.
+            if changed and k > 0:
+                report[STATUS], report[WHERE] = _event_3(functions, flags, reached, event_calls)
+                if report[WHERE] != DONE:
+                    return
         ends = False
         if version == 3:
             status, where, ends = _advance_3(functions, k * step, (k + 1) * step, flags, reached, no_calls)

@@ -1,6 +1,6 @@
 """Model exchange of the test FMUs against closed forms, scipy and co-simulation."""
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def order_residuals(
 ) -> float:
     """Largest residual of the Runge-Kutta order conditions (Hairer, Norsett, Wanner I, table II.2.2)."""
     ac = a @ c
-    conditions: list[list[tuple[float, float]]] = [
+    conditions: list[list[tuple[Any, float]]] = [
         [(b.sum(), 1)],
         [(b @ c, 1 / 2)],
         [(b @ c**2, 1 / 3), (b @ ac, 1 / 6)],
@@ -51,7 +51,7 @@ def order_residuals(
             (b @ a @ a @ ac, 1 / 120),
         ],
     ]
-    return max(abs(value - exact) for group in conditions[:order] for value, exact in group)
+    return max(abs(float(value) - exact) for group in conditions[:order] for value, exact in group)
 
 
 def test_coefficients_have_their_orders() -> None:

@@ -45,5 +45,4 @@ def test_steps_must_fit(stop: float, interval: float, step: float | None, key: s
 def test_smaller_steps_divide_the_output_interval() -> None:
     plan = make_plan(LAG, Experiment(2.0, 0.1, ("y",), step_size=0.02), ["u"], [])
     assert (plan.samples, plan.every, plan.steps) == (21, 5, 100)
-    assert plan.times[:3].tolist() == [0.0, 0.02, 0.04]
     assert issubclass(SpecError, FalsifierError)
