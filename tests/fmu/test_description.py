@@ -21,7 +21,7 @@ def test_agrees_with_fmpy(name: str) -> None:
     from fmpy import read_model_description
 
     path = fixtures.path(name)
-    expected: Any = read_model_description(str(path), validate=False)
+    expected: Any = read_model_description(str(path), validate=True)
     description = read_description(path)
     info = description.info
     assert (info.name, info.fmi_version) == (expected.modelName, expected.fmiVersion)
