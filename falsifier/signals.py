@@ -141,27 +141,34 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
     Slopes after Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304, at the ends after Moler,
     Numerical Computing with MATLAB (2004), 3.6: equal to scipy's PchipInterpolator.
     """
-    knots, heights = np.asarray(times), np.asarray(values)
-    steps = np.diff(knots)
-    secants = np.diff(heights) / steps
-    slopes = np.empty(len(knots))
-    if len(knots) == 2:
-        slopes[:] = secants[0]
+    # Plain floats: with the few control points of a search, numpy's calls would cost more than the numbers.
+    steps = [b - a for a, b in pairwise(times)]
+    secants = [(b - a) / h for (a, b), h in zip(pairwise(values), steps, strict=True)]
+    slopes = _inner_slopes(steps, secants)
+    if len(steps) == 1:
+        slopes = [secants[0], secants[0]]
     else:
-        left, right = secants[:-1], secants[1:]
-        w_left, w_right = steps[:-1] + 2.0 * steps[1:], 2.0 * steps[:-1] + steps[1:]
-        same = left * right > 0.0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            harmonic = (w_left + w_right) / (w_left / left + w_right / right)
-        slopes[1:-1] = np.where(same, harmonic, 0.0)
-        slopes[0] = _end_slope(steps[0], steps[1], secants[0], secants[1])
-        slopes[-1] = _end_slope(steps[-1], steps[-2], secants[-1], secants[-2])
-    table = _constant_pieces(knots, heights)
-    table[:-1, 2] = slopes[:-1]
-    table[:-1, 3] = (3.0 * secants - 2.0 * slopes[:-1] - slopes[1:]) / steps
-    table[:-1, 4] = (slopes[:-1] + slopes[1:] - 2.0 * secants) / steps**2
+        first = _end_slope(steps[0], steps[1], secants[0], secants[1])
+        slopes = [first, *slopes, _end_slope(steps[-1], steps[-2], secants[-1], secants[-2])]
+    rows = [
+        (t, y, d, (3.0 * m - 2.0 * d - e) / h, (d + e - 2.0 * m) / (h * h))
+        for t, y, (d, e), m, h in zip(times, values, pairwise(slopes), secants, steps, strict=False)
+    ]
+    table = np.array([*rows, (times[-1], values[-1], 0.0, 0.0, 0.0)])
     table.flags.writeable = False
     return table
+
+
+def _inner_slopes(steps: list[float], secants: list[float]) -> list[float]:
+    """Weighted harmonic means of the slopes on both sides; 0 at a peak, a valley or a level piece."""
+    slopes = []
+    for (h, next_h), (left, right) in zip(pairwise(steps), pairwise(secants), strict=True):
+        if left * right <= 0.0:
+            slopes.append(0.0)
+        else:
+            w_left, w_right = h + 2.0 * next_h, 2.0 * h + next_h
+            slopes.append((w_left + w_right) / (w_left / left + w_right / right))
+    return slopes
 
 
 def _end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:

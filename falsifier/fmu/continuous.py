@@ -177,7 +177,7 @@ def derive(m, s, time, x, derivatives):  # type: ignore[no-untyped-def]
         status = _vector(f[SET_STATES], f[INSTANCE], x.ctypes.data, n)
     if status <= 1 and m.set_calls.shape[0]:
         for j in range(m.set_places.shape[0]):
-            put(m.set_places[j], value_at(m.pieces, j, s.piece[j], time))
+            put(m.set_places, j, value_at(m.pieces, j, s.piece[j], time))
         status = exchange_values(f[INSTANCE], f[VERSION], m.set_calls)
     if status <= 1 and n:
         status = _vector(f[GET_DERIVATIVES], f[INSTANCE], derivatives.ctypes.data, n)
@@ -296,11 +296,11 @@ def set_event_inputs(m, s):  # type: ignore[no-untyped-def]
     """Set all inputs to their values at the current time; returns the FMI status."""
     f, time = m.functions, s.clock[TIME]
     for j in range(m.set_places.shape[0]):
-        put(m.set_places[j], value_at(m.pieces, j, s.piece[j], time))
+        put(m.set_places, j, value_at(m.pieces, j, s.piece[j], time))
     status = exchange_values(f[INSTANCE], f[VERSION], m.set_calls)
     first = m.set_places.shape[0]
     for j in range(m.event_places.shape[0]):
-        put(m.event_places[j], m.event_pieces[j, s.piece[first + j], C0])
+        put(m.event_places, j, m.event_pieces[j, s.piece[first + j], C0])
     return max(status, exchange_values(f[INSTANCE], f[VERSION], m.event_calls))
 
 

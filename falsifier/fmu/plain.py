@@ -35,18 +35,18 @@ def _function(address: int, *argument_types: Any) -> Callable[..., int]:
     return ctypes.CFUNCTYPE(c_int, c_void_p, *argument_types)(address)
 
 
-def fetch(place: Table) -> float:
-    """One variable as a number, from where its call left it."""
-    kind, address, sign, is_boolean = (int(p) for p in place)
+def fetch(places: Table, j: int) -> float:
+    """Variable j as a number, from where its call left it."""
+    kind, address, sign, is_boolean = places[j].tolist()
     value = float(_C_TYPES[STORAGE[kind]].from_address(address).value)
     if is_boolean:
         return float((value != 0.0) == (sign > 0))
     return value * sign
 
 
-def put(place: Table, number: float) -> None:
-    """One number to where its call will take it from; anything but floating point is rounded."""
-    kind, address, sign, is_boolean = (int(p) for p in place)
+def put(places: Table, j: int, number: float) -> None:
+    """A number to where the call that sets variable j takes it; anything but floating point is rounded."""
+    kind, address, sign, is_boolean = places[j].tolist()
     stored = STORAGE[kind]
     value = float((number >= 0.5) == (sign > 0)) if is_boolean else float(number) * sign
     _C_TYPES[stored].from_address(address).value = value if stored[0] == "f" else int(np.rint(value))
@@ -71,15 +71,15 @@ def read_row(instance: int, version: int, calls: Table, places: Table, rows: Flo
     """Read all variables of a table into one column of ``rows``."""
     status = exchange_values(instance, version, calls)
     if status <= 1:
-        for j, place in enumerate(places):
-            rows[j, column] = fetch(place)
+        for j in range(len(places)):
+            rows[j, column] = fetch(places, j)
     return status
 
 
 def write_row(instance: int, version: int, calls: Table, places: Table, rows: Floats, column: int) -> int:
     """Set all variables of a table to one column of ``rows``."""
-    for j, place in enumerate(places):
-        put(place, rows[j, column])
+    for j in range(len(places)):
+        put(places, j, float(rows[j, column]))
     return exchange_values(instance, version, calls)
 
 
@@ -134,12 +134,12 @@ def co_simulate(
 def _put_inputs(places: Table, pieces: Floats, time: float) -> Floats:
     """Put all inputs of a table at a time into its buffers; returns their values."""
     values = np.zeros(len(places))
-    for j, place in enumerate(places):
+    for j in range(len(places)):
         begun = pieces[j, pieces[j, :, 0] <= time + 1e-11 * max(1.0, abs(time))]
         start, c0, c1, c2, c3 = begun[-1].tolist()
         dt = time - start
         values[j] = ((c3 * dt + c2) * dt + c1) * dt + c0
-        put(place, values[j])
+        put(places, j, float(values[j]))
     return values
 
 

@@ -129,12 +129,12 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled
-def fetch(place):  # type: ignore[no-untyped-def]
-    """One variable as a number, from where its call left it."""
-    kind, address = place[0], place[1]
+def fetch(places, j):  # type: ignore[no-untyped-def]
+    """Variable j as a number, from where its call left it."""
+    kind, address, sign = places[j, 0], places[j, 1], places[j, 2]
     if kind == 0:
-        value = _load_f8(address)
-    elif kind == 1:
+        return _load_f8(address) * sign
+    if kind == 1:
         value = np.float64(_load_f4(address))
     elif kind == 2:
         value = np.float64(_load_i1(address))
@@ -152,23 +152,23 @@ def fetch(place):  # type: ignore[no-untyped-def]
         value = np.float64(_load_i8(address))
     else:
         value = np.float64(_load_u8(address))
-    if place[3]:
+    if places[j, 3]:
         # Any non-zero byte is true; a negated Boolean is its complement.
-        truth = value != 0.0
-        return 1.0 if truth == (place[2] > 0) else 0.0
-    return value * place[2]
+        return 1.0 if (value != 0.0) == (sign > 0) else 0.0
+    return value * sign
 
 
 @compiled
-def put(place, number):  # type: ignore[no-untyped-def]
-    """One number to where its call will take it from; anything but floating point is rounded."""
-    kind, address = place[0], place[1]
-    value = number * place[2]
-    if place[3]:
-        value = 1.0 if (number >= 0.5) == (place[2] > 0) else 0.0
+def put(places, j, number):  # type: ignore[no-untyped-def]
+    """A number to where the call that sets variable j takes it; anything but floating point is rounded."""
+    kind, address, sign = places[j, 0], places[j, 1], places[j, 2]
+    value = number * sign
     if kind == 0:
         _store_f8(address, value)
-    elif kind == 1:
+        return
+    if places[j, 3]:
+        value = 1.0 if (number >= 0.5) == (sign > 0) else 0.0
+    if kind == 1:
         _store_f4(address, np.float32(value))
     elif kind == 2:
         _store_i1(address, np.int8(np.rint(value)))
@@ -209,7 +209,7 @@ def read_row(instance, version, calls, places, rows, column):  # type: ignore[no
     status = exchange_values(instance, version, calls)
     if status <= 1:
         for j in range(places.shape[0]):
-            rows[j, column] = fetch(places[j])
+            rows[j, column] = fetch(places, j)
     return status
 
 
@@ -217,7 +217,7 @@ def read_row(instance, version, calls, places, rows, column):  # type: ignore[no
 def write_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
     """Set all variables of a table to one column of ``rows``."""
     for j in range(places.shape[0]):
-        put(places[j], rows[j, column])
+        put(places, j, rows[j, column])
     return exchange_values(instance, version, calls)
 
 
@@ -249,7 +249,7 @@ def _put_inputs(places, pieces, current, first, time, values):  # type: ignore[n
         value = value_at(pieces, j, p, time)
         changed = changed or value != values[first + j]
         values[first + j] = value
-        put(places[j], value)
+        put(places, j, value)
     return changed
 
 
@@ -309,7 +309,7 @@ def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore
     a, r = flags.ctypes.data, reached.ctypes.data
     ends = False
     while True:
-        flags[:] = 0
+        flags[0] = flags[1] = flags[2] = 0
         reached[0] = end
         status = _do_step_3(
             functions[DO_STEP],

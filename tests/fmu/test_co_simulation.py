@@ -138,7 +138,7 @@ def test_a_negated_alias_has_the_other_sign() -> None:
     memory = ports.memory[1]
     memory[0] = 2.5
     loops = stepper.loops()
-    assert [loops.fetch(ports.places[k]) for k in (0, 1)] == [2.5, -2.5]
-    assert [plain.fetch(ports.places[k]) for k in (0, 1)] == [2.5, -2.5]
-    loops.put(ports.places[1], 4.0)
+    assert [loops.fetch(ports.places, k) for k in (0, 1)] == [2.5, -2.5]
+    assert [plain.fetch(ports.places, k) for k in (0, 1)] == [2.5, -2.5]
+    loops.put(ports.places, 1, 4.0)
     assert memory[0] == -4.0
