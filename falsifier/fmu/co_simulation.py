@@ -20,41 +20,32 @@ class CoSimulation(Stepper):
         super().__init__(description, library, plan, room)
         self._report = np.zeros(3, dtype=np.int64)
         functions = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
-        self._functions = np.array(
-            [0, *map(library.address, functions), description.major, self._in_event_mode], dtype=np.int64
-        )
+        self._addresses = [library.address(name) for name in functions]
 
     def advance(self, deadline: float) -> None:
         """Do all communication steps; see Stepper.advance."""
         plan, loops, report = self._plan, self._loops, self._report
-        self._functions[loops.INSTANCE] = self._library.component
+        version = self._library.description.major
+        functions = (self._library.component, *self._addresses, version, int(self._in_event_mode))
         if self._in_event_mode:
-            status, where = loops.enter_step_mode(self._functions)
+            status, where = loops.enter_step_mode(functions)
             self._check(status, where, 0.0)
         self._read_first()
         step = plan.stop_time / plan.steps
         pieces, held_pieces = self._pieces(self._other_rows), self._pieces(self._held_rows)
         current, values = np.zeros(len(plan.inputs), dtype=np.int64), np.zeros(len(plan.inputs))
+        inputs = (
+            self._inputs.table,
+            (pieces.ctypes.data, plan.pieces),
+            self._held_inputs.table,
+            (held_pieces.ctypes.data, plan.pieces),
+            current.ctypes.data,
+            values.ctypes.data,
+        )
+        outputs = (self._outputs.table, self._room.outputs.ctypes.data, plan.samples)
         for first in range(0, plan.steps, _STEPS_PER_CLOCK_LOOK):
-            loops.co_simulate(
-                self._functions,
-                self._inputs.calls,
-                self._inputs.places,
-                self._held_inputs.calls,
-                self._held_inputs.places,
-                self._outputs.calls,
-                self._outputs.places,
-                pieces,
-                held_pieces,
-                current,
-                values,
-                self._room.outputs,
-                step,
-                first,
-                min(first + _STEPS_PER_CLOCK_LOOK, plan.steps),
-                plan.every,
-                report,
-            )
+            last = min(first + _STEPS_PER_CLOCK_LOOK, plan.steps)
+            loops.co_simulate(functions, *inputs, *outputs, step, first, last, plan.every, report)
             status, where, done = report.tolist()
             if done == plan.steps and where in (loops.DONE, loops.TERMINATED):
                 return

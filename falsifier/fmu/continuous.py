@@ -10,13 +10,12 @@ import numpy as np
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from falsifier.fmu.ports import Table
+from falsifier.fmu.ports import Addresses, Table
 from falsifier.fmu.stepping import (
-    C0,
     DONE,
     EVENT,
+    PLACE_BYTES,
     SETTING,
-    START,
     STEPPING,
     STUCK,
     TERMINATED,
@@ -26,6 +25,7 @@ from falsifier.fmu.stepping import (
     exchange_values,
     put,
     rounding,
+    start_of,
     value_at,
 )
 
@@ -45,30 +45,24 @@ class Model(NamedTuple):
     """What does not change during a run.
 
     Attributes:
-        functions: addresses and facts, int64[11].
-        set_calls: continuous inputs, see ports.Ports.
-        set_places: their places.
-        event_calls: inputs that change at events only.
-        event_places: their places.
-        get_calls: recorded variables.
-        get_places: their places.
-        pieces: continuous inputs as piecewise cubics, shape (inputs, pieces, 5); unused pieces start at inf.
-        event_pieces: the same for the inputs that change at events only.
+        functions: addresses and facts.
+        ports: continuous inputs (Ports.table).
+        held_ports: inputs that change at events only.
+        getters: recorded variables.
+        pieces: address and number per input of the continuous inputs' pieces (Signal.pieces).
+        held_pieces: the same for the inputs that change at events only.
         weights: absolute tolerance of each state, shape (states,).
         tolerance: relative tolerance.
         stop_time: end in s.
         max_step: largest step in s.
     """
 
-    functions: Table
-    set_calls: Table
-    set_places: Table
-    event_calls: Table
-    event_places: Table
-    get_calls: Table
-    get_places: Table
-    pieces: NDArray[np.float64]
-    event_pieces: NDArray[np.float64]
+    functions: tuple[int, ...]
+    ports: Addresses
+    held_ports: Addresses
+    getters: Addresses
+    pieces: tuple[int, int]
+    held_pieces: tuple[int, int]
     weights: Floats
     tolerance: float
     stop_time: float
@@ -175,10 +169,10 @@ def derive(m, s, time, x, derivatives):  # type: ignore[no-untyped-def]
     status = _set_time(f[SET_TIME], f[INSTANCE], time)
     if status <= 1 and n:
         status = _vector(f[SET_STATES], f[INSTANCE], x.ctypes.data, n)
-    if status <= 1 and m.set_calls.shape[0]:
-        for j in range(m.set_places.shape[0]):
-            put(m.set_places, j, value_at(m.pieces, j, s.piece[j], time))
-        status = exchange_values(f[INSTANCE], f[VERSION], m.set_calls)
+    if status <= 1 and m.ports[3]:
+        for j in range(m.ports[3]):
+            put(m.ports[2] + j * PLACE_BYTES, value_at(m.pieces, j, s.piece[j], time))
+        status = exchange_values(f[INSTANCE], f[VERSION], m.ports)
     if status <= 1 and n:
         status = _vector(f[GET_DERIVATIVES], f[INSTANCE], derivatives.ctypes.data, n)
         for i in range(n):
@@ -295,48 +289,43 @@ def handle_event(m, s):  # type: ignore[no-untyped-def]
 def set_event_inputs(m, s):  # type: ignore[no-untyped-def]
     """Set all inputs to their values at the current time; returns the FMI status."""
     f, time = m.functions, s.clock[TIME]
-    for j in range(m.set_places.shape[0]):
-        put(m.set_places, j, value_at(m.pieces, j, s.piece[j], time))
-    status = exchange_values(f[INSTANCE], f[VERSION], m.set_calls)
-    first = m.set_places.shape[0]
-    for j in range(m.event_places.shape[0]):
-        put(m.event_places, j, m.event_pieces[j, s.piece[first + j], C0])
-    return max(status, exchange_values(f[INSTANCE], f[VERSION], m.event_calls))
+    for j in range(m.ports[3]):
+        put(m.ports[2] + j * PLACE_BYTES, value_at(m.pieces, j, s.piece[j], time))
+    status = exchange_values(f[INSTANCE], f[VERSION], m.ports)
+    for j in range(m.held_ports[3]):
+        value = value_at(m.held_pieces, j, s.piece[m.ports[3] + j], time)
+        put(m.held_ports[2] + j * PLACE_BYTES, value)
+    return max(status, exchange_values(f[INSTANCE], f[VERSION], m.held_ports))
 
 
 @compiled
 def next_break(m, s):  # type: ignore[no-untyped-def]
     """Start in s of the next piece of any input."""
     nearest = np.inf
-    n = m.pieces.shape[0]
-    for j in range(n + m.event_pieces.shape[0]):
-        p = s.piece[j] + 1
-        if j < n:
-            if p < m.pieces.shape[1]:
-                nearest = min(nearest, m.pieces[j, p, START])
-        elif p < m.event_pieces.shape[1]:
-            nearest = min(nearest, m.event_pieces[j - n, p, START])
+    for j in range(m.ports[3]):
+        nearest = min(nearest, start_of(m.pieces, j, s.piece[j] + 1))
+    for j in range(m.held_ports[3]):
+        nearest = min(nearest, start_of(m.held_pieces, j, s.piece[m.ports[3] + j] + 1))
     return nearest
 
 
 @compiled
 def enter_pieces(m, s):  # type: ignore[no-untyped-def]
     """Go on to the pieces that begin by now; whether an input jumps there."""
-    time, n = s.clock[TIME], m.pieces.shape[0]
+    now = s.clock[TIME] + rounding(s.clock[TIME])
     jumps = False
-    for j in range(n):
-        while s.piece[j] + 1 < m.pieces.shape[1] and m.pieces[j, s.piece[j] + 1, START] <= time + rounding(
-            time
-        ):
-            before = value_at(m.pieces, j, s.piece[j], m.pieces[j, s.piece[j] + 1, START])
+    for j in range(m.ports[3]):
+        while start_of(m.pieces, j, s.piece[j] + 1) <= now:
+            start = start_of(m.pieces, j, s.piece[j] + 1)
+            before, after = (
+                value_at(m.pieces, j, s.piece[j], start),
+                value_at(m.pieces, j, s.piece[j] + 1, start),
+            )
             s.piece[j] += 1
-            after = m.pieces[j, s.piece[j], C0]
             jumps = jumps or abs(after - before) > 1e-9 * max(abs(after), abs(before))
-    for j in range(m.event_pieces.shape[0]):
-        k = n + j
-        while s.piece[k] + 1 < m.event_pieces.shape[1] and m.event_pieces[
-            j, s.piece[k] + 1, START
-        ] <= time + rounding(time):
+    for j in range(m.held_ports[3]):
+        k = m.ports[3] + j
+        while start_of(m.held_pieces, j, s.piece[k] + 1) <= now:
             s.piece[k] += 1
             jumps = True
     return jumps

@@ -90,7 +90,9 @@ def advance(m, s, outputs, steps):  # type: ignore[no-untyped-def]
                 s.clock[NEXT_EVENT] = np.inf
         if grid_time <= time + rounding(time):
             f = m.functions
-            status = read_row(f[INSTANCE], f[VERSION], m.get_calls, m.get_places, outputs, s.counts[COLUMN])
+            status = read_row(
+                f[INSTANCE], f[VERSION], m.getters, outputs.ctypes.data, samples, s.counts[COLUMN]
+            )
             if status > 1:
                 return status, GETTING
             s.counts[COLUMN] += 1

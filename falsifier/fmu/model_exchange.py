@@ -42,11 +42,8 @@ def warm_up() -> None:
     """Compile the solver, or load it from the cache, without an FMU."""
     from numba import typeof
 
-    table, places = np.zeros((0, 5), dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
-    functions, pieces = np.zeros(11, dtype=np.int64), np.zeros((0, 1, 5))
-    model = Model(
-        functions, table, places, table, places, table, places, pieces, pieces, np.zeros(0), 1e-6, 1.0, 1.0
-    )
+    table = (0, 0, 0, 0)
+    model = Model((0,) * 11, table, table, table, (0, 0), (0, 0), np.zeros(0), 1e-6, 1.0, 1.0)
     memory = make_memory(0, 0, 0)
     for function in (continuous.settle, continuous.refresh):
         function.compile((typeof(model), typeof(memory)))
@@ -62,16 +59,15 @@ class ModelExchange(Stepper):
     ) -> None:
         super().__init__(description, library, plan, room)
         self._lifecycle = lifecycle
-        addresses = [library.address(name) if name else 0 for name in _NAMES[description.major]]
-        self._functions = np.array([0, description.major, *addresses], dtype=np.int64)
+        self._addresses = [library.address(name) if name else 0 for name in _NAMES[description.major]]
         self._states, self._indicators = self._sizes(description)
         self._tolerance = plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE
 
     def advance(self, deadline: float) -> None:
         """Solve to the stop time; see Stepper.advance."""
-        self._functions[continuous.INSTANCE] = self._library.component
         memory = make_memory(self._states, self._indicators, len(self._plan.inputs))
-        model = self._model()
+        pieces, held_pieces = self._pieces(self._other_rows), self._pieces(self._held_rows)
+        model = self._model(pieces, held_pieces)
         self._begin(model, memory)
         self._read_first()
         memory.counts[continuous.COLUMN] = 1
@@ -85,19 +81,16 @@ class ModelExchange(Stepper):
             self._check(status, where, reached)
             return
 
-    def _model(self) -> Model:
+    def _model(self, pieces: NDArray[np.float64], held_pieces: NDArray[np.float64]) -> Model:
         nominals = np.ones(self._states)
         self._vector("GetNominalContinuousStates", "GetNominalsOfContinuousStates", nominals)
         return Model(
-            functions=self._functions,
-            set_calls=self._inputs.calls,
-            set_places=self._inputs.places,
-            event_calls=self._held_inputs.calls,
-            event_places=self._held_inputs.places,
-            get_calls=self._outputs.calls,
-            get_places=self._outputs.places,
-            pieces=self._pieces(self._other_rows),
-            event_pieces=self._pieces(self._held_rows),
+            functions=(self._library.component, self._library.description.major, *self._addresses),
+            ports=self._inputs.table,
+            held_ports=self._held_inputs.table,
+            getters=self._outputs.table,
+            pieces=(pieces.ctypes.data, self._plan.pieces),
+            held_pieces=(held_pieces.ctypes.data, self._plan.pieces),
             weights=_ABSOLUTE_SHARE * self._tolerance * np.where(nominals > 0.0, nominals, 1.0),
             tolerance=float(self._tolerance),
             stop_time=float(self._plan.stop_time),

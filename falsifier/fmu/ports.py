@@ -15,6 +15,8 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description import Description, Slot
 
 Table = NDArray[np.int64]
+# What the loops get of Ports: integers, because compiled code counts references to every array that it touches.
+Addresses = tuple[int, int, int, int]
 
 # How a value lies in memory: the position is the code that the compiled loops switch on.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
@@ -50,6 +52,11 @@ class Ports:
     places: Table
     limits: NDArray[np.float64]
     memory: tuple[NDArray[np.generic], ...]
+
+    @property
+    def table(self) -> Addresses:
+        """Address and number of the calls, address and number of the places."""
+        return (self.calls.ctypes.data, len(self.calls), self.places.ctypes.data, len(self.places))
 
 
 def make_ports(description: Description, names: Sequence[str], addresses: Mapping[str, int]) -> Ports:

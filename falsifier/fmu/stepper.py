@@ -42,8 +42,8 @@ class Stepper(ABC):
 
     def set_parameters(self) -> None:
         """Set the plan's parameters and start values."""
-        names, values = self._plan.parameters, self._room.parameters[:, np.newaxis]
-        check_range(self._name, names, self._parameters, values)
+        names, values = self._plan.parameters, self._room.parameters
+        check_range(self._name, names, self._parameters, values[:, np.newaxis])
         self._write(self._parameters, values, "parameters")
 
     def set_first_inputs(self) -> None:
@@ -54,10 +54,10 @@ class Stepper(ABC):
                 pieces = self._pieces(rows)
                 values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
                 check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
-                self._write(ports, values, "inputs")
+                self._write(ports, np.ascontiguousarray(values[:, 0]), "inputs")
 
     def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Pieces of some inputs, shape (rows, pieces, 5)."""
+        """Pieces of some inputs, shape (rows, pieces, 5), one behind the other in memory."""
         inputs = self._room.inputs
         chosen = inputs if len(rows) == len(inputs) else inputs[rows]
         return chosen.reshape(len(rows), self._plan.pieces, 5)
@@ -82,24 +82,23 @@ class Stepper(ABC):
         status = self._loops.read_row(
             self._library.component,
             self._library.description.major,
-            self._outputs.calls,
-            self._outputs.places,
-            self._room.outputs,
+            self._outputs.table,
+            self._room.outputs.ctypes.data,
+            self._plan.samples,
             0,
         )
         self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
 
-    def _write(self, ports: Ports, rows: NDArray[np.float64], what: str) -> None:
-        """Set variables to the first column of their rows."""
-        if not rows.shape[0]:
+    def _write(self, ports: Ports, numbers: NDArray[np.float64], what: str) -> None:
+        """Set variables to numbers, which lie one behind the other."""
+        if not numbers.size:
             return
-        status = self._loops.write_row(
-            self._library.component, self._library.description.major, ports.calls, ports.places, rows, 0
-        )
+        version = self._library.description.major
+        address = numbers.ctypes.data
+        status = self._loops.write_row(self._library.component, version, ports.table, address)
         if status > 1:
-            raise SimulationError(
-                f"{self._name}: setting the {what} returned {status_name(status)}", time=0.0
-            )
+            reason = f"setting the {what} returned {status_name(status)}"
+            raise SimulationError(f"{self._name}: {reason}", time=0.0)
 
     def _check(self, status: int, where: int, reached: float) -> None:
         loops = self._loops
@@ -161,28 +160,7 @@ def warm_up() -> None:
     """Load what every simulation needs, so that processes forked from this one find it ready."""
     load_binding()
     compiled = loops()
-    calls, places = np.zeros((0, 5), dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
-    rows, report = np.zeros((0, 1)), np.zeros(3, dtype=np.int64)
-    pieces, current, values = np.zeros((0, 1, 5)), np.zeros(0, dtype=np.int64), np.zeros(0)
-    functions = np.zeros(7, dtype=np.int64)
-    compiled.write_row(0, 2, calls, places, rows, 0)
-    compiled.read_row(0, 2, calls, places, rows, 0)
-    compiled.co_simulate(
-        functions,
-        calls,
-        places,
-        calls,
-        places,
-        calls,
-        places,
-        pieces,
-        pieces,
-        current,
-        values,
-        rows,
-        1.0,
-        0,
-        0,
-        1,
-        report,
-    )
+    table, report = (0, 0, 0, 0), np.zeros(3, dtype=np.int64)
+    compiled.write_row(0, 2, table, 0)
+    compiled.read_row(0, 2, table, 0, 0, 0)
+    compiled.co_simulate((0,) * 7, table, (0, 0), table, (0, 0), 0, 0, table, 0, 0, 1.0, 0, 0, 1, report)

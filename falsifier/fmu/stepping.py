@@ -4,8 +4,9 @@ numba compiles the loops; small intrinsics emit calls of C functions whose addre
 that the machine code is cached on disk and serves every FMU. Intrinsics and loops share this file because
 numba's cache notices changes of the file of the cached function only.
 
-Addresses of scratch memory and of functions travel in integer tables (see ports.Ports for the tables of
-variables). Every loop returns after a bounded number of steps, so that its caller can look at the clock.
+Functions, tables and memory are passed as integer addresses, not as arrays: compiled code counts references to
+every array that it touches, which here costs more than the rest of the loop. Every loop returns after a bounded
+number of steps, so that its caller can look at the clock.
 """
 
 from typing import Any
@@ -24,8 +25,8 @@ INSTANCE, DO_STEP, ENTER_EVENT_MODE, UPDATE_DISCRETE_STATES, ENTER_STEP_MODE, FM
     7
 )
 
-# Columns of a piece of an input: start time in s, then coefficients of 1, dt, dt**2, dt**3 (Signal.pieces).
-START, C0, C1, C2, C3 = range(5)
+# Bytes from one row to the next in the tables of calls and places (Ports) and of pieces (Signal.pieces).
+CALL_BYTES, PLACE_BYTES, PIECE_BYTES = 40, 32, 40
 
 # Early returns at one time before the FMU counts as stuck, and rounds of one event iteration.
 _MOST_ROUNDS = 1000
@@ -129,9 +130,9 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled
-def fetch(places, j):  # type: ignore[no-untyped-def]
-    """Variable j as a number, from where its call left it."""
-    kind, address, sign = places[j, 0], places[j, 1], places[j, 2]
+def fetch(place):  # type: ignore[no-untyped-def]
+    """A variable as a number, from where its call left it; see PLACE_BYTES."""
+    kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
     if kind == 0:
         return _load_f8(address) * sign
     if kind == 1:
@@ -152,21 +153,21 @@ def fetch(places, j):  # type: ignore[no-untyped-def]
         value = np.float64(_load_i8(address))
     else:
         value = np.float64(_load_u8(address))
-    if places[j, 3]:
+    if _load_i8(place + 24):
         # Any non-zero byte is true; a negated Boolean is its complement.
         return 1.0 if (value != 0.0) == (sign > 0) else 0.0
     return value * sign
 
 
 @compiled
-def put(places, j, number):  # type: ignore[no-untyped-def]
-    """A number to where the call that sets variable j takes it; anything but floating point is rounded."""
-    kind, address, sign = places[j, 0], places[j, 1], places[j, 2]
+def put(place, number):  # type: ignore[no-untyped-def]
+    """A number to where the call that sets a variable takes it; anything but floating point is rounded."""
+    kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
     value = number * sign
     if kind == 0:
         _store_f8(address, value)
         return
-    if places[j, 3]:
+    if _load_i8(place + 24):
         value = 1.0 if (number >= 0.5) == (sign > 0) else 0.0
     if kind == 1:
         _store_f4(address, np.float32(value))
@@ -189,36 +190,39 @@ def put(places, j, number):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def exchange_values(instance, version, calls):  # type: ignore[no-untyped-def]
-    """Call the get or set functions of a table; the first status above warning ends it."""
+def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
+    """Make the get or set calls of a table (Ports.table); the first status above warning ends it."""
     worst = 0
-    for g in range(calls.shape[0]):
+    for g in range(ports[1]):
+        call = ports[0] + g * CALL_BYTES
+        function, references, count = _load_i8(call), _load_i8(call + 8), _load_i8(call + 16)
+        values = _load_i8(call + 24)
         if version == 3:
-            status = _values_3(calls[g, 0], instance, calls[g, 1], calls[g, 2], calls[g, 3], calls[g, 4])
+            status = _values_3(function, instance, references, count, values, _load_i8(call + 32))
         else:
-            status = _values_2(calls[g, 0], instance, calls[g, 1], calls[g, 2], calls[g, 3])
+            status = _values_2(function, instance, references, count, values)
         worst = max(worst, status)
         if status > 1:
-            break
+            return worst
     return worst
 
 
 @compiled
-def read_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
-    """Read all variables of a table into one column of ``rows``."""
-    status = exchange_values(instance, version, calls)
+def read_row(instance, version, ports, rows, width, column):  # type: ignore[no-untyped-def]
+    """Read all variables of a table into one column of float64 rows of this width at this address."""
+    status = exchange_values(instance, version, ports)
     if status <= 1:
-        for j in range(places.shape[0]):
-            rows[j, column] = fetch(places, j)
+        for j in range(ports[3]):
+            _store_f8(rows + 8 * (j * width + column), fetch(ports[2] + j * PLACE_BYTES))
     return status
 
 
 @compiled
-def write_row(instance, version, calls, places, rows, column):  # type: ignore[no-untyped-def]
-    """Set all variables of a table to one column of ``rows``."""
-    for j in range(places.shape[0]):
-        put(places, j, rows[j, column])
-    return exchange_values(instance, version, calls)
+def write_row(instance, version, ports, numbers):  # type: ignore[no-untyped-def]
+    """Set all variables of a table to the float64 numbers at this address."""
+    for j in range(ports[3]):
+        put(ports[2] + j * PLACE_BYTES, _load_f8(numbers + 8 * j))
+    return exchange_values(instance, version, ports)
 
 
 @compiled
@@ -228,71 +232,70 @@ def rounding(time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
-    """Input j at a time within (or at the end of) its piece p."""
-    dt = time - pieces[j, p, START]
-    return ((pieces[j, p, C3] * dt + pieces[j, p, C2]) * dt + pieces[j, p, C1]) * dt + pieces[j, p, C0]
+def start_of(pieces, j, p):  # type: ignore[no-untyped-def]
+    """Start in s of piece p of input j; inf behind the last one."""
+    return _load_f8(pieces[0] + PIECE_BYTES * (j * pieces[1] + p)) if p < pieces[1] else np.inf
 
 
 @compiled
-def _put_inputs(places, pieces, current, first, time, values):  # type: ignore[no-untyped-def]
+def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
+    """Input j at a time within (or at the end of) its piece p; ``pieces`` is address and number per input."""
+    at = pieces[0] + PIECE_BYTES * (j * pieces[1] + p)
+    dt = time - _load_f8(at)
+    return ((_load_f8(at + 32) * dt + _load_f8(at + 24)) * dt + _load_f8(at + 16)) * dt + _load_f8(at + 8)
+
+
+@compiled
+def _put_inputs(ports, pieces, current, values, time):  # type: ignore[no-untyped-def]
     """Put all inputs of a table at a time into its buffers; whether any differs from before.
 
-    ``current[first:]`` are the pieces that the inputs are in, ``values[first:]`` what was put last.
+    At ``current`` lie the pieces that the inputs are in, at ``values`` what was put last.
     """
     changed = False
-    for j in range(places.shape[0]):
-        p = current[first + j]
-        while p + 1 < pieces.shape[1] and pieces[j, p + 1, START] <= time + rounding(time):
+    for j in range(ports[3]):
+        p = _load_i8(current + 8 * j)
+        while start_of(pieces, j, p + 1) <= time + rounding(time):
             p += 1
-        current[first + j] = p
+        _store_i8(current + 8 * j, p)
         value = value_at(pieces, j, p, time)
-        changed = changed or value != values[first + j]
-        values[first + j] = value
-        put(places, j, value)
+        changed = changed or value != _load_f8(values + 8 * j)
+        _store_f8(values + 8 * j, value)
+        put(ports[2] + j * PLACE_BYTES, value)
     return changed
 
 
 @compiled
-def settle_3(functions, flags, reached):  # type: ignore[no-untyped-def]
+def settle_3(functions, scratch):  # type: ignore[no-untyped-def]
     """Event iteration of FMI 3 in event mode: update discrete states until nothing changes any more.
 
     Returns the status and where it stopped.
     """
     for _ in range(_MOST_ROUNDS):
-        flags[0] = 0
         # again, terminate, nominals changed, states changed, next event defined; next event time
-        a = flags.ctypes.data
         status = _update_3(
-            functions[UPDATE_DISCRETE_STATES],
-            functions[INSTANCE],
-            a,
-            a + 1,
-            a + 2,
-            a + 3,
-            a + 4,
-            reached.ctypes.data + 8,
-        )
+            functions[UPDATE_DISCRETE_STATES], functions[INSTANCE],
+            scratch, scratch + 1, scratch + 2, scratch + 3, scratch + 4, scratch + 8,
+        )  # fmt: skip
         if status > 1:
             return status, EVENT
-        if flags[1]:
+        if _load_u1(scratch + 1):
             return status, TERMINATED
-        if not flags[0]:
+        if not _load_u1(scratch):
             return status, DONE
     return 0, STUCK
 
 
 @compiled
-def _event_3(functions, flags, reached, discrete_calls):  # type: ignore[no-untyped-def]
-    """One visit to event mode: set the discrete inputs, update, return to step mode."""
+def _event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
+    """One visit to event mode: set the inputs of a table, update, return to step mode."""
     instance = functions[INSTANCE]
     status = call_mode(functions[ENTER_EVENT_MODE], instance)
     if status > 1:
         return status, EVENT
-    status = exchange_values(instance, 3, discrete_calls)
+    status = exchange_values(instance, 3, ports)
     if status > 1:
         return status, SETTING
-    status, where = settle_3(functions, flags, reached)
+    status, where = settle_3(functions, scratch)
     if where != DONE:
         return status, where
     status = call_mode(functions[ENTER_STEP_MODE], instance)
@@ -300,34 +303,24 @@ def _event_3(functions, flags, reached, discrete_calls):  # type: ignore[no-unty
 
 
 @compiled
-def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore[no-untyped-def]
+def _advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
     """One communication step of FMI 3, in several calls where the FMU returns early.
 
     Returns status, where it stopped and whether the FMU asked to end the simulation.
     """
     time, rounds = start, 0
-    a, r = flags.ctypes.data, reached.ctypes.data
-    ends = False
     while True:
-        flags[0] = flags[1] = flags[2] = 0
-        reached[0] = end
+        _store_f8(scratch + 8, end)
         status = _do_step_3(
-            functions[DO_STEP],
-            functions[INSTANCE],
-            time,
-            end - time,
-            np.uint8(1),
-            a,
-            a + 1,
-            a + 2,
-            r,
-        )
+            functions[DO_STEP], functions[INSTANCE], time, end - time, np.uint8(1),
+            scratch, scratch + 1, scratch + 2, scratch + 8,
+        )  # fmt: skip
         if status > 1:
-            return status, STEPPING, ends
-        event, ends, early = flags[0] != 0, flags[1] != 0, flags[2] != 0
-        before, time = time, (reached[0] if early else end)
+            return status, STEPPING, False
+        event, ends, early = _load_u1(scratch) != 0, _load_u1(scratch + 1) != 0, _load_u1(scratch + 2) != 0
+        before, time = time, (_load_f8(scratch + 8) if early else end)
         if event and functions[EVENT_MODE] and not ends:
-            status, where = _event_3(functions, flags, reached, no_calls)
+            status, where = _event_3(functions, (0, 0, 0, 0), scratch)
             if where == TERMINATED:
                 return status, DONE if time >= end else TERMINATED, True
             if where != DONE:
@@ -342,24 +335,23 @@ def _advance_3(functions, start, end, flags, reached, no_calls):  # type: ignore
 
 @compiled
 def co_simulate(  # type: ignore[no-untyped-def]
-    functions, set_calls, set_places, event_calls, event_places, get_calls, get_places,
-    pieces, event_pieces, current, values, outputs, step, first, last, every, report,
+    functions, ports, pieces, held_ports, held_pieces, current, values, getters, outputs, width,
+    step, first, last, every, report,
 ):  # fmt: skip
     """Do the communication steps first..last-1.
 
     Args:
-        functions: addresses and facts, int64[7].
-        set_calls: inputs that are set before each step, see ports.Ports.
-        set_places: their places.
-        event_calls: inputs that are set in event mode only (FMI 3 with event mode).
-        event_places: their places.
-        get_calls: recorded variables.
-        get_places: their places.
-        pieces: inputs as piecewise cubics, shape (n, pieces, 5); pieces that are not there start at inf.
-        event_pieces: the same for the event-mode inputs, shape (m, pieces, 5).
-        current: pieces that the inputs are in, int64[n + m]; zeros at the start.
-        values: what the inputs were set to last, shape (n + m,).
-        outputs: receives the recorded variables, shape (k, samples); column 0 is the caller's.
+        functions: addresses and facts, 7 integers.
+        ports: inputs that are set before each step (Ports.table).
+        pieces: address and number per input of these as piecewise cubics (Signal.pieces); pieces that are not
+            there start at inf.
+        held_ports: inputs that are set in event mode only (FMI 3 with event mode).
+        held_pieces: the same for these.
+        current: address of the pieces that inputs, then held inputs are in; int64, zeros at the start.
+        values: address of what they were set to last.
+        getters: recorded variables (Ports.table).
+        outputs: address of a row of float64 for each of these; column 0 is the caller's.
+        width: length of such a row.
         step: communication step in s.
         first: first step to do.
         last: step to stop before.
@@ -367,58 +359,64 @@ def co_simulate(  # type: ignore[no-untyped-def]
         report: receives FMI status, reason and number of completed steps, int64[3].
     """
     instance, version = functions[INSTANCE], functions[FMI_VERSION]
-    flags = np.zeros(8, dtype=np.uint8)
-    reached = np.zeros(2)
-    no_calls = event_calls[:0]
-    n = set_places.shape[0]
-    report[STATUS], report[WHERE], report[STEP] = 0, DONE, first
-    for k in range(first, last):
-        report[STEP] = k
-        if n:
-            _put_inputs(set_places, pieces, current, 0, k * step, values)
-            report[STATUS] = exchange_values(instance, version, set_calls)
-            if report[STATUS] > 1:
-                report[WHERE] = SETTING
-                return
-        if event_calls.shape[0]:
-            changed = _put_inputs(event_places, event_pieces, current, n, k * step, values)
-            # Initialisation has set their first values.
-            if changed and k > 0:
-                report[STATUS], report[WHERE] = _event_3(functions, flags, reached, event_calls)
-                if report[WHERE] != DONE:
-                    return
+    memory = np.zeros(16, dtype=np.uint8)
+    scratch = memory.ctypes.data
+    status, where, k = 0, DONE, first
+    while k < last and where == DONE:
+        status, where = _set_inputs(
+            functions, ports, pieces, held_ports, held_pieces, current, values, k * step, k > 0, scratch
+        )
+        if where != DONE:
+            break
         ends = False
         if version == 3:
-            status, where, ends = _advance_3(functions, k * step, (k + 1) * step, flags, reached, no_calls)
-            report[STATUS], report[WHERE] = status, where
-            if where != DONE:
-                return
+            status, where, ends = _advance_3(functions, k * step, (k + 1) * step, scratch)
         elif version == 2:
-            report[STATUS] = _do_step_2(functions[DO_STEP], instance, k * step, step, np.int32(1))
+            status = _do_step_2(functions[DO_STEP], instance, k * step, step, np.int32(1))
         else:
-            report[STATUS] = _do_step_1(functions[DO_STEP], instance, k * step, step, np.uint8(1))
-        if report[STATUS] > 1:
-            report[WHERE] = STEPPING
-            return
-        report[STEP] = k + 1
-        if (k + 1) % every == 0:
-            column = (k + 1) // every
-            report[STATUS] = read_row(instance, version, get_calls, get_places, outputs, column)
-            if report[STATUS] > 1:
-                report[WHERE] = GETTING
-                return
-        if ends:
-            report[WHERE] = TERMINATED
-            return
+            status = _do_step_1(functions[DO_STEP], instance, k * step, step, np.uint8(1))
+        if status > 1 and where == DONE:
+            where = STEPPING
+        if where != DONE:
+            break
+        k += 1
+        if k % every == 0:
+            status = read_row(instance, version, getters, outputs, width, k // every)
+            if status > 1:
+                where = GETTING
+        if ends and where == DONE:
+            where = TERMINATED
+    report[STATUS], report[WHERE], report[STEP] = status, where, k
+    # The scratch memory must outlive the calls that got its address.
+    memory[0] = 0
+
+
+@compiled
+def _set_inputs(  # type: ignore[no-untyped-def]
+    functions, ports, pieces, held_ports, held_pieces, current, values, time, is_initialised, scratch
+):  # fmt: skip
+    """Set the inputs at a communication point. Status and where it stopped."""
+    if ports[3]:
+        _put_inputs(ports, pieces, current, values, time)
+        status = exchange_values(functions[INSTANCE], functions[FMI_VERSION], ports)
+        if status > 1:
+            return status, SETTING
+    if held_ports[3]:
+        offset = 8 * ports[3]
+        changed = _put_inputs(held_ports, held_pieces, current + offset, values + offset, time)
+        # Initialisation has set their first values.
+        if changed and is_initialised:
+            return _event_3(functions, held_ports, scratch)
+    return 0, DONE
 
 
 @compiled
 def enter_step_mode(functions):  # type: ignore[no-untyped-def]
     """Leave the event mode that an FMI 3 FMU is in after its initialisation: status and where it stopped."""
-    flags = np.zeros(8, dtype=np.uint8)
-    reached = np.zeros(2)
-    status, where = settle_3(functions, flags, reached)
+    memory = np.zeros(16, dtype=np.uint8)
+    status, where = settle_3(functions, memory.ctypes.data)
     if where == DONE:
         status = call_mode(functions[ENTER_STEP_MODE], functions[INSTANCE])
         where = EVENT if status > 1 else DONE
+    memory[0] = 0
     return status, where

@@ -137,8 +137,8 @@ def test_a_negated_alias_has_the_other_sign() -> None:
     ports = make_ports(Description(info, "", {}, slots), ["a", "b"], {"Real": 1})
     memory = ports.memory[1]
     memory[0] = 2.5
-    loops = stepper.loops()
-    assert [loops.fetch(ports.places, k) for k in (0, 1)] == [2.5, -2.5]
-    assert [plain.fetch(ports.places, k) for k in (0, 1)] == [2.5, -2.5]
-    loops.put(ports.places, 1, 4.0)
+    loops, place = stepper.loops(), ports.table[2]
+    assert [loops.fetch(place + 32 * k) for k in (0, 1)] == [2.5, -2.5]
+    assert [plain.fetch(place + 32 * k) for k in (0, 1)] == [2.5, -2.5]
+    loops.put(place + 32, 4.0)
     assert memory[0] == -4.0
