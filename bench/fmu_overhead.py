@@ -98,6 +98,10 @@ def measure(name: str, steps: int, rounds: int, folder: Path) -> dict[str, NDArr
     def signals() -> dict[str, Signal]:
         return {n: Signal.evenly(random.uniform(-1, 1, 7).tolist(), stop_time=STOP) for n in inputs}
 
+    def simulated(model: FmuModel) -> float:
+        chosen = signals()
+        return timed(lambda: model.simulate(chosen, {}, experiment))
+
     def fmpy() -> object:
         columns = [("time", np.float64), *((n, np.float64) for n in inputs)]
         rows = zip(grid, *(s.sample(grid) for s in signals().values()), strict=True)
@@ -109,8 +113,8 @@ def measure(name: str, steps: int, rounds: int, folder: Path) -> dict[str, NDArr
 
     kinds: dict[str, Callable[[], float]] = {
         "c": program,
-        "process": lambda: timed(lambda: local.simulate(signals(), {}, experiment)),
-        "worker": lambda: timed(lambda: apart.simulate(signals(), {}, experiment)),
+        "process": lambda: simulated(local),
+        "worker": lambda: simulated(apart),
         "fmpy": lambda: timed(fmpy),
     }
     for action in kinds.values():

@@ -13,9 +13,8 @@ from typing import Literal
 Status = Literal["ok", "failed", "crashed", "timeout", "unusable"]
 _STATUSES: tuple[Status, ...] = ("ok", "failed", "crashed", "timeout", "unusable")
 
-_REQUEST = struct.Struct("<BI")
+_REQUEST = struct.Struct("<BBI")
 _REPLY = struct.Struct("<BBBdI")
-_MOST_DESCRIPTORS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +49,9 @@ def send_request(
         Closed: when the other end is gone.
     """
     try:
-        header = _REQUEST.pack(kind, len(payload))
+        sock.sendall(_REQUEST.pack(kind, len(descriptors), len(payload)) + payload)
         if descriptors:
-            socket.send_fds(sock, [header], list(descriptors))
-            sock.sendall(payload)
-        else:
-            sock.sendall(header + payload)
+            socket.send_fds(sock, [b"\0"], list(descriptors))
     except OSError as error:
         if isinstance(error, TimeoutError):
             raise
@@ -69,12 +65,10 @@ def receive_request(sock: socket.socket) -> tuple[int, bytes, list[int]]:
         Closed: when the other end is gone.
     """
     try:
-        header, descriptors, _, _ = socket.recv_fds(sock, _REQUEST.size, _MOST_DESCRIPTORS)
-        if not header:
-            raise Closed
-        header += _exactly(sock, _REQUEST.size - len(header))
-        kind, length = _REQUEST.unpack(header)
-        return kind, _exactly(sock, length), descriptors
+        kind, count, length = _REQUEST.unpack(_exactly(sock, _REQUEST.size))
+        payload = _exactly(sock, length)
+        descriptors = socket.recv_fds(sock, 1, count)[1] if count else []
+        return kind, payload, descriptors
     except ConnectionError as error:
         raise Closed from error
 
@@ -101,19 +95,6 @@ def receive_reply(sock: socket.socket, limit: float | None) -> Reply:
         return Reply(_STATUSES[status], text, time, bool(more), bool(leaving))
     except ConnectionError as error:
         raise Closed from error
-
-
-def is_closed(sock: socket.socket) -> bool:
-    """Whether the other end is gone; does not wait."""
-    sock.settimeout(0.0)
-    try:
-        return not sock.recv(1, socket.MSG_PEEK)
-    except BlockingIOError:
-        return False
-    except ConnectionError:
-        return True
-    finally:
-        sock.settimeout(None)
 
 
 def close_all(descriptors: list[int]) -> None:

@@ -1,5 +1,7 @@
 """Co-simulation: the FMU brings its own solver and is told when to stop and what its inputs are."""
 
+import time
+
 import numpy as np
 
 from falsifier.fmu.description import Description
@@ -9,7 +11,8 @@ from falsifier.fmu.room import Room
 from falsifier.fmu.stepper import Stepper
 from falsifier.model import Variable
 
-_STEPS_PER_CLOCK_LOOK = 1000
+# Steps before the first look at the clock; looks become rarer while they come in quick succession.
+_FIRST_CHUNK, _CHUNK_GROWTH, _QUICK_SECONDS = 1000, 16, 0.01
 
 
 class CoSimulation(Stepper):
@@ -33,24 +36,29 @@ class CoSimulation(Stepper):
         self._read_first()
         step = plan.stop_time / plan.steps
         pieces, held_pieces = self._pieces(self._other_rows), self._pieces(self._held_rows)
-        current, values = np.zeros(len(plan.inputs), dtype=np.int64), np.zeros(len(plan.inputs))
+        # Where the loop keeps the current piece (int64) and the last value of each input.
+        memory = np.zeros(2 * len(plan.inputs))
         inputs = (
             self._inputs.table,
             (pieces.ctypes.data, plan.pieces),
             self._held_inputs.table,
-            (held_pieces.ctypes.data, plan.pieces),
-            current.ctypes.data,
-            values.ctypes.data,
+            (held_pieces.ctypes.data if held_pieces.size else 0, plan.pieces),
+            memory.ctypes.data,
+            memory.ctypes.data + 8 * len(plan.inputs),
         )
-        outputs = (self._outputs.table, self._room.outputs.ctypes.data, plan.samples)
-        for first in range(0, plan.steps, _STEPS_PER_CLOCK_LOOK):
-            last = min(first + _STEPS_PER_CLOCK_LOOK, plan.steps)
-            loops.co_simulate(functions, *inputs, *outputs, step, first, last, plan.every, report)
+        first, chunk = 0, _FIRST_CHUNK
+        while first < plan.steps:
+            started = time.perf_counter()
+            last = min(first + chunk, plan.steps)
+            loops.co_simulate(functions, *inputs, *self._record, step, first, last, plan.every, report)
             status, where, done = report.tolist()
             if done == plan.steps and where in (loops.DONE, loops.TERMINATED):
                 return
             self._check(status, where, done * step)
             self._watch_clock(deadline, done * step)
+            first = last
+            if time.perf_counter() - started < _QUICK_SECONDS:
+                chunk *= _CHUNK_GROWTH
 
     def _is_held(self, variable: Variable) -> bool:
         return self._in_event_mode and variable.variability != "continuous"

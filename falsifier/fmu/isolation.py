@@ -31,7 +31,6 @@ from falsifier.fmu import nursery
 from falsifier.fmu.channel import (
     Closed,
     Reply,
-    is_closed,
     receive_reply,
     send_request,
 )
@@ -197,7 +196,7 @@ class IsolatedFmu:
             worker = self._worker_for(plan)
             try:
                 fill(worker.room)
-                send_request(worker.sock, RUN)
+                worker = self._started(worker, plan, fill)
                 reply = receive_reply(worker.sock, plan.time_limit + _GRACE_SECONDS)
             except TimeoutError:
                 raise self._end(
@@ -234,9 +233,18 @@ class IsolatedFmu:
             self._worker.sock.close()
             self._worker = None
 
-    def _worker_for(self, plan: Plan) -> _Worker:
-        if self._worker is not None and is_closed(self._worker.sock):
+    def _started(self, worker: _Worker, plan: Plan, fill: Callable[[Room], None]) -> _Worker:
+        """Have the simulation begin, in a new worker where this one has died since the last one."""
+        try:
+            send_request(worker.sock, RUN)
+        except Closed:
             self._drop()
+            worker = self._worker_for(plan)
+            fill(worker.room)
+            send_request(worker.sock, RUN)
+        return worker
+
+    def _worker_for(self, plan: Plan) -> _Worker:
         if self._worker is not None and self._worker.awaits_test:
             self._await_test(self._worker, plan)
         worker = self._worker

@@ -124,7 +124,8 @@ def co_simulate(
             status, where = _event_3(functions, held_ports)
             if where != DONE:
                 break
-        kept[:] = new
+        for j, value in enumerate(new):
+            kept[j] = value
         status, where, ends = _advance(functions, k * step, (k + 1) * step, step)
         if where != DONE:
             break

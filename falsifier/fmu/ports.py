@@ -15,7 +15,7 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description import Description, Slot
 
 Table = NDArray[np.int64]
-# What the loops get of Ports: integers, because compiled code counts references to every array that it touches.
+# What the loops get of Ports: integers, because compiled code counts references to every array it touches.
 Addresses = tuple[int, int, int, int]
 
 # How a value lies in memory: the position is the code that the compiled loops switch on.
@@ -46,17 +46,16 @@ class Ports:
             1 for a Boolean.
         limits: smallest and largest number that fits, shape (n, 2); infinite for floating point.
         memory: the arrays that the addresses point into.
+        table: what the loops get: address and number of the calls, address and number of the places.
+        is_limited: whether any of the variables has limits.
     """
 
     calls: Table
     places: Table
     limits: NDArray[np.float64]
     memory: tuple[NDArray[np.generic], ...]
-
-    @property
-    def table(self) -> Addresses:
-        """Address and number of the calls, address and number of the places."""
-        return (self.calls.ctypes.data, len(self.calls), self.places.ctypes.data, len(self.places))
+    table: Addresses
+    is_limited: bool
 
 
 def make_ports(description: Description, names: Sequence[str], addresses: Mapping[str, int]) -> Ports:
@@ -98,7 +97,15 @@ def make_ports(description: Description, names: Sequence[str], addresses: Mappin
                 if not stored.startswith("f"):
                     kind = np.iinfo(stored)
                     limits[row] = (0, 1) if code == "Boolean" else (kind.min, kind.max)
-    return Ports(np.array(calls, dtype=np.int64).reshape(-1, 5), places, limits, tuple(memory))
+    rows = np.array(calls, dtype=np.int64).reshape(-1, 5)
+    return Ports(
+        calls=rows,
+        places=places,
+        limits=limits,
+        memory=tuple(memory),
+        table=(rows.ctypes.data, len(rows), places.ctypes.data, len(places)),
+        is_limited=bool(np.isfinite(limits).any()),
+    )
 
 
 def _sizes(slots: Sequence[Slot]) -> dict[int, int]:

@@ -64,7 +64,8 @@ class FmuModel:
         task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (most - 1).bit_length())
 
         def fill(room: Room) -> None:
-            room.parameters[:] = list(parameters.values())
+            if parameters:
+                room.parameters[:] = list(parameters.values())
             for row, table in zip(room.inputs, tables, strict=True):
                 row[: table.size] = table.ravel()
                 row[table.size :] = np.inf

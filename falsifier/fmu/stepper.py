@@ -34,6 +34,8 @@ class Stepper(ABC):
         setters = library.setters()
         self._parameters = make_ports(description, plan.parameters, setters)
         self._outputs = make_ports(description, plan.outputs, library.getters())
+        # What is recorded, where to, and how far apart the rows lie.
+        self._record = (self._outputs.table, room.outputs.ctypes.data, plan.samples)
         kinds = {v.name: v for v in description.info.variables}
         held = np.array([self._is_held(kinds[name]) for name in plan.inputs], dtype=bool)
         self._held_rows, self._other_rows = np.flatnonzero(held), np.flatnonzero(~held)
@@ -42,19 +44,22 @@ class Stepper(ABC):
 
     def set_parameters(self) -> None:
         """Set the plan's parameters and start values."""
-        names, values = self._plan.parameters, self._room.parameters
-        check_range(self._name, names, self._parameters, values[:, np.newaxis])
+        values = self._room.parameters
+        if self._parameters.is_limited:
+            check_range(self._name, self._plan.parameters, self._parameters, values[:, np.newaxis])
         self._write(self._parameters, values, "parameters")
 
     def set_first_inputs(self) -> None:
         """Set the inputs at time 0."""
         for ports, rows in ((self._inputs, self._other_rows), (self._held_inputs, self._held_rows)):
-            if len(rows):
+            if not len(rows):
+                continue
+            pieces = self._pieces(rows)
+            if ports.is_limited:
                 # Interpolation never leaves the range of the values at the ends of the pieces.
-                pieces = self._pieces(rows)
                 values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
                 check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
-                self._write(ports, np.ascontiguousarray(values[:, 0]), "inputs")
+            self._write(ports, pieces[:, 0, 1].copy(), "inputs")
 
     def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """Pieces of some inputs, shape (rows, pieces, 5), one behind the other in memory."""
@@ -79,14 +84,8 @@ class Stepper(ABC):
 
     def _read_first(self) -> None:
         """Record the outputs at time 0."""
-        status = self._loops.read_row(
-            self._library.component,
-            self._library.description.major,
-            self._outputs.table,
-            self._room.outputs.ctypes.data,
-            self._plan.samples,
-            0,
-        )
+        version = self._library.description.major
+        status = self._loops.read_row(self._library.component, version, *self._record, 0)
         self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
 
     def _write(self, ports: Ports, numbers: NDArray[np.float64], what: str) -> None:

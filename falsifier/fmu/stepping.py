@@ -4,9 +4,9 @@ numba compiles the loops; small intrinsics emit calls of C functions whose addre
 that the machine code is cached on disk and serves every FMU. Intrinsics and loops share this file because
 numba's cache notices changes of the file of the cached function only.
 
-Functions, tables and memory are passed as integer addresses, not as arrays: compiled code counts references to
-every array that it touches, which here costs more than the rest of the loop. Every loop returns after a bounded
-number of steps, so that its caller can look at the clock.
+Functions, tables and memory are passed as integer addresses, not as arrays: compiled code counts references
+to every array that it touches, which here costs more than the rest of the loop. Every loop returns after a
+bounded number of steps, so that its caller can look at the clock.
 """
 
 from typing import Any
@@ -127,9 +127,11 @@ _load_i8, _store_i8 = _typed(types.int64, ir.IntType(64))
 _load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
+# For what is called in every step: a call passes every address by itself.
+_inlined = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
-@compiled
+@_inlined
 def fetch(place):  # type: ignore[no-untyped-def]
     """A variable as a number, from where its call left it; see PLACE_BYTES."""
     kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
@@ -159,7 +161,7 @@ def fetch(place):  # type: ignore[no-untyped-def]
     return value * sign
 
 
-@compiled
+@_inlined
 def put(place, number):  # type: ignore[no-untyped-def]
     """A number to where the call that sets a variable takes it; anything but floating point is rounded."""
     kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
@@ -189,7 +191,7 @@ def put(place, number):  # type: ignore[no-untyped-def]
         _store_u8(address, np.uint64(np.rint(value)))
 
 
-@compiled
+@_inlined
 def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
     """Make the get or set calls of a table (Ports.table); the first status above warning ends it."""
     worst = 0
@@ -207,7 +209,7 @@ def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
     return worst
 
 
-@compiled
+@_inlined
 def read_row(instance, version, ports, rows, width, column):  # type: ignore[no-untyped-def]
     """Read all variables of a table into one column of float64 rows of this width at this address."""
     status = exchange_values(instance, version, ports)
@@ -225,19 +227,19 @@ def write_row(instance, version, ports, numbers):  # type: ignore[no-untyped-def
     return exchange_values(instance, version, ports)
 
 
-@compiled
+@_inlined
 def rounding(time):  # type: ignore[no-untyped-def]
     """Times closer than this are one time; s."""
     return 1e-11 * max(1.0, abs(time))
 
 
-@compiled
+@_inlined
 def start_of(pieces, j, p):  # type: ignore[no-untyped-def]
     """Start in s of piece p of input j; inf behind the last one."""
     return _load_f8(pieces[0] + PIECE_BYTES * (j * pieces[1] + p)) if p < pieces[1] else np.inf
 
 
-@compiled
+@_inlined
 def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
     """Input j at a time within (or at the end of) its piece p; ``pieces`` is address and number per input."""
     at = pieces[0] + PIECE_BYTES * (j * pieces[1] + p)
@@ -245,7 +247,7 @@ def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
     return ((_load_f8(at + 32) * dt + _load_f8(at + 24)) * dt + _load_f8(at + 16)) * dt + _load_f8(at + 8)
 
 
-@compiled
+@_inlined
 def _put_inputs(ports, pieces, current, values, time):  # type: ignore[no-untyped-def]
     """Put all inputs of a table at a time into its buffers; whether any differs from before.
 
@@ -391,7 +393,7 @@ def co_simulate(  # type: ignore[no-untyped-def]
     memory[0] = 0
 
 
-@compiled
+@_inlined
 def _set_inputs(  # type: ignore[no-untyped-def]
     functions, ports, pieces, held_ports, held_pieces, current, values, time, is_initialised, scratch
 ):  # fmt: skip
