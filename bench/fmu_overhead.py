@@ -3,9 +3,10 @@
 ``python -m bench.fmu_overhead [--rounds N] [--out bench/fmu_overhead.md]``
 
 Interleaved, one simulation of each kind in turn: fmpy.simulate_fmu, FmuModel in this process, FmuModel in its
-worker, and a C program that makes the same calls (bench/fmu_loop.c, needs a C compiler). The FMUs' own work is
-next to nothing (tests/fixtures/fmus, Cheap*); where they have an input it varies in time, with 7 control points
-that are new for each simulation. Then 3000 simulations in a row, a crash, and a hang.
+worker, and a C program that makes the same calls (bench/fmu_loop.c, needs a C compiler). The FMUs do one
+Runge-Kutta step of one or two states per communication step (tests/fixtures/fmus, Cheap*); where they have an
+input it varies in time, with 7 control points that are new for each simulation. Then 3000 simulations in a
+row, a crash, and a hang.
 """
 
 import argparse
@@ -191,8 +192,8 @@ def report(rounds: int) -> str:
         "# What a simulation costs beyond the FMU",
         "",
         f"`python -m bench.fmu_overhead --rounds {rounds}`; {platform.machine()}, {os.cpu_count()} cores, "
-        f"load {load:.1f} before the start, Python {platform.python_version()}. Microseconds: minimum (median) "
-        "of interleaved rounds; ratios: of minima (median of the rounds' ratios, of the medians for fmpy).",
+        f"load {load:.1f} before the start, Python {platform.python_version()}. Microseconds: minimum "
+        "(median) of interleaved rounds; ratios: of minima (median of the ratios, for fmpy of medians).",
         "",
         "| FMU, steps | C program | in process | in a worker | fmpy.simulate_fmu | fmpy / in process "
         "| in process / C | worker - process |",
@@ -215,14 +216,14 @@ def report(rounds: int) -> str:
     crash, hang = failure(1, 60.0), failure(2, 0.2)
     lines += [
         "",
-        "3000 simulations in a row in a worker (after 300): KiB of resident memory, open files of the parent.",
+        "3000 simulations in a row in a worker: KiB of resident memory and open files, before -> after.",
         "",
         "| FMU | parent | worker | open files |",
         "|---|---|---|---|",
         endurance(3000),
         "",
-        f"A segmentation fault is reported after {crash[0]:.1f} ms, and the next simulation done {crash[1]:.1f} ms "
-        f"later; an endless loop with a limit of 200 ms after {hang[0]:.0f} ms and {hang[1]:.1f} ms. Medians of 20.",
+        f"A segmentation fault is reported after {crash[0]:.1f} ms; the next simulation takes {crash[1]:.1f} "
+        f"ms. An endless loop with a limit of 200 ms: {hang[0]:.0f} ms and {hang[1]:.1f} ms. Medians of 20.",
         "",
     ]
     return "\n".join(lines)
