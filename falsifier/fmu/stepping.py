@@ -304,7 +304,7 @@ def _event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
     return status, EVENT if status > 1 else DONE
 
 
-@compiled
+@_inlined
 def _advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
     """One communication step of FMI 3, in several calls where the FMU returns early.
 
