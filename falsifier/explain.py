@@ -30,6 +30,7 @@ class Effect:
         span: begin and end in s of what was put back; None for a parameter or a whole signal.
         instead: the value that it was put back to.
         is_rest: whether that is the value at rest; otherwise it is the middle of the range.
+        was_rest: whether the part was at rest in the counterexample.
         robustness: then; None when the simulation failed.
     """
 
@@ -37,6 +38,7 @@ class Effect:
     span: tuple[float, float] | None
     instead: float
     is_rest: bool
+    was_rest: bool
     robustness: float | None
 
     @property
@@ -91,7 +93,8 @@ class Explanation:
             yield f"Without {_listed(failed)} the simulation fails."
 
     def _part(self, effect: Effect) -> str:
-        return f"{effect.name} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
+        name = f"{effect.name} at rest" if effect.was_rest else effect.name
+        return f"{name} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
 
     def _without(self, effect: Effect) -> str:
         return f"{effect.name} ({self._instead(effect)} it is still {effect.robustness:+.4g})"
@@ -102,8 +105,8 @@ class Explanation:
 
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
-        meaning = "its rest value" if effect.is_rest else "the middle of its range"
-        return f"at {effect.instead:.4g}{f' {unit}' if unit else ''}, {meaning},"
+        number = f"{effect.instead:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
+        return f"at {number}, {'its rest value' if effect.is_rest else 'the middle of its range'},"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
@@ -121,34 +124,44 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
 
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
     for r in problem.space.inputs:
-        signal = candidate.signals[r.name]
-        value, is_rest = _put_back_to(problem, r, signal.values)
-        whole = with_signal(candidate, r.name, constant_signal(problem, r, value))
-        yield Effect(r.name, None, value, is_rest, _robustness(problem, whole))
+        nominal = _nominal(problem, r, candidate.signals[r.name].values)
+        changed = with_signal(candidate, r.name, constant_signal(problem, r, nominal.value))
+        yield nominal.effect(None, _robustness(problem, changed))
     for p in problem.space.parameters:
-        value, is_rest = _put_back_to(problem, p, (candidate.parameters[p.name],))
-        changed = replace(candidate, parameters={**candidate.parameters, p.name: value})
-        yield Effect(p.name, None, value, is_rest, _robustness(problem, changed))
+        nominal = _nominal(problem, p, (candidate.parameters[p.name],))
+        changed = replace(candidate, parameters={**candidate.parameters, p.name: nominal.value})
+        yield nominal.effect(None, _robustness(problem, changed))
     for r in problem.space.inputs:
         signal = candidate.signals[r.name]
-        value, is_rest = _put_back_to(problem, r, signal.values)
+        nominal = _nominal(problem, r, signal.values)
         for first, end in _longest(signal):
-            values = (*signal.values[:first], *(value,) * (end - first), *signal.values[end:])
-            if values == signal.values:
-                continue
-            changed = with_signal(candidate, r.name, replace(signal, values=values))
-            span = _span(signal, first, end, problem.space.stop_time)
-            yield Effect(r.name, span, value, is_rest, _robustness(problem, changed))
+            values = (*signal.values[:first], *(nominal.value,) * (end - first), *signal.values[end:])
+            if values != signal.values:
+                changed = with_signal(candidate, r.name, replace(signal, values=values))
+                span = _span(signal, first, end, problem.space.stop_time)
+                yield nominal.effect(span, _robustness(problem, changed))
 
 
-def _put_back_to(
-    problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]
-) -> tuple[float, bool]:
-    """Rest value and True; the middle of the range and False where it rests already or rest is unknown."""
+@dataclass(frozen=True, slots=True)
+class _Nominal:
+    """What an input or parameter is put back to."""
+
+    name: str
+    value: float
+    is_rest: bool
+    was_rest: bool
+
+    def effect(self, span: tuple[float, float] | None, robustness: float | None) -> Effect:
+        return Effect(self.name, span, self.value, self.is_rest, self.was_rest, robustness)
+
+
+def _nominal(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]) -> _Nominal:
+    """Rest, or the middle of the range where rest is unknown or everything is at rest already."""
     rest = rest_value(problem, ranged.name)
-    if rest is not None and any(v != rest for v in values):
-        return rest, True
-    return (ranged.low + ranged.high) / 2, False
+    was_rest = rest is not None and all(v == rest for v in values)
+    if rest is not None and not was_rest:
+        return _Nominal(ranged.name, rest, is_rest=True, was_rest=False)
+    return _Nominal(ranged.name, (ranged.low + ranged.high) / 2, is_rest=False, was_rest=was_rest)
 
 
 def _longest(signal: Signal) -> list[tuple[int, int]]:

@@ -17,6 +17,7 @@ _COMMANDS = {
     "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),
     "explain": ("falsifier.cli.counterexample", "Say why a counterexample violates and what it takes."),
     "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
+    "robustness-map": ("falsifier.cli.counterexample", "Show how far a violation reaches around it."),
     "bench": ("falsifier.cli.campaign", "Run requirements x engines x seeds; print the protocol's table."),
     "watch": ("falsifier.cli.campaign", "Follow a running campaign from another shell."),
     "report": ("falsifier.cli.report", "Write a page, tables or JUnit results of a run or campaign."),
@@ -39,7 +40,7 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        command: click.Command = getattr(import_module(_COMMANDS[cmd_name][0]), cmd_name)
+        command: click.Command = getattr(import_module(_COMMANDS[cmd_name][0]), cmd_name.replace("-", "_"))
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -1,4 +1,4 @@
-"""``falsifier replay``, ``shrink``, ``explain`` and ``export``: what is done with a counterexample."""
+"""What is done with a counterexample: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``."""
 
 import json
 import sys
@@ -159,6 +159,47 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
         written.append(Database(store).save(problem, stored))
     for path in written:
         click.echo(str(path))
+
+
+@click.command("robustness-map")
+@_run_argument
+@click.option(
+    "--radius", type=float, default=0.05, show_default=True, help="Largest change, share of a range."
+)
+@click.option("--samples", type=int, default=256, show_default=True, help="Simulations of random changes.")
+@click.option("--grid", type=int, default=21, show_default=True, help="Points a side of the map.")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Picture; default: robustness-map.png beside RUN's."
+)
+@json_option
+def robustness_map(
+    *, run: Path, radius: float, samples: int, grid: int, seed: int, out: Path | None, as_json: bool
+) -> None:
+    """Sample around a counterexample and draw where the violation persists.
+
+    RUN is a run directory or a counterexample file.
+    """
+    from falsifier.neighbourhood import sample_neighbourhood
+    from falsifier.plotting import plot_neighbourhood, save_figure
+
+    stored = load(run)
+    picture = out or counterexample_file(run).with_name("robustness-map.png")
+    with _problem(stored) as problem:
+        found = sample_neighbourhood(
+            problem, _simulated(stored, problem), radius=radius, samples=samples, points=grid, seed=seed
+        )
+    save_figure(plot_neighbourhood(found, problem.name), picture)
+    if as_json:
+        content = {
+            "persistence": [{"size": size, "share": share} for size, share in found.persistence],
+            "deciding": [found.coordinates[i].label for i in found.axes],
+            "picture": str(picture),
+        }
+        click.echo(json.dumps(content, indent=2))
+        return
+    click.echo(f"{problem.name}: {found.text}")
+    click.echo(f"  picture        {picture}")
 
 
 @contextmanager

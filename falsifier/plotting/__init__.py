@@ -6,5 +6,14 @@ nothing here needs a display.
 
 from falsifier.plotting.campaign import plot_comparison, plot_history, plot_rates
 from falsifier.plotting.evaluation import plot_evaluation, plot_panel, save_figure
+from falsifier.plotting.neighbourhood import plot_neighbourhood
 
-__all__ = ["plot_comparison", "plot_evaluation", "plot_history", "plot_panel", "plot_rates", "save_figure"]
+__all__ = [
+    "plot_comparison",
+    "plot_evaluation",
+    "plot_history",
+    "plot_neighbourhood",
+    "plot_panel",
+    "plot_rates",
+    "save_figure",
+]

@@ -75,6 +75,17 @@ def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
     assert run(folder, "replay", "exported").code == 1
 
 
+def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> None:
+    done = run(folder, "robustness-map", "run", "--samples", "16", "--grid", "3", "--json")
+    assert done.code == 0, done.err
+    shares = [p["share"] for p in done.json["persistence"]]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] == 1.0
+    assert shares[-1] < 1.0
+    assert done.json["deciding"] == ["throttle [%]", "brake [ft.lbf]"]
+    assert (folder / done.json["picture"]).read_bytes().startswith(b"\x89PNG")
+
+
 def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "AT.fmu")
     spec = (bundled("specs") / "AT.toml").read_text().replace("../fmus/", "")
