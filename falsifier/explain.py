@@ -7,7 +7,11 @@ simulated again.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from falsifier.display import candidate_lines
 from falsifier.errors import CandidateError
 from falsifier.evaluation import Evaluation, evaluate, monitor_for
 from falsifier.problem import Problem
@@ -17,6 +21,16 @@ from falsifier.simplicity import rest_value
 from falsifier.space import Candidate, InputRange, ParameterRange
 from falsifier.stl import Diagnosis, in_words
 
+if TYPE_CHECKING:
+    from falsifier.llm.messages import Chat
+
+_NARRATOR = (
+    "You explain to a control engineer why a simulated system violates a requirement. Tell in one short "
+    "paragraph of plain text what happens over time and which inputs bring it about. Use only what you are "
+    "given; say what you merely suppose."
+)
+# Rows of the trajectory that a language model is shown, beside the critical one.
+_ROWS = 21
 # Stretches of one signal that are put back one by one; the longest are taken.
 _MOST_STRETCHES = 12
 
@@ -120,6 +134,56 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
     effects = tuple(_effects(problem, evaluation.candidate))
     return Explanation(problem, evaluation, diagnosis, effects)
+
+
+def narrate(explanation: Explanation, chat: "Chat") -> str:
+    """Have a language model tell an engineer what happens, from the findings and the trajectory alone.
+
+    Raises:
+        ChatError: when the model gives no answer.
+    """
+    from falsifier.llm.conversation import converse
+    from falsifier.llm.messages import ChatRequest, Message
+
+    messages = (
+        Message(role="system", content=_NARRATOR),
+        Message(role="user", content=_findings(explanation)),
+    )
+    return converse(chat, ChatRequest(messages=messages), str.strip, lambda exchange: None)
+
+
+def _findings(explanation: Explanation) -> str:
+    """What the language model is told: system, findings, inputs and a few rows of the trajectory."""
+    problem, evaluation = explanation.problem, explanation.evaluation
+    trajectory = evaluation.trajectory
+    assert trajectory is not None
+    described = [
+        f"- {v.name}{f' [{v.unit}]' if v.unit else ''}: {v.description or v.causality}"
+        for v in problem.info.variables
+        if v.name in trajectory.names or v.name in evaluation.candidate.parameters
+    ]
+    last = len(trajectory) - 1
+    samples = sorted(
+        {*np.linspace(0, last, _ROWS).astype(int), trajectory.index(explanation.diagnosis.critical_time)}
+    )
+    rows = [
+        ", ".join(f"{x:.5g}" for x in (trajectory.times[k], *(trajectory[n][k] for n in trajectory.names)))
+        for k in samples
+    ]
+    return "\n".join(
+        [
+            f"System: {problem.info.description or problem.info.name}",
+            "Signals:",
+            *described,
+            f"Formula: {problem.requirement.formula}",
+            f"Findings: {explanation.text}",
+            "Inputs:",
+            *(f"- {line}" for line in candidate_lines(problem, evaluation.candidate)),
+            "Trajectory:",
+            ", ".join(("time", *trajectory.names)),
+            *rows,
+        ]
+    )
 
 
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:

@@ -3,7 +3,8 @@ from collections.abc import Mapping
 import pytest
 
 from falsifier.evaluation import evaluate
-from falsifier.explain import explain
+from falsifier.explain import explain, narrate
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.signals import Signal
 from falsifier.space import Candidate, Freedom, ParameterRange
 from tests.problems import Array, broken, lag_problem
@@ -61,3 +62,20 @@ def test_a_failed_simulation_cannot_be_explained() -> None:
     problem = lag_problem(function=broken)
     with pytest.raises(ValueError, match="failed"):
         explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
+
+
+def test_a_language_model_is_given_the_findings_and_its_words_are_returned() -> None:
+    problem = lag_problem()
+    explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
+    chat = ScriptedChat(["", "The drive stays at its upper end.\n"])
+    assert narrate(explanation, chat) == "The drive stays at its upper end."
+    told = chat.requests[0].messages[-1].content
+    for part in (
+        "A first-order lag.",
+        "- u [V]: drive",
+        explanation.text,
+        "u [V] constant 1",
+        "\n10, 0.99997, 1\n",
+    ):
+        assert part in f"{told}\n"
+    assert len(told.splitlines()) < 50

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -108,32 +108,38 @@ def shrink(
 
 @click.command()
 @_run_argument
+@click.option("--model", metavar="NAME", help="Language model that tells it in its own words, too.")
+@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
+@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
 @json_option
-def explain(*, run: Path, as_json: bool) -> None:
+def explain(*, run: Path, model: str | None, effort: str | None, api_base: str | None, as_json: bool) -> None:
     """Say in a paragraph why a counterexample violates and which inputs it takes.
 
     RUN is a run directory or a counterexample file.
     """
     from falsifier.explain import explain as explain_violation
+    from falsifier.explain import narrate
 
+    if model is None and (effort is not None or api_base is not None):
+        raise click.UsageError("--effort and --api-base need --model NAME")
+    chat = None
+    if model is not None:
+        from falsifier.llm.connect import connect
+
+        chat = connect(model, effort=effort, api_base=api_base)
     stored = load(run)
     with _problem(stored) as problem:
         explanation = explain_violation(problem, _simulated(stored, problem))
-    if not as_json:
-        click.echo(explanation.text)
+    words = narrate(explanation, chat) if chat else None
+    if as_json:
+        effects = [{**asdict(e), "needed": e.needed} for e in explanation.effects]
+        told = {"model": model, "words": words} if words else None
+        content = {"text": explanation.text, "effects": effects, "told_by": told}
+        click.echo(json.dumps(content, indent=2))
         return
-    effects = [
-        {
-            "name": e.name,
-            "span": e.span,
-            "instead": e.instead,
-            "at_rest": e.is_rest,
-            "robustness": e.robustness,
-            "needed": e.needed,
-        }
-        for e in explanation.effects
-    ]
-    click.echo(json.dumps({"text": explanation.text, "effects": effects}, indent=2))
+    click.echo(explanation.text)
+    if words is not None:
+        click.echo(f"\nIn the words of {model}, which may be wrong:\n{words}")
 
 
 @click.command()

@@ -10,6 +10,7 @@ import pytest
 from falsifier.cli import main
 from falsifier.problem import bundled
 from tests.command import Done
+from tests.llm.server import Step, serving
 
 
 def run(folder: Path, *arguments: str) -> Done:
@@ -64,6 +65,15 @@ def test_explain_names_what_it_takes(folder: Path) -> None:
     assert {e["name"]: e["needed"] for e in effects} == {"throttle": True, "brake": True}
 
 
+def test_a_language_models_words_are_marked_as_its_own(folder: Path) -> None:
+    with serving(Step(content="Full throttle for 20 s.")) as server:
+        done = run(folder, "explain", "run", "--model", "openai/any", "--api-base", server.url)
+    assert done.code == 0, done.err
+    assert "It takes throttle" in done.out
+    assert done.out.endswith("In the words of openai/any, which may be wrong:\nFull throttle for 20 s.\n")
+    assert "It takes throttle" in server.received[0].texts[-1]
+
+
 def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
     done = run(folder, "export", "run", "--out", "exported")
     assert done.code == 0, done.err
@@ -82,7 +92,7 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
     assert shares == sorted(shares, reverse=True)
     assert shares[0] == 1.0
     assert shares[-1] < 1.0
-    assert done.json["deciding"] == ["throttle [%]", "brake [ft.lbf]"]
+    assert set(done.json["deciding"]) == {"throttle [%]", "brake [ft.lbf]"}
     assert (folder / done.json["picture"]).read_bytes().startswith(b"\x89PNG")
 
 
