@@ -179,10 +179,10 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
         f"  requirement    {problem.requirement.formula}",
         f"  confirmed      {found.reason}",
         *(f"  {line}" for line in candidate_lines(problem, found.evaluation.candidate)),
-        f"  picture        {picture}",
+        f"  picture        {_short(picture)}",
     ]
     if checked.file is not None:
-        lines.append(f"  stored         {checked.file}")
+        lines.append(f"  stored         {_short(checked.file)}")
         lines.append(f"  again          {_command(item, checked)}")
     return "\n".join([*lines, "", explain(problem, found.evaluation).text])
 
@@ -193,4 +193,10 @@ def _command(item: pytest.Item, checked: "Checked") -> str:
 
     assert checked.file is not None
     loadable = load(checked.file).problem is not None
-    return f"falsifier replay {checked.file}" if loadable else f"pytest '{item.nodeid}'"
+    return f"falsifier replay {_short(checked.file)}" if loadable else f"pytest '{item.nodeid}'"
+
+
+def _short(path: Path) -> Path:
+    """Return the path as seen from the working directory, where it lies below."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path

@@ -64,17 +64,17 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
         "throttle [%] constant 100",
         "brake [ft.lbf] constant 0",
         "It takes throttle",
-        "again          falsifier replay",
+        "again          falsifier replay counterexamples/car.fast/",
     ):
         assert part in first.stdout
     pictures = [line.split()[-1] for line in first.stdout.splitlines() if line.startswith("  picture ")]
-    assert Path(pictures[0]).read_bytes().startswith(b"\x89PNG")
+    assert (repository / pictures[0]).read_bytes().startswith(b"\x89PNG")
     stored = list((repository / "counterexamples").rglob("*.json"))
     assert [p.parent.name for p in stored] == ["car.fast"]
     assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
     second = run_pytest(repository, "--falsifier", "specs", "-k", "fast")
     assert "fast is violated: a stored counterexample violates it" in second.stdout
-    assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier").returncode == 5
+    assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").returncode == 5
 
 
 def test_distributed_tests_give_the_same(repository: Path) -> None:
