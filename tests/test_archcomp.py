@@ -67,7 +67,7 @@ def test_coarse_inputs_are_piecewise_constant_and_dense_ones_are_as_given(tmp_pa
     # One second of full input, then the opposite: x(1) = 1 - 0.9**10; the dense one falls from 0.5 s on.
     assert first.robustness == pytest.approx(0.6 - (1 - 0.9**10))
     assert second.robustness is not None
-    assert 0.6 > second.robustness > 0  # type: ignore[operator]
+    assert 0.6 > second.robustness > 0
     assert second.robustness != first.robustness
 
 

@@ -16,6 +16,7 @@ from falsifier.model import ModelInfo, Variable
 from falsifier.problem import Problem, bundled, load_problems
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
     from rich.table import Table
 
 # Rows of a table of parameters or states; models have thousands of them.
@@ -85,9 +86,8 @@ def _schema(what: str) -> dict[str, Any]:
     from falsifier.manifest import Manifest
     from falsifier.spec import Spec
 
-    if what == "journal":
-        return RECORDS.json_schema()
-    return {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}[what].model_json_schema()
+    models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
+    return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
 
 
 def _existing_fmu(fmu: Path) -> Path:

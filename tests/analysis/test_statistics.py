@@ -44,7 +44,7 @@ def test_statistics_are_over_the_falsified_runs(campaign: Path) -> None:
 def test_without_a_falsified_run_there_is_no_mean(campaign: Path) -> None:
     found = statistics(run for run in load(campaign) if run.requirement == "NEVER")
     assert (found.runs, found.falsified) == (4, 0)
-    assert found.mean is found.median is found.deviation is found.mean_interval is None
+    assert (found.mean, found.median, found.deviation, found.mean_interval) == (None, None, None, None)
     assert found.rate_interval is not None
     assert found.rate_interval[0] == 0
 

@@ -97,6 +97,11 @@ def test_a_missing_file_is_sent_once_it_is_asked_for(tmp_path: Path, monkeypatch
     assert sent == [{}, {"digest": b"content"}]
 
 
+def _finish(future: "Future[Done]") -> None:
+    if not future.done():
+        future.set_result(Done("not falsified", ""))
+
+
 class Mortal(Executor):
     """Breaks like a process pool when it is given the deadly run: everything in it is lost."""
 
@@ -118,9 +123,7 @@ class Mortal(Executor):
         elif len(self.pending) > 2 or task.name.startswith("last"):
             future.set_result(Done("not falsified", ""))
         else:
-            threading.Timer(
-                0.02, lambda: future.done() or future.set_result(Done("not falsified", ""))
-            ).start()
+            threading.Timer(0.02, _finish, [future]).start()
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
