@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from falsifier.budget import Spent
 from falsifier.campaign.directory import run_directories
 from falsifier.campaign.plan import Method, method_of
-from falsifier.campaign.tally import RunStatus, Tally
+from falsifier.campaign.tally import RunStatus, read_tally
 from falsifier.errors import JournalError
 from falsifier.journal import read_manifest
 from falsifier.manifest import Manifest
@@ -105,11 +105,7 @@ def load_run(directory: Path) -> Run:
     except ValidationError as error:
         first = error.errors()[0]
         raise JournalError(f"{directory}/manifest.json: {first['loc']}: {first['msg']}") from None
-    tally = Tally()
-    path = directory / "journal.jsonl"
-    lines = path.read_bytes().split(b"\n") if path.exists() else [b""]
-    for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn or empty
-        tally.feed(line, f"{path}: line {number}")
+    tally = read_tally(directory)
     return Run(
         directory,
         manifest,

@@ -16,14 +16,15 @@ from falsifier.campaign.directory import (
     run_directory,
     write_campaign,
 )
+from falsifier.campaign.found import keep_counterexample
 from falsifier.campaign.plan import CampaignRequest
 from falsifier.campaign.progress import Follower, Progress
 from falsifier.campaign.schedule import Schedule
-from falsifier.campaign.tally import Tally
+from falsifier.campaign.tally import read_tally
 from falsifier.campaign.work import Done, Task, unpack
 from falsifier.errors import JournalError, SpecError
 from falsifier.execution import Workers, open_workers
-from falsifier.journal import EndedRecord, open_journal, read_journal, write_manifest
+from falsifier.journal import EndedRecord, open_journal, write_manifest
 from falsifier.manifest import check_unchanged, environment, file_hashes, manifest
 from falsifier.problem import Problem
 from falsifier.request import ProblemRequest, RunRequest
@@ -126,7 +127,11 @@ def _work(
     stop = directory / STOP
     stop.unlink(missing_ok=True)
     watch = _Watch(directory, record.request.limits, listeners)
-    unfinished = [run.name for run in watch.follower.look().runs if not run.finished]
+    runs = watch.follower.look().runs
+    unfinished = [run.name for run in runs if not run.finished]
+    for run in runs:  # the file of a run that ended at the very moment of a kill is missing
+        if run.status == "falsified":
+            keep_counterexample(run_directory(directory, run.name))
     mark = campaign_mark(directory)
     tasks = []
     for name in unfinished:
@@ -140,6 +145,7 @@ def _work(
             unpack(done.packed, place)
         elif done.status == "failed":
             _record_failure(place, task, done.reason)
+        keep_counterexample(place)
 
     schedule = Schedule(tasks, workers, calls=record.request.calls)
     try:
@@ -213,9 +219,7 @@ def _hashes(problems: Mapping[ProblemRequest, Problem]) -> dict[str, str]:
 
 def _record_failure(directory: Path, task: Task, reason: str) -> None:
     """Write into a run's journal how it failed, where its worker could not do so itself."""
-    tally = Tally()
-    for record in read_journal(directory):
-        tally.add(record)
+    tally = read_tally(directory)
     if tally.status not in ("waiting", "running"):
         return
     with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:

@@ -119,6 +119,20 @@ class Tally:
         )
 
 
+def read_tally(directory: Path) -> Tally:
+    """Numbers of a run directory's whole journal.
+
+    Raises:
+        JournalError: when a line other than a torn last one cannot be understood.
+    """
+    tally = Tally()
+    path = directory / "journal.jsonl"
+    lines = path.read_bytes().split(b"\n") if path.exists() else [b""]
+    for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn or empty
+        tally.feed(line, f"{path}: line {number}")
+    return tally
+
+
 def read_candidate(directory: Path, index: int) -> dict[str, Any]:
     """Candidate of an evaluation in its plain form, from the journal of a run directory.
 

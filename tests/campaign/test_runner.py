@@ -13,6 +13,7 @@ from falsifier.campaign import (
     run_campaign,
 )
 from falsifier.campaign.directory import locked, run_directory
+from falsifier.counterexamples import load, problem_of, replay
 from falsifier.engine import falsify
 from falsifier.errors import JournalError, SpecError
 from falsifier.request import ProblemRequest
@@ -145,3 +146,14 @@ def test_a_torn_last_line_is_dropped(tmp_path: Path) -> None:
     assert Follower(tmp_path / "torn").look().counts["running"] == 1
     resume_campaign(tmp_path / "torn")
     assert outcomes(tmp_path / "torn") == outcomes(tmp_path / "whole")
+
+
+def test_counterexamples_are_files_that_can_be_replayed(tmp_path: Path) -> None:
+    run_campaign(request("hard", "impossible", seeds=1), tmp_path)
+    (file,) = tmp_path.rglob("counterexample.json")
+    stored = load(file.parent)
+    assert stored.problem == ProblemRequest(target="python:tests.problems:hard", parameterization="fixed")
+    assert replay(stored, problem_of(stored)).status == "violates"
+    file.unlink()
+    resume_campaign(tmp_path)
+    assert load(file) == stored
