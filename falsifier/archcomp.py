@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.analysis import Run, load
+from falsifier.campaign.suites import bundled_target
 from falsifier.campaign.tally import read_candidate
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation import evaluate
@@ -154,7 +155,7 @@ def bundled_problem(requirement: str, instance: str, stop_time: float | None) ->
         SpecError: when there is none of that name, or the stop time is too short for the requirement.
     """
     changes = None if stop_time is None else ModelChanges(stop_time=stop_time)
-    return load_problem(requirement, profile=_PROFILES[instance], changes=changes)
+    return load_problem(bundled_target(requirement), profile=_PROFILES[instance], changes=changes)
 
 
 def tolerance(requirement: str) -> float:

@@ -23,8 +23,17 @@ def suite(name: str, *, profile: str | None = None) -> tuple[ProblemRequest, ...
     if name not in SUITES:
         raise SpecError(f"unknown suite {name!r}; {did_you_mean(name, SUITES)}")
     published = tomllib.loads((bundled("specs") / "published.toml").read_text(encoding="utf-8"))
-    names = [key for key in published["best"] if key != "source"]
-    return tuple(ProblemRequest(target=n) for n in names if profile is None or _offers(n, profile))
+    targets = [bundled_target(key) for key in published["best"] if key != "source"]
+    return tuple(ProblemRequest(target=t) for t in targets if profile is None or _offers(t, profile))
+
+
+def bundled_target(requirement: str) -> str:
+    """Target of a bundled requirement with its spec, like ``NN:NN``: ``NN`` alone would be the whole spec.
+
+    Raises:
+        SpecError: when there is none of that name.
+    """
+    return f"{find_spec(requirement)[0].stem}:{requirement}"
 
 
 def _offers(target: str, profile: str) -> bool:

@@ -17,7 +17,7 @@ from falsifier.campaign import resume_campaign as _resume
 from falsifier.campaign.suites import SUITES
 from falsifier.cli.options import json_option, quiet_option
 from falsifier.journal import write_whole
-from falsifier.problem import find_spec, load_problems
+from falsifier.problem import bundled, find_spec, load_problems
 from falsifier.request import Effort, ProblemRequest
 from falsifier.scoreboard import campaign_display, overall_line
 
@@ -186,7 +186,8 @@ def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemRequ
             continue
         path, requirement = find_spec(target)
         names = [requirement] if requirement else [p.name for p in load_problems(target, profile=profile)]
-        requests += [ProblemRequest(target=f"{path}:{name}") for name in names]
+        spec = path.stem if path.parent == bundled("specs") else path
+        requests += [ProblemRequest(target=f"{spec}:{name}") for name in names]
     return requests
 
 

@@ -65,12 +65,13 @@ def test_the_same_run_twice_is_refused() -> None:
 def test_the_suite_has_the_published_requirements() -> None:
     names = [r.target for r in suite("arch-comp")]
     assert len(names) == 21
-    assert {"AT1", "AT6abc", "NNx", "CCx", "F16", "SC"} < set(names)
+    assert {"AT:AT1", "AT:AT6abc", "NN:NN", "CC:CCx", "F16:F16", "SC:SC"} < set(names)
+    assert [r.load().name for r in suite("arch-comp")] == [name.split(":")[1] for name in names]
 
 
 def test_instance_2_leaves_out_what_has_none() -> None:
     names = [r.target for r in suite("arch-comp", profile="instance2")]
-    assert "F16" not in names
+    assert "F16:F16" not in names
     assert len(names) == 20
 
 
