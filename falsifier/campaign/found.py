@@ -5,7 +5,7 @@ from pathlib import Path
 from falsifier.campaign.tally import read_candidate, read_tally
 from falsifier.counterexamples import FILE_NAME, StoredCounterexample, save
 from falsifier.journal import read_manifest
-from falsifier.request import Manifest
+from falsifier.manifest import Manifest
 
 
 def keep_counterexample(directory: Path) -> None:
