@@ -1,6 +1,7 @@
 """What a run's journal says in numbers, line by line, as it grows."""
 
 import json
+import re
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -27,6 +28,7 @@ FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
 
 # Candidates are long and say nothing that is counted here.
 _ASKED = b'{"kind":"asked"'
+_FIRST = re.compile(rb'\{"kind":"asked","first":(\d+),')
 
 
 class Tally:
@@ -41,7 +43,6 @@ class Tally:
         counterexample: index of the confirmed violation, or None.
         unconfirmed: what was said of violations that were not confirmed.
         trajectories: file names of kept trajectories by evaluation.
-        spent: what the run has used.
     """
 
     def __init__(self) -> None:
@@ -52,8 +53,16 @@ class Tally:
         self.counterexample: int | None = None
         self.unconfirmed: dict[int, str] = {}
         self.trajectories: dict[int, str] = {}
-        self.spent = Spent()
+        self._spent = Spent()
+        self._simulation_seconds = 0.0
         self._robustness: list[float] = []
+
+    @property
+    def spent(self) -> Spent:
+        """What the run has used; wall-clock seconds are known once it has ended."""
+        return replace(
+            self._spent, simulations=len(self._robustness), simulation_seconds=self._simulation_seconds
+        )
 
     @property
     def robustness(self) -> NDArray[np.float64]:
@@ -91,7 +100,7 @@ class Tally:
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
                 usage = Exchange.model_validate(record.exchange).usage
-                self.spent = self.spent.plus_call(
+                self._spent = self._spent.plus_call(
                     prompt=usage.prompt_tokens,
                     completion=usage.completion_tokens,
                     reasoning=usage.reasoning_tokens,
@@ -100,7 +109,7 @@ class Tally:
             case EndedRecord():
                 self.status = _ended(record.status)
                 self.reason = record.reason
-                self.spent = _spent(record.spent)
+                self._spent = _spent(record.spent)
             case AskedRecord():
                 pass
 
@@ -112,11 +121,7 @@ class Tally:
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory
         self._robustness.append(value)
-        self.spent = replace(
-            self.spent,
-            simulations=len(self._robustness),
-            simulation_seconds=self.spent.simulation_seconds + record.seconds,
-        )
+        self._simulation_seconds += record.seconds
 
 
 def read_tally(directory: Path) -> Tally:
@@ -139,12 +144,15 @@ def read_candidate(directory: Path, index: int) -> dict[str, Any]:
     Raises:
         JournalError: when the journal holds no such candidate.
     """
+    last: tuple[int, bytes] | None = None
     for line in (directory / "journal.jsonl").read_bytes().split(b"\n")[:-1]:
-        if line.startswith(_ASKED):
-            asked = json.loads(line)
-            if asked["first"] <= index < asked["first"] + len(asked["candidates"]):
-                found: dict[str, Any] = asked["candidates"][index - asked["first"]]
-                return found
+        asked = _FIRST.match(line)
+        if asked is not None and int(asked[1]) <= index:
+            last = int(asked[1]), line
+    if last is not None:
+        candidates: list[dict[str, Any]] = json.loads(last[1])["candidates"]
+        if index - last[0] < len(candidates):
+            return candidates[index - last[0]]
     raise JournalError(f"{directory}: the journal holds no candidate {index}")
 
 
