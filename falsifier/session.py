@@ -16,7 +16,7 @@ from falsifier.wiring import proposer_builder
 
 
 def execute(
-    request: RunRequest, directory: Path, *, listeners: Iterable[Listener] = (), resume: bool = False
+    request: RunRequest, directory: Path | None, *, listeners: Iterable[Listener] = (), resume: bool = False
 ) -> list[Result]:
     """Run a request, recorded in a directory; with resume, go on where that directory's journal ends.
 

@@ -37,7 +37,7 @@ def test_linear_keeps_its_last_value() -> None:
 
 def test_hold_samples_at_its_own_multiples_in_spite_of_rounding() -> None:
     signal = Signal((0.0, 1.0), (0.0, 1.0), "linear", hold=0.05)
-    times = np.arange(21) * 0.01
+    times = np.linspace(0.0, 0.2, 21)
     expected = np.repeat([0.0, 0.05, 0.10, 0.15, 0.20], 5)[:21]
     np.testing.assert_allclose(signal.sample(times), expected, atol=1e-12)
 

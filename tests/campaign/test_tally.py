@@ -15,6 +15,11 @@ from falsifier.journal import (
 from falsifier.llm.messages import ChatReply, Exchange, Message, Usage
 
 
+def status(tally: Tally) -> str:
+    """Read the status anew: the type checker takes an attribute that was compared once for settled."""
+    return tally.status
+
+
 def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
     verdict = None
     if robustness is not None:
@@ -26,9 +31,9 @@ def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
 
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     tally = Tally()
-    assert tally.status == "waiting"
+    assert status(tally) == "waiting"
     tally.feed(AskedRecord(first=0, n=1, candidates=[], seconds=0.1).model_dump_json().encode(), "here")
-    assert tally.status == "running"
+    assert status(tally) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         tally.add(evaluated(i, robustness))
     assert (tally.best, tally.best_robustness) == (4, -3.0)
@@ -37,7 +42,7 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
     tally.add(ConfirmedRecord(index=4, outcome="confirmed", robustness=-3.0, reference=-3.0, reason="yes"))
     assert tally.counterexample == 4
     assert tally.unconfirmed == {2: "fragile: vanishes"}
-    assert tally.status == "running"
+    assert status(tally) == "running"
     tally.add(
         EndedRecord(
             status="falsified", reason="yes", spent={"simulations": 5.0, "seconds": 9.0, "cost": None}
@@ -63,9 +68,9 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
 def test_a_run_that_goes_on_is_running_again() -> None:
     tally = Tally()
     tally.add(EndedRecord(status="interrupted", reason="", spent={}))
-    assert tally.status == "interrupted"
+    assert status(tally) == "interrupted"
     tally.add(evaluated(0, 1.0))
-    assert tally.status == "running"
+    assert status(tally) == "running"
 
 
 def test_candidates_are_found_in_batches(tmp_path: Path) -> None:
