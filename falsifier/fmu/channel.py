@@ -88,7 +88,8 @@ def receive_reply(sock: socket.socket, limit: float | None) -> Reply:
         TimeoutError: when nothing came within limit seconds.
         Closed: when the other end is gone.
     """
-    sock.settimeout(limit)
+    if sock.gettimeout() != limit:
+        sock.settimeout(limit)
     try:
         status, more, leaving, time, length = _REPLY.unpack(_exactly(sock, _REPLY.size))
         text = _exactly(sock, length).decode("utf-8", "replace") if length else ""
