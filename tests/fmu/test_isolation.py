@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import zipfile
 from collections.abc import Iterator
@@ -247,9 +246,10 @@ except KeyboardInterrupt:
         assert process.stdout.read() == "interrupted 10.0\n"
 
 
-def test_nothing_of_this_process_is_left_in_the_temporary_folder() -> None:
+def test_closing_the_registry_removes_the_folder_of_this_process() -> None:
     run(isolated("Lag_2"), ("y",))
-    own = [p for p in Path(tempfile.gettempdir()).glob("falsifier-fmu-*") if p.stat().st_uid == os.getuid()]
+    root = REGISTRY.nursery()._root
+    assert root.is_dir()
     REGISTRY.close()
-    after = list(Path(tempfile.gettempdir()).glob("falsifier-fmu-*"))
-    assert len(after) < len(own)
+    assert not root.exists()
+    assert len(run(isolated("Lag_2"), ("y",))) == 11
