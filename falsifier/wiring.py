@@ -50,7 +50,7 @@ def proposer_builder(
         raise SpecError(
             f"the engine {request.engine!r} asks no language model: leave out --model, or leave out --engine"
         )
-    return _led_by_model(request, request.model, _chat(request.model, records))
+    return _led_by_model(request, request.model, _chat(request, request.model, records))
 
 
 def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> ProposerBuilder:
@@ -74,18 +74,25 @@ def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> Pro
     return build
 
 
-def _chat(model: ModelRequest, records: Sequence[Record]) -> "Chat":
+def _chat(request: RunRequest, model: ModelRequest, records: Sequence[Record]) -> "Chat":
     from falsifier.llm.cache import default_cache_directory
     from falsifier.llm.connect import connect
+    from falsifier.llm.library import listed_price
     from falsifier.llm.replay import RecordedChat
     from falsifier.llm.usage import Price
 
+    price = Price(*model.price) if model.price else None
+    if request.budget.cost is not None and (price or listed_price(model.name)) is None:
+        raise SpecError(
+            f"the price of {model.name} is unknown, so --max-cost cannot be kept: give "
+            "--price SENT:RECEIVED, or limit --max-tokens instead"
+        )
     chat = connect(
         model.name,
         effort=model.effort,
         api_base=model.api_base,
         options=model.options,
-        price=Price(*model.price) if model.price else None,
+        price=price,
         gate=_gate(model.name, model.api_base),
         cache=default_cache_directory() if model.cache else None,
     )

@@ -24,6 +24,7 @@ _COMMANDS = {
     "validate": ("falsifier.cli.report", "Re-simulate counterexamples in the competition's format."),
     "info": ("falsifier.cli.inspect", "Show what an FMU says of itself."),
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
+    "build": ("falsifier.cli.inspect", "Compile an FMU's C sources for this platform."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
     "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
     "prompt": ("falsifier.cli.model", "Print what would be sent to a language model; send nothing."),

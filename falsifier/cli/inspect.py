@@ -1,4 +1,4 @@
-"""``falsifier info``, ``init``, ``check`` and ``schema``: everything that does not search."""
+"""``falsifier info``, ``init``, ``build``, ``check`` and ``schema``: everything that does not search."""
 
 import json
 import sys
@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.adhoc import starter_spec
+from falsifier.adhoc import default_interface, default_interval, starter_spec
 from falsifier.cli.options import json_option
 from falsifier.errors import SpecError
-from falsifier.model import ModelInfo, Variable
+from falsifier.model import Experiment, ModelInfo, Variable
 from falsifier.problem import Problem, bundled, load_problems
+from falsifier.signals import Signal
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 # Rows of a table of parameters or states; models have thousands of them.
 _SHOWN_VARIABLES = 60
+# Seconds that are simulated to check the step where the FMU gives no stop time.
+_CHECKED_SECONDS = 10.0
 # Columns of text where the width of the terminal cannot be asked.
 _PIPED_WIDTH = 160
 
@@ -28,16 +31,38 @@ _PIPED_WIDTH = 160
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option("--all", "everything", is_flag=True, help="Show all variables, internal ones too.")
+@click.option(
+    "--check",
+    "checked",
+    is_flag=True,
+    help="Simulate with the step and with half of it: how far outputs move.",
+)
 @json_option
-def info(*, fmu: Path, everything: bool, as_json: bool) -> None:
+def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     """Show what an FMU says of itself: interfaces, inputs, outputs, parameters with units and ranges."""
     from falsifier.fmu import read_info
 
-    found = read_info(_existing_fmu(fmu))
+    source = _existing_fmu(fmu)
+    found = read_info(source)
     if as_json:
         click.echo(json.dumps(asdict(found), indent=2))
         return
     _print_info(found, everything=everything)
+    if checked:
+        _print_convergence(source, found)
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), help="FMU to write; default: NAME-PLATFORM.fmu."
+)
+def build(*, fmu: Path, out: Path | None) -> None:
+    """Compile the C sources inside an FMU for this platform and write a copy of it with the library."""
+    from falsifier.fmu.build import build as compile_sources
+
+    written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
+    click.echo(f"{written} written")
 
 
 @click.command()
@@ -88,6 +113,38 @@ def _schema(what: str) -> dict[str, Any]:
 
     models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
     return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
+
+
+def _print_convergence(fmu: Path, found: ModelInfo) -> None:
+    """Say how far halving the step moves the outputs, with every bounded input going up and down once."""
+    from falsifier.fmu import FmuModel
+    from falsifier.fmu.check import step_convergence
+
+    interface = default_interface(found)
+    if interface is None:
+        raise SpecError(f"{fmu}: the FMU offers no interface that can be simulated")
+    stop_time = found.stop_time or _CHECKED_SECONDS
+    outputs = tuple(v.name for v in found.outputs if v.kind != "string")
+    experiment = Experiment(stop_time, default_interval(found, stop_time), outputs)
+    signals = {
+        v.name: Signal.evenly([v.low, v.high, v.low], stop_time=stop_time, interpolation="linear")
+        for v in found.inputs
+        if v.kind == "real" and v.low is not None and v.high is not None
+    }
+    model = FmuModel(fmu, interface=interface)
+    try:
+        movements = step_convergence(model, experiment, signals)
+    finally:
+        model.close()
+    click.echo(
+        f"\n{interface}, step {experiment.output_interval:g} s against half of it, over {stop_time:g} s:"
+    )
+    for name, moved in movements.items():
+        unit = f" {found[name].unit}" if found[name].unit else ""
+        click.echo(
+            f"  {name} moves by at most {moved.largest:.3g}{unit} at {moved.time:.4g} s "
+            f"({moved.relative:.2%} of its range)"
+        )
 
 
 def _existing_fmu(fmu: Path) -> Path:

@@ -8,6 +8,9 @@ import click
 
 from falsifier.request import ModelRequest, ProblemRequest
 
+# Options of litellm that would carry a key.
+_SECRET_OPTIONS = ("api_key", "headers", "extra_headers", "extra_body")
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -128,6 +131,8 @@ def _model_option(text: str) -> tuple[str, str | float]:
     name, equals, value = text.partition("=")
     if not equals or not name:
         raise click.UsageError(f"--model-option {text}: expected NAME=VALUE, for example max_tokens=4000")
+    if name in _SECRET_OPTIONS:  # options stand in the run's manifest
+        raise click.UsageError(f"--model-option {name}: keys are read from the environment only")
     try:
         return name, int(value) if value.isdigit() else float(value)
     except ValueError:

@@ -1,5 +1,6 @@
 """Patience: requests that failed for a passing reason are sent again, by all runs together."""
 
+import logging
 import random
 import threading
 import time
@@ -11,6 +12,8 @@ from typing import Any
 from falsifier.errors import ChatError
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest
+
+_LOG = logging.getLogger(__name__)
 
 # With doubling delays the last request goes out about a minute after the first, so that a server may restart.
 DEFAULT_ATTEMPTS = 7
@@ -100,6 +103,9 @@ class RetryingChat:
                     raise ChatError(f"gave up after {attempt} attempts. {error}") from None
                 own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
                 delay = min(own, self.longest_delay) if asked is None else asked
+                _LOG.warning(
+                    "%s Asking again in %.0f s (%d of %d).", error, delay, attempt + 1, self.attempts
+                )
                 (self.gate.pause if error.for_all else self.gate.wait)(delay)
         raise AssertionError("attempts is at least 1")
 
