@@ -159,14 +159,16 @@ def result_json(result: Result) -> dict[str, Any]:
 
 
 def signal_text(signal: Signal) -> str:
-    """Control points of a signal in one line."""
+    """Control points of a signal in one line, and how lively it is: a reader judges how plausible that is."""
     if len(set(signal.values)) == 1:
         return f"constant {signal.values[0]:g}"
     points = [f"{v:g} at {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
     if len(points) > _SHOWN_POINTS:
         half = _SHOWN_POINTS // 2
         points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
-    return f"{signal.interpolation}: {', '.join(points)}"
+    dwell = signal.shortest_dwell
+    lively = "" if dwell is None else f", shortest dwell {dwell:.4g} s"
+    return f"{signal.interpolation}: {', '.join(points)} ({signal.switches} switches{lively})"
 
 
 def candidate_lines(problem: Problem, candidate: Candidate) -> list[str]:
@@ -207,6 +209,10 @@ def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "critical_time": verdict and verdict.critical_time,
         "predicate": verdict and verdict.predicate,
         "values": dict(verdict.values) if verdict else None,
+        "switches": {name: signal.switches for name, signal in evaluation.candidate.signals.items()},
+        "shortest_dwell": {
+            name: signal.shortest_dwell for name, signal in evaluation.candidate.signals.items()
+        },
     }
 
 
