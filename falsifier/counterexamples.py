@@ -23,6 +23,8 @@ from falsifier import __version__
 from falsifier.confirm import Confirmation, Outcome, confirm
 from falsifier.errors import CandidateError, SimulationError, SpecError
 from falsifier.evaluation import Evaluation, evaluate
+from falsifier.journal import ConfirmedRecord, read_journal, read_manifest, recorded_evaluations
+from falsifier.manifest import Manifest
 from falsifier.problem import Problem
 from falsifier.request import ProblemRequest
 from falsifier.space import Candidate
@@ -132,16 +134,47 @@ def load(path: Path) -> StoredCounterexample:
 def counterexample_file(path: Path) -> Path:
     """Path of a counterexample file, given itself or its run directory.
 
+    Runs of a campaign keep a journal only; their counterexample is written from it.
+
     Raises:
-        SpecError: when there is none.
+        SpecError: when there is none, or more than one.
     """
-    file = path / FILE_NAME if path.is_dir() else path
-    if not file.is_file():
-        hint = "this run has found no confirmed counterexample" if path.is_dir() else "there is no such file"
-        raise SpecError(
-            f"{hint}; give a run directory that has a {FILE_NAME}, or such a file", file=str(path)
-        )
-    return file
+    if not path.is_dir():
+        if not path.is_file():
+            raise SpecError(
+                "there is no such file; give a run directory or a counterexample file", file=str(path)
+            )
+        return path
+    found = sorted(path.glob("counterexample*.json"))
+    if len(found) > 1:
+        names = ", ".join(str(f) for f in found)
+        raise SpecError(f"this run has several counterexamples, give one of them: {names}", file=str(path))
+    return found[0] if found else save(_recorded(path), path / FILE_NAME)
+
+
+def _recorded(directory: Path) -> StoredCounterexample:
+    """Counterexample of a run directory's journal."""
+    records = read_journal(directory)
+    confirmed = [r for r in records if isinstance(r, ConfirmedRecord) and r.outcome == "confirmed"]
+    if not confirmed or confirmed[0].requirement:
+        raise SpecError("this run has found no confirmed counterexample", file=str(directory))
+    described = Manifest.model_validate(read_manifest(directory))
+    evaluation = recorded_evaluations(directory, records)[confirmed[0].index]
+    verdict = evaluation.verdict
+    assert verdict is not None
+    digests = [digest for name, digest in described.hashes.items() if name.endswith(".fmu")]
+    return StoredCounterexample(
+        requirement=described.requirement["name"],
+        formula=described.requirement["formula"],
+        problem=described.request.problem,
+        candidate=evaluation.candidate.to_json(),
+        robustness=verdict.robustness,
+        critical_time=verdict.critical_time,
+        predicate=verdict.predicate,
+        outcome="confirmed",
+        reason=confirmed[0].reason,
+        fmu_sha256=digests[0] if digests else None,
+    )
 
 
 def problem_of(stored: StoredCounterexample) -> Problem:

@@ -5,13 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.budget import Budget
 from falsifier.check import check
 from falsifier.confirm import Confirmation, confirm
 from falsifier.counterexamples import Database, load, problem_of, replay, save, to_store
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation import evaluate
 from falsifier.problem import Problem, bundled
-from falsifier.request import ProblemRequest
+from falsifier.request import ProblemRequest, RunRequest
+from falsifier.session import execute
 from falsifier.stl import parse
 from tests.problems import lag_problem, never
 from tests.stepped import euler_problem
@@ -119,6 +121,27 @@ def test_what_is_not_there_is_said(tmp_path: Path) -> None:
         load(tmp_path)
     with pytest.raises(SpecError, match="no such file"):
         load(tmp_path / "gone.json")
+
+
+def test_a_run_without_the_file_is_read_from_its_journal(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    request = RunRequest(problem=ProblemRequest(target="my.toml:R"), engine="corners", budget=Budget(5))
+    result = execute(request, Path("run"))[0]
+    assert result.counterexample is not None
+    stored = load(Path("run"))
+    assert stored.robustness == result.counterexample.evaluation.robustness
+    assert replay(stored, problem_of(stored)).text.count("changed") == 0
+    assert json.loads(Path("run/counterexample.json").read_text())["problem"]["target"] == "../my.toml:R"
+
+
+def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
+    problem = lag_problem()
+    for name in ("counterexample-A.json", "counterexample-B.json"):
+        save(to_store(problem, violation(problem), None), tmp_path / name)
+    with pytest.raises(SpecError, match=r"several counterexamples, give one of them: .*counterexample-A\.json"):
+        load(tmp_path)
 
 
 def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from falsifier.confirm import half_step
 from falsifier.errors import SpecError
 from falsifier.evaluation import Evaluation, evaluate
-from falsifier.problem import Problem
+from falsifier.problem import Problem, load_problem
 from falsifier.shrink import PASSES, Shrunk, shrink
 from falsifier.signals import Signal
 from falsifier.simplicity import digits, rest_value, rounder, simplicity
@@ -169,3 +169,30 @@ def test_digits_and_rounder_numbers() -> None:
     assert list(rounder(33.25)) == [30.0, 40.0, 33.0, 34.0, 33.2, 33.3]
     assert list(rounder(-0.12)) == [-0.1, -0.2]
     assert list(rounder(7.0)) == []
+
+
+def test_at6a_shrinks_to_one_change_of_throttle_without_brake() -> None:
+    problem = load_problem("AT6a")
+    signals = {
+        "throttle": Signal((0.0, 3.4575, 6.2728), (44.82, 53.369, 17.89), "linear"),
+        "brake": Signal((0.0, 20.0), (1.7146, 32.187), "pchip"),
+    }
+    original = evaluate(problem, problem.space.admit(Candidate(signals)))
+    shrunk = shrink(problem, original)
+    found = shrunk.evaluation.candidate.signals
+    assert shrunk.minimal
+    assert found["brake"].values == (0.0,)
+    assert found["throttle"].interpolation == "constant"
+    assert found["throttle"].switches == 1
+    assert_local_minimum(problem, shrunk)
+
+
+def test_f16_shrinks_its_idle_parameter_only() -> None:
+    problem = load_problem("F16")
+    roll, pitch, _ = problem.space.parameters
+    start = {"roll": roll.high, "pitch": pitch.low, "yaw": -0.7853981}
+    shrunk = shrink(problem, evaluate(problem, problem.space.admit(Candidate({}, start))))
+    found = shrunk.evaluation.candidate.parameters
+    assert shrunk.minimal
+    assert (found["roll"], found["pitch"]) == (roll.high, pitch.low)
+    assert digits(found["yaw"]) == 1
