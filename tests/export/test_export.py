@@ -53,6 +53,7 @@ def by_fmpy(problem: Problem, candidate: Candidate, directory: Path, interface: 
     start = write_json(start_values(problem, candidate), directory / "start_values.json")
     return fmpy.simulate_fmu(
         str(problem.model.path),  # type: ignore[attr-defined]
+        validate=False,
         fmi_type=interface,
         stop_time=problem.experiment.stop_time,
         output_interval=problem.experiment.output_interval,
@@ -83,6 +84,28 @@ def test_fmpy_alone_gets_the_same_of_interpolated_inputs_and_of_start_values(
     candidate = problem.space.decode(low + np.random.default_rng(1).uniform(size=len(low)) * (high - low))
     trajectory = evaluate(problem, candidate).trajectory
     assert trajectory is not None
+    result = by_fmpy(problem, candidate, tmp_path)
+    for output in problem.experiment.outputs:
+        np.testing.assert_allclose(result[output], trajectory[output], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_fmpy_alone_gets_the_same_of_inputs_of_all_types(tmp_path: Path, version: int) -> None:
+    real = "in_Real" if version == 2 else "in_Float64"
+    whole = "in_Integer" if version == 2 else "in_Int32"
+    request = ProblemRequest(
+        target=str(ROOT / "tests" / "fixtures" / "fmus" / f"Echo_{version}.fmu"),
+        stl=f"G[0,2] ({real.replace('in', 'out')} <= 100)",
+        inputs=(f"{real}=-5:5:4", f"{whole}=0:9:5", "in_Boolean=0:1:3", "in_Enumeration=1:2:2"),
+        stop_time=2.0,
+        output_interval=0.01,
+    )
+    problem = request.load()
+    low, high = problem.space.bounds.T
+    candidate = problem.space.decode(np.random.default_rng(version).uniform(low, high))
+    trajectory = evaluate(problem, candidate).trajectory
+    assert trajectory is not None
+    assert len(set(trajectory[whole.replace("in", "out")])) > 2
     result = by_fmpy(problem, candidate, tmp_path)
     for output in problem.experiment.outputs:
         np.testing.assert_allclose(result[output], trajectory[output], rtol=1e-9, atol=1e-9)
