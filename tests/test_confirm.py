@@ -7,7 +7,7 @@ from falsifier.confirm import confirm, half_step, other_interface
 from falsifier.engine import falsify
 from falsifier.errors import MonitorError, SpecError
 from falsifier.evaluation import Evaluation, evaluate
-from falsifier.problem import Problem
+from falsifier.problem import Problem, load_problem
 from falsifier.proposers import make_proposer
 from falsifier.stl import reference
 from tests.problems import lag_problem
@@ -108,6 +108,19 @@ def test_without_the_second_monitor_nothing_is_confirmed(monkeypatch: pytest.Mon
 def test_a_function_has_no_second_interface() -> None:
     with pytest.raises(SpecError, match="not an FMU"):
         other_interface(lag_problem())
+
+
+def test_the_other_interface_of_an_fmu_confirms_too() -> None:
+    problem = load_problem("AT1")
+    other = other_interface(problem)
+    assert [getattr(p.model, "interface", None) for p in (problem, other)] == [
+        "co-simulation",
+        "model-exchange",
+    ]
+    vector = [100.0] * 7 + [0.0] * 3
+    here, there = (confirm(p, evaluate(p, p.space.decode(vector))) for p in (problem, other))
+    assert (here.outcome, there.outcome) == ("confirmed", "confirmed")
+    assert there.robustness == pytest.approx(here.robustness, abs=0.05)
 
 
 def test_euler_agrees_with_the_function() -> None:
