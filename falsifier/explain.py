@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from falsifier.display import candidate_lines
-from falsifier.errors import CandidateError
 from falsifier.evaluation import Evaluation, evaluate, monitor_for
 from falsifier.problem import Problem
 from falsifier.shrink import constant_signal, stretches, with_signal
@@ -60,6 +59,11 @@ class Effect:
         """Whether the violation vanishes without this part."""
         return self.robustness is not None and self.robustness >= 0
 
+    @property
+    def part(self) -> str:
+        """What was put back, in words."""
+        return f"{self.name} at rest" if self.was_rest else self.name
+
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
@@ -96,7 +100,7 @@ class Explanation:
             yield f"It takes {_listed([self._part(e) for e in needed])}."
         idle = [e for e in whole if e.robustness is not None and not e.needed]
         if idle:
-            yield f"It does not depend on {_listed([self._without(e) for e in idle])}."
+            yield f"It does not need {_listed([self._without(e) for e in idle])}."
         for name in dict.fromkeys(e.name for e in needed):
             spans = [e for e in self.effects if e.name == name and e.span is not None]
             decisive = [e for e in spans if e.needed]
@@ -107,11 +111,10 @@ class Explanation:
             yield f"Without {_listed(failed)} the simulation fails."
 
     def _part(self, effect: Effect) -> str:
-        name = f"{effect.name} at rest" if effect.was_rest else effect.name
-        return f"{name} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
+        return f"{effect.part} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
 
     def _without(self, effect: Effect) -> str:
-        return f"{effect.name} ({self._instead(effect)} it is still {effect.robustness:+.4g})"
+        return f"{effect.part} ({self._instead(effect)} it is still {effect.robustness:+.4g})"
 
     def _stretch(self, effect: Effect) -> str:
         start, end = effect.span or (0.0, 0.0)
@@ -245,10 +248,7 @@ def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float
 
 
 def _robustness(problem: Problem, candidate: Candidate) -> float | None:
-    try:
-        return evaluate(problem, problem.space.admit(candidate)).robustness
-    except CandidateError:
-        return None
+    return evaluate(problem, problem.space.admit(candidate)).robustness
 
 
 def _listed(parts: list[str]) -> str:

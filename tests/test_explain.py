@@ -24,7 +24,7 @@ def test_a_signal_that_is_needed_is_named_with_what_happens_without_it() -> None
     assert not effects["x0"].needed
     assert "LAG demands: At all times from 0 to 10 s, x is at most 0.9." in explanation.text
     assert "It takes u (at 0 V, its rest value, the robustness is +0.4)." in explanation.text
-    assert "It does not depend on x0 (at 0, its rest value, it is still -0.09997)." in explanation.text
+    assert "It does not need x0 (at 0, its rest value, it is still -0.09997)." in explanation.text
     assert explanation.diagnosis.critical_time == 10.0
 
 
@@ -43,8 +43,8 @@ def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
     explanation = explain(problem, evaluate(problem, problem.space.decode([0.0] * 4 + [0.0])))
     x0 = next(e for e in explanation.effects if e.name == "x0")
     assert (x0.instead, x0.is_rest, x0.was_rest) == (0.5, False, True)
-    assert "It does not depend on " in explanation.text
-    assert "x0 (at 0.5, the middle of its range, it is still" in explanation.text
+    assert "It does not need " in explanation.text
+    assert "x0 at rest (at 0.5, the middle of its range, it is still" in explanation.text
 
 
 def test_a_part_without_which_the_simulation_fails_is_said() -> None:
