@@ -27,6 +27,8 @@ class Method:
         variant: its prompt variant, or empty.
         parameterization: ``free`` or ``fixed``.
         profile: of the specs, or empty.
+        anonymous: whether the model is told neutral names only.
+        fallback: engine that goes on when the model gives up, or empty.
     """
 
     engine: str = ""
@@ -35,14 +37,21 @@ class Method:
     variant: str = ""
     parameterization: str = "fixed"
     profile: str = ""
+    anonymous: bool = False
+    fallback: str = ""
 
     @property
     def label(self) -> str:
         """Name for people, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
         model = " ".join(p for p in (self.model.rpartition("/")[2], self.effort, self.variant) if p)
         name = " + ".join(p for p in (self.engine, model) if p) or "default engine"
-        extra = [self.parameterization] if self.parameterization != "fixed" else []
-        return ", ".join([name, *extra, *([self.profile] if self.profile else [])])
+        apart = {
+            self.parameterization: self.parameterization != "fixed",
+            self.profile: bool(self.profile),
+            "neutral names": self.anonymous,
+            f"then {self.fallback}": bool(self.fallback),
+        }
+        return ", ".join([name, *(text for text, said in apart.items() if said)])
 
 
 class CampaignRequest(BaseModel):
@@ -83,11 +92,16 @@ def cross(
     *,
     seeds: Iterable[int],
     budget: Budget,
-    api_base: str | None = None,
+    asking: ModelRequest | None = None,
 ) -> tuple[RunRequest, ...]:
     """All runs of problems x methods x seeds, in this order.
 
-    The method decides each problem's parameterization and profile.
+    Args:
+        problems: what is searched; the method decides their parameterization and profile.
+        methods: how.
+        seeds: of the engines.
+        budget: of each run.
+        asking: address, options, price and cache of language models; the method decides the rest.
     """
     seeds, methods = tuple(seeds), tuple(methods)
     return tuple(
@@ -96,7 +110,7 @@ def cross(
                 update={"parameterization": method.parameterization, "profile": method.profile or None}
             ),
             engine=method.engine or None,
-            model=_model_request(method, api_base),
+            model=_model_request(method, asking),
             seed=seed,
             budget=budget,
             keep="best",
@@ -109,14 +123,16 @@ def cross(
 
 def method_of(request: RunRequest) -> Method:
     """Method of a run."""
-    model = request.model
+    problem, model = request.problem, request.model or ModelRequest(name="")
     return Method(
-        request.engine or "",
-        model.name if model else "",
-        (model.effort or "") if model else "",
-        (model.variant or "") if model else "",
-        request.problem.parameterization,
-        request.problem.profile or "",
+        engine=request.engine or "",
+        model=model.name,
+        effort=model.effort or "",
+        variant=model.variant or "",
+        parameterization=problem.parameterization,
+        profile=problem.profile or "",
+        anonymous=model.anonymous,
+        fallback=model.fallback or "",
     )
 
 
@@ -128,14 +144,14 @@ def run_name(request: RunRequest) -> str:
     return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable).strip('-.')}-{digest}"
 
 
-def _model_request(method: Method, api_base: str | None) -> ModelRequest | None:
+def _model_request(method: Method, asking: ModelRequest | None) -> ModelRequest | None:
     if not method.model:
         return None
-    return ModelRequest.model_validate(
-        {
-            "name": method.model,
-            "effort": method.effort or None,
-            "api_base": api_base,
-            "variant": method.variant or None,
-        }
-    )
+    decided = {
+        "name": method.model,
+        "effort": method.effort or None,
+        "variant": method.variant or None,
+        "anonymous": method.anonymous,
+        "fallback": method.fallback or None,
+    }
+    return ModelRequest.model_validate((asking.model_dump() if asking else {}) | decided)

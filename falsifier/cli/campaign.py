@@ -5,7 +5,7 @@ import time
 from datetime import datetime
 from itertools import product
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import click
 
@@ -15,10 +15,10 @@ from falsifier.budget import Budget
 from falsifier.campaign import CampaignRequest, Follower, Method, Outcome, cross, run_campaign, suite
 from falsifier.campaign import resume_campaign as _resume
 from falsifier.campaign.suites import SUITES
-from falsifier.cli.options import json_option, quiet_option
+from falsifier.cli.options import asking, asking_options, json_option, quiet_option
 from falsifier.journal import write_whole
 from falsifier.problem import bundled, find_spec, load_problems
-from falsifier.request import Effort, ProblemRequest
+from falsifier.request import Effort, ModelRequest, ProblemRequest
 from falsifier.scoreboard import campaign_display, overall_line
 
 # Time in s between two looks of falsifier watch.
@@ -47,7 +47,7 @@ table_option = click.option(
 @click.option("--model", "models", multiple=True, metavar="NAME[@EFFORT]", help="Language model. Repeatable.")
 @click.option("--effort", type=click.Choice(get_args(Effort)), help="Of models without one of their own.")
 @click.option("--variant", "variants", multiple=True, metavar="MP1..", help="Prompt variant. Repeatable.")
-@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
+@asking_options
 @click.option("--runs", type=click.IntRange(1), default=10, show_default=True, help="Runs of each.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the first run; others count up.")
 @click.option("--budget", type=int, default=1500, show_default=True, help="Most simulations a run.")
@@ -76,7 +76,6 @@ def bench(
     models: tuple[str, ...],
     effort: str | None,
     variants: tuple[str, ...],
-    api_base: str | None,
     runs: int,
     seed: int,
     budget: int,
@@ -94,6 +93,7 @@ def bench(
     out: Path | None,
     quiet: bool,
     as_json: bool,
+    **options: Any,
 ) -> None:
     r"""Run requirements x methods x seeds and print the protocol's table.
 
@@ -112,14 +112,16 @@ def bench(
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("give requirements or specs, or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
+    how = ModelRequest(name="", **asking(options, named=bool(models)))
+    methods = _methods(engines, models, effort, variants, parameterization or ("fixed",), profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)
     request = CampaignRequest(
         runs=cross(
             problems,
-            _methods(engines, models, effort, variants, parameterization or ("fixed",), profile or ""),
+            methods,
             seeds=range(seed, seed + runs),
             budget=Budget(budget, seconds, max_tokens, max_cost),
-            api_base=api_base,
+            asking=how,
         ),
         limits=Budget(*limits) if any(x is not None for x in limits) else None,
         calls=calls,
@@ -198,13 +200,14 @@ def _methods(
     variants: tuple[str, ...],
     parameterizations: tuple[str, ...],
     profile: str,
+    how: ModelRequest,
 ) -> list[Method]:
     """Engines alone, or engines x models x variants where a model is named; each in all parameterizations."""
     if not models and (variants or effort):
         raise click.UsageError("--variant and --effort need --model NAME")
     named = [_model(model, effort) for model in models] or [("", "")]
     return [
-        Method(engine, model, level, variant, parameterization, profile)
+        Method(engine, model, level, variant, parameterization, profile, how.anonymous, how.fallback or "")
         for engine, (model, level), variant, parameterization in product(
             engines or ("",), named, variants or ("",), parameterizations
         )

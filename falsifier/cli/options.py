@@ -74,8 +74,19 @@ def model_options(command: F) -> F:
             click.option(
                 "--effort", type=click.Choice(["low", "medium", "high"]), help="Its reasoning effort."
             ),
-            click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
             click.option("--variant", metavar="MP1..", help="Prompt variant."),
+            asking_options,
+        )
+    ):
+        command = decorate(command)
+    return command
+
+
+def asking_options(command: F) -> F:
+    """Add how language models are asked, whichever they are."""
+    for decorate in reversed(
+        (
+            click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
             click.option(
                 "--model-option",
                 "model_options",
@@ -100,21 +111,32 @@ def model_options(command: F) -> F:
 def model_request(options: dict[str, Any]) -> ModelRequest | None:
     """Take the model's options out of a command's keyword arguments; None where no model is named."""
     name = options.pop("model")
-    given = {key: options.pop(key) for key in ("effort", "api_base", "variant", "fallback", "anonymous")}
-    given["price"] = options.pop("price")
-    given["options"] = options.pop("model_options")
-    cache = not options.pop("no_cache")
+    asked = {key: options.pop(key) for key in ("effort", "variant")}
+    asked |= asking(options, named=name is not None)
     if name is None:
-        stray = [key for key, value in given.items() if value]
-        if stray:
-            flags = ", ".join(
-                "--" + key.replace("_", "-").replace("options", "model-option") for key in stray
-            )
-            raise click.UsageError(f"{flags}: needs --model NAME")
+        _refuse_without_model(asked)
         return None
-    given["price"] = _price(given["price"])
-    given["options"] = dict(_model_option(option) for option in given["options"])
-    return ModelRequest(name=name, cache=cache, **given)
+    return ModelRequest(name=name, **asked)
+
+
+def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
+    """Take the values of asking_options out of a command's keyword arguments, as fields of ModelRequest.
+
+    Raises:
+        click.UsageError: where one cannot be read, or one is given and no model is named.
+    """
+    given = {key: options.pop(key) for key in ("api_base", "fallback", "anonymous")}
+    price, pairs = options.pop("price"), options.pop("model_options")
+    cache = not options.pop("no_cache")
+    if not named:
+        _refuse_without_model(given | {"price": price, "model_option": pairs})
+    return given | {"price": _price(price), "options": dict(map(_model_option, pairs)), "cache": cache}
+
+
+def _refuse_without_model(given: dict[str, Any]) -> None:
+    stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value and key != "cache"]
+    if stray:
+        raise click.UsageError(f"{', '.join(stray)}: only a language model takes this; you need --model NAME")
 
 
 def _price(text: str | None) -> tuple[float, float] | None:

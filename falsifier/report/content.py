@@ -8,7 +8,7 @@ from pathlib import Path
 from falsifier.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.campaign.tally import read_candidate
 from falsifier.panels import Panel, panels
-from falsifier.request import RunRequest
+from falsifier.request import ModelRequest, RunRequest
 from falsifier.space import Candidate
 from falsifier.stl import parse
 from falsifier.trajectory import Trajectory
@@ -94,7 +94,7 @@ def run_command(request: RunRequest) -> str:
     >>> run_command(RunRequest(problem=ProblemRequest(target="AT1"), engine="uniform"))
     'falsifier run AT1 --engine uniform --budget 100 --seed 0'
     """
-    problem, model, budget = request.problem, request.model, request.budget
+    problem, budget = request.problem, request.budget
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
         ("--profile", problem.profile),
@@ -105,8 +105,7 @@ def run_command(request: RunRequest) -> str:
         ("--stop-time", problem.stop_time),
         ("--output-interval", problem.output_interval),
         ("--engine", request.engine),
-        *([] if model is None else [("--model", model.name), ("--effort", model.effort)]),
-        *([] if model is None else [("--api-base", model.api_base), ("--variant", model.variant)]),
+        *(_model_options(request.model) if request.model else ()),
         ("--budget", budget.simulations),
         ("--seconds", budget.seconds),
         ("--max-tokens", budget.tokens),
@@ -115,8 +114,21 @@ def run_command(request: RunRequest) -> str:
     ]
     words = ["falsifier", "run", problem.target]
     for name, value in options:
-        words += [] if value is None else [name, str(value)]
+        words += [] if value is None else [name] if value is True else [name, str(value)]
     return shlex.join(words)
+
+
+def _model_options(model: ModelRequest) -> list[tuple[str, object]]:
+    return [
+        ("--model", model.name),
+        ("--effort", model.effort),
+        ("--api-base", model.api_base),
+        ("--variant", model.variant),
+        *(("--model-option", f"{name}={value}") for name, value in model.options.items()),
+        ("--price", None if model.price is None else f"{model.price[0]:g}:{model.price[1]:g}"),
+        ("--anonymous", True if model.anonymous else None),
+        ("--fallback", model.fallback),
+    ]
 
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:

@@ -3,7 +3,7 @@ import pytest
 from falsifier.budget import Budget
 from falsifier.campaign import CampaignRequest, Method, cross, method_of, run_name, suite
 from falsifier.errors import SpecError
-from falsifier.request import ProblemRequest
+from falsifier.request import ModelRequest, ProblemRequest
 
 AT1 = ProblemRequest(target="AT1")
 
@@ -15,13 +15,19 @@ def test_a_campaign_is_requirements_times_methods_times_seeds() -> None:
         methods,
         seeds=range(3),
         budget=Budget(7),
-        api_base="http://x",
+        asking=ModelRequest(name="", api_base="http://x", options={"top_p": 0.5}, cache=False),
     )
     assert len(runs) == 12
     assert [r.seed for r in runs[:3]] == [0, 1, 2]
     assert [method_of(r) for r in runs] == [m for _ in range(2) for m in methods for _ in range(3)]
-    assert runs[3].model is not None
-    assert (runs[3].model.api_base, runs[3].model.variant) == ("http://x", "MP4")
+    assert runs[3].model == ModelRequest(
+        name="openai/gpt-5-nano",
+        effort="low",
+        api_base="http://x",
+        variant="MP4",
+        options={"top_p": 0.5},
+        cache=False,
+    )
     assert {r.problem.parameterization for r in runs} == {"fixed"}
     assert {r.budget for r in runs} == {Budget(7)}
 
@@ -54,6 +60,9 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
         "hybrid + gpt-5-mini high MP4, instance2"
     )
+    named = Method(model="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
+    assert named.label == "gpt-5-mini, neutral names, then surrogate"
+    assert method_of(cross([AT1], [named], seeds=[0], budget=Budget(1))[0]) == named
 
 
 def test_the_same_run_twice_is_refused() -> None:

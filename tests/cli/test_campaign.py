@@ -94,17 +94,9 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
             "--calls",
             "3",
         ),
-        *("--model", "openai/gpt-5-nano@low", "--model", "x/y@2024", "--effort", "high"),
-        *(
-            "--variant",
-            "MP1",
-            "--variant",
-            "MP4",
-            "--parameterization",
-            "fixed",
-            "--parameterization",
-            "free",
-        ),
+        *("--model", "openai/gpt-5-nano@low", "--model", "x/y@2024", "--effort", "high", "--price", "1:2"),
+        *("--variant", "MP1", "--variant", "MP4", "--anonymous"),
+        *("--parameterization", "fixed", "--parameterization", "free"),
     )
     (request,) = seen
     asked = {
@@ -115,6 +107,7 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 1500)}
     assert (request.limits.cost, request.calls) == (9.0, 3)
+    assert {(r.model.price, r.model.anonymous) for r in request.runs} == {((1.0, 2.0), True)}
 
 
 def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,6 +134,7 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
         (["bench", HARD, "--suite", "arch-comp"], "give requirements or specs, or --suite"),
         (["bench", HARD, "--instance", "2"], "--instance belongs to --suite"),
         (["bench", HARD, "--variant", "MP1"], "--variant and --effort need --model"),
+        (["bench", HARD, "--anonymous"], "--anonymous: only a language model takes this"),
     ],
 )
 def test_wrong_usage_is_said(command: Any, arguments: list[str], message: str) -> None:

@@ -17,7 +17,7 @@ from falsifier.manifest import manifest
 from falsifier.proposers import make_proposer
 from falsifier.report import html_report
 from falsifier.report.content import run_command
-from falsifier.request import ProblemRequest, RunRequest
+from falsifier.request import ModelRequest, ProblemRequest, RunRequest
 from falsifier.space import Candidate
 from tests.problems import easy
 
@@ -207,4 +207,15 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
     assert run_command(request) == (
         "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --input u=0:1:3 --stop-time 5.0 --engine uniform "
         "--budget 7 --max-cost 0.5 --seed 3"
+    )
+
+
+def test_a_models_search_can_be_repeated_too() -> None:
+    model = ModelRequest(
+        name="openai/gpt-5-mini", effort="high", variant="MP4", price=(0.25, 2), anonymous=True
+    )
+    request = RunRequest(problem=ProblemRequest(target="AT1"), model=model)
+    assert run_command(request) == (
+        "falsifier run AT1 --model openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
+        "--budget 100 --seed 0"
     )
