@@ -14,7 +14,7 @@ from falsifier.proposers.surrogate.arms import choose_arm, quality
 from falsifier.proposers.surrogate.coarse import coarse_formula, inner_windows
 from falsifier.proposers.surrogate.forecast import Ensemble, Forecast
 from falsifier.proposers.surrogate.grid import Grid
-from falsifier.proposers.surrogate.history import History, Sample, relaxed_cost, scaled_costs
+from falsifier.proposers.surrogate.history import History, Sample, scaled_costs
 from falsifier.proposers.surrogate.layout import Layout, planning_layout, region_layouts
 from falsifier.proposers.surrogate.opening import opening
 from falsifier.proposers.surrogate.planning import plan
@@ -127,7 +127,7 @@ class Surrogate:
             if sample is None:
                 cost = max((s.robustness for s in self.history.samples), default=1.0)
             else:
-                cost = relaxed_cost(sample, self.history.scaled_objective())
+                cost = self.history.direct_cost(sample)
             pending.region.tell(pending.point, cost)
         if pending.forecast is not None and sample is not None:
             objective = self.history.scaled_objective()

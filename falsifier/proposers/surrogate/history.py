@@ -51,6 +51,7 @@ class History:
     samples: list[Sample] = field(default_factory=list)
     objective: Objective | None = None
     _coordinates: Coordinates | None = None
+    _scaled: Objective | None = None
 
     def add(self, evaluation: Evaluation, arm: str) -> Sample | None:
         """Take note of an evaluation; None where it has no trajectory to learn from."""
@@ -72,6 +73,7 @@ class History:
         point = self.layout.point(evaluation.candidate)
         sample = Sample(point, trace, values, robustness, min(critical, 1.0), arm)
         self.samples.append(sample)
+        self._scaled = None
         return sample
 
     def _start(self, trajectory: Trajectory) -> None:
@@ -92,7 +94,9 @@ class History:
     def scaled_objective(self) -> Objective:
         """Objective with the scales of all samples."""
         assert self.objective is not None
-        return self.objective.rescaled([s.values for s in self.samples])
+        if self._scaled is None:
+            self._scaled = self.objective.rescaled([s.values for s in self.samples])
+        return self._scaled
 
     def plain_objective(self) -> Objective:
         """Objective in the requirement's own unit, without relaxation."""
@@ -106,15 +110,13 @@ class History:
 
     def direct_costs(self) -> list[float]:
         """What search without a model minimises: the robustness, or a relaxation that has a slope."""
-        objective = self.scaled_objective()
-        return [relaxed_cost(s, objective) for s in self.samples]
+        return [self.direct_cost(s) for s in self.samples]
 
-
-def relaxed_cost(sample: Sample, objective: Objective) -> float:
-    """Mean of the relaxed formulas' robustness; the true one where it is negative."""
-    if sample.robustness < 0 or not objective.is_relaxed:
-        return sample.robustness
-    return float(objective.cost(sample.values)[0])
+    def direct_cost(self, sample: Sample) -> float:
+        """Mean of the relaxed formulas' robustness; the true one where it is negative or has a slope."""
+        if sample.robustness < 0 or self.objective is None or not self.objective.is_relaxed:
+            return sample.robustness
+        return float(self.scaled_objective().cost(sample.values)[0])
 
 
 def scaled_costs(samples: Sequence[Sample], objective: Objective) -> Array:

@@ -83,10 +83,11 @@ def plan(
         best = int(np.argmin(simple_costs))
         if simple_costs[best] <= costs[0] + snap:
             return Plan(simple[best], float(simple_costs[best]), is_simple=True)
-    for point, cost in zip(pool, costs, strict=True):
-        if not _is_seen(point, seen):
-            return Plan(point, float(cost), is_simple=False)
-    return Plan(mutations(layout, rng, elites, 1)[0], float(costs[0]), is_simple=False)
+    # Only where the whole pool was simulated before are the further points looked at.
+    others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
+    points = np.concatenate([pool, *others])
+    unseen = next((i for i, point in enumerate(points) if not _is_seen(point, seen)), 0)
+    return Plan(points[unseen], float(costs[min(unseen, len(costs) - 1)]), is_simple=False)
 
 
 def _best(points: Array, costs: Array, count: int) -> tuple[Array, Array]:
