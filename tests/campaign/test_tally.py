@@ -29,10 +29,6 @@ def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
     return EvaluatedRecord(index=index, status="ok" if verdict else "failed", verdict=verdict, seconds=0.5)
 
 
-def status(tally: Tally) -> str:
-    return tally.status
-
-
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     tally = Tally()
     assert status(tally) == "waiting"
