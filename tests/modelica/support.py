@@ -10,6 +10,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pytest
+
+from falsifier.errors import SimulationError
+from falsifier.fmu import FmuModel
+from falsifier.model import Experiment
 
 Floats = npt.NDArray[np.float64]
 Inputs = Callable[[float], Mapping[str, float]]
@@ -199,3 +204,14 @@ class Exchange:
             self.advance(k * size, (k + 1) * size)
             rows.append([(k + 1) * size, *self.instance.row(names)])
         return np.array(rows)
+
+
+def said_on_failure(fmu: Path, outputs: tuple[str, ...], **values: float) -> str:
+    """Simulate an FMU that is bound to fail for a second; return the reason and what the FMU said."""
+    model = FmuModel(fmu)
+    try:
+        with pytest.raises(SimulationError) as failure:
+            model.simulate({}, values, Experiment(1.0, 0.1, outputs))
+    finally:
+        model.close()
+    return "\n".join((str(failure.value), *failure.value.log))
