@@ -11,6 +11,9 @@ from falsifier.proposers.surrogate.coordinates import Coordinates
 from falsifier.space import Candidate, SearchSpace
 from falsifier.trajectory import Trajectory
 
+# What happens long after the formula's horizon teaches little about it.
+_MOST_HORIZONS = 20
+
 
 @dataclass(frozen=True, slots=True)
 class Grid:
@@ -19,7 +22,7 @@ class Grid:
     Attributes:
         step: in s.
         cells: number of cells over the horizon.
-        all_cells: number of whole cells until the end of the simulation, at least ``cells``.
+        all_cells: number of whole cells until the end of the simulation, or twenty horizons.
     """
 
     step: float
@@ -32,7 +35,8 @@ class Grid:
         horizon = min(horizon, stop_time) if horizon > 0 else stop_time
         count = max(1, min(cells, round(horizon / shortest)))
         step = horizon / count
-        return cls(step, count, max(count, int(stop_time / step + 1e-6)))
+        rest = int(stop_time / step + 1e-6)
+        return cls(step, count, max(count, min(rest, _MOST_HORIZONS * count)))
 
     @property
     def middles(self) -> Array:
