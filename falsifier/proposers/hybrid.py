@@ -8,7 +8,7 @@ again and told why.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -75,10 +75,11 @@ class Settings:
 
 @dataclass(slots=True)
 class _Turn:
-    """Candidates of the model that wait to be simulated."""
+    """Candidates of one answer: those that wait to be asked for, and those that wait to be told."""
 
     queue: list[Candidate]
     best_before: float
+    asked: set[object] = field(default_factory=set)
 
 
 class Hybrid:
@@ -119,6 +120,8 @@ class Hybrid:
         self.adviser.tell(evaluations)
         for evaluation in evaluations:
             self._since_best += 1
+            if self._turn is not None:
+                self._turn.asked.discard(evaluation.candidate.key)
             if evaluation.robustness is not None and evaluation.robustness < self._best:
                 self._best, self._since_best = evaluation.robustness, 0
 
@@ -131,8 +134,11 @@ class Hybrid:
             self._consult(reason)
         if self._turn is not None:
             if self._turn.queue:
-                return self._turn.queue.pop(0)
-            self._close_turn(self._turn)
+                candidate = self._turn.queue.pop(0)
+                self._turn.asked.add(candidate.key)
+                return candidate
+            if not self._turn.asked:
+                self._close_turn(self._turn)
         candidate, self._numeric = self._numeric or self.surrogate.ask(1)[0], None
         return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
 
