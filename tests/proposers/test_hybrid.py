@@ -1,3 +1,4 @@
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -6,9 +7,11 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.evaluation import Evaluation
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
 from falsifier.proposers.hybrid import Hybrid
+from falsifier.proposers.llm import make_llm_proposer
 from falsifier.proposers.protocol import Proposer
 from falsifier.proposers.surrogate import Settings
 from falsifier.signals import Signal
@@ -137,3 +140,20 @@ def test_without_an_opening_answer_the_run_fails_and_later_it_goes_on() -> None:
     asked = drive(engine, simulated(problem, lambda y: 0.5), rounds=20)
     assert len(script.notes) > 1
     assert {c.origin for c in asked[2:]} == {"hybrid"}
+
+
+def test_a_scripted_chat_leads_through_the_real_prompts() -> None:
+    problem = lag_problem(free=True, parameters=0)
+
+    def answer(*levels: float) -> str:
+        signals = [[{"name": "u0", "values": [level] * 4}] for level in levels]
+        return json.dumps({"candidates": [{"rationale": "a guess", "signals": s} for s in signals]})
+
+    chat = ScriptedChat([answer(0.1, 0.2), answer(0.3, 0.4, 0.5, 0.6, 0.7), answer(1.5)])
+    adviser = make_llm_proposer(problem, chat)
+    engine = Hybrid(problem, seed=0, adviser=adviser, surrogate_settings=HASTY)
+    asked = drive(engine, simulated(problem, lambda y: float(9 - y.max())), rounds=10)
+    assert [c.origin for c in asked[:2]] == [adviser.name] * 2
+    assert {c.origin for c in asked} == {adviser.name, "hybrid"}
+    assert len(chat.requests) >= 2
+    assert "brought no new best" in chat.requests[1].messages[-1].content
