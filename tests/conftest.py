@@ -10,6 +10,8 @@ import pytest
 from falsifier.campaign import run_campaign
 from tests.campaigns import request, work_in_threads
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does
+
 _real_connect = socket.socket.connect
 
 

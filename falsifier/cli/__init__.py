@@ -1,5 +1,6 @@
 """The command line. Commands live in their own modules and are imported when they are used."""
 
+import os
 import sys
 import traceback
 from importlib import import_module
@@ -69,6 +70,8 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: every error ends with its exit code, and never with the code of a falsification."""
+    # The engines' matrices are small: threads of the algebra library only get in each other's way.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         sys.exit(cli.main(prog_name="falsifier", standalone_mode=False))
     except click.exceptions.Exit as end:
