@@ -17,8 +17,8 @@ from falsifier.campaign import CampaignRequest, Method, cross, suite
 from falsifier.campaign.directory import CampaignRecord, run_directory, write_campaign
 from falsifier.evaluation import evaluate, monitor_for
 from falsifier.journal import EndedRecord, EvaluatedRecord, VerdictRecord, read_journal
+from falsifier.loading import load_problem
 from falsifier.manifest import environment, manifest
-from falsifier.problem import load_problem
 from falsifier.proposers import make_proposer
 from falsifier.report import html_report
 from falsifier.request import ProblemRequest, RunRequest, fixed_parameterization

@@ -14,7 +14,7 @@ from falsifier.budget import Budget
 from falsifier.engine import search
 from falsifier.evaluation import monitor_for
 from falsifier.journal import open_journal
-from falsifier.problem import load_problem
+from falsifier.loading import load_problem
 from falsifier.proposers import make_proposer
 
 COUNT = 1000

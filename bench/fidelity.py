@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from falsifier.evaluation import evaluate, monitor_for
-from falsifier.problem import Problem, load_problem
+from falsifier.loading import load_problem
+from falsifier.problem import Problem
 from falsifier.space import ParameterRange
 
 ROOT = Path(__file__).resolve().parents[1]

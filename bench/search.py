@@ -27,7 +27,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from falsifier.evaluation import evaluate
-from falsifier.problem import Problem, load_problem
+from falsifier.loading import load_problem
+from falsifier.problem import Problem
 from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer
 from falsifier.space import Candidate
 

@@ -21,13 +21,13 @@ _EXPORTS = {
     "FalsifierError": "falsifier.errors",
     "FunctionModel": "falsifier.model",
     "Problem": "falsifier.problem",
-    "Result": "falsifier.engine",
+    "Result": "falsifier.result",
     "SearchSpace": "falsifier.space",
     "Signal": "falsifier.signals",
     "Trajectory": "falsifier.trajectory",
     "evaluate": "falsifier.evaluation",
     "falsify": "falsifier.engine",
-    "load_problem": "falsifier.problem",
+    "load_problem": "falsifier.loading",
 }
 
 __all__ = [*_EXPORTS, "__version__"]

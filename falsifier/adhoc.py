@@ -5,8 +5,9 @@ from itertools import islice
 from pathlib import Path
 
 from falsifier.errors import SpecError, did_you_mean
+from falsifier.loading import build_problem
 from falsifier.model import Interface, ModelInfo, Variable
-from falsifier.problem import Problem, build_problem
+from falsifier.problem import Problem
 from falsifier.signals import INTERPOLATIONS
 from falsifier.spec import ModelChanges, parse_spec
 from falsifier.stl.names import name_text

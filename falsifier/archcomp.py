@@ -22,7 +22,8 @@ from falsifier.campaign.suites import bundled_target
 from falsifier.campaign.tally import read_candidate
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation import evaluate
-from falsifier.problem import Problem, load_problem
+from falsifier.loading import load_problem
+from falsifier.problem import Problem
 from falsifier.signals import Signal
 from falsifier.space import Candidate
 from falsifier.spec import ModelChanges

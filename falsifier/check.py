@@ -6,10 +6,11 @@ from pathlib import Path
 from falsifier.budget import Budget
 from falsifier.confirm import Confirmation, confirm
 from falsifier.counterexamples import Database, Replayed, replay, to_store
-from falsifier.engine import Result, falsify
+from falsifier.engine import falsify
 from falsifier.errors import SimulationError
 from falsifier.problem import Problem
 from falsifier.request import ProblemRequest
+from falsifier.result import Result
 from falsifier.shrink import shrink
 
 

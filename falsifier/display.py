@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from falsifier.budget import Spent
-from falsifier.engine import Result
 from falsifier.evaluation import Evaluation
 from falsifier.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunStarted
 from falsifier.manifest import recorded_request
 from falsifier.problem import Problem
+from falsifier.result import Result
 from falsifier.signals import Signal
 from falsifier.space import Candidate
 

@@ -5,7 +5,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from falsifier.budget import Budget, Spent
 from falsifier.confirm import Confirmation, confirm
@@ -24,48 +24,18 @@ from falsifier.journal import (
 )
 from falsifier.problem import Problem
 from falsifier.proposers.protocol import Proposer
+from falsifier.result import Result, ResultStatus
 from falsifier.space import Candidate
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Exchange
 
-ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 OnExchange = Callable[["Exchange"], None]
 # Makes a problem's proposer, which calls what it is handed with every exchange with a language model.
 ProposerBuilder = Callable[[Problem, OnExchange], Proposer]
 
 # A model whose first simulations all fail is broken or wrongly set up; more of them would tell nothing new.
 _HOPELESS = 10
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """How a run ended.
-
-    Attributes:
-        problem: what was searched.
-        status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
-            ``interrupted`` or ``failed`` (the simulator or the language model).
-        reason: in words.
-        counterexample: the confirmed violation, or None.
-        best: evaluation with the smallest robustness, or None when every simulation failed.
-        evaluations: all evaluations in order, without trajectories except the best's.
-        refuted: violations that a second simulation or the second monitor did not confirm.
-        fragile: violations that vanish at half the communication step.
-        spent: what the run used.
-        directory: the run directory, or None.
-    """
-
-    problem: Problem
-    status: ResultStatus
-    reason: str
-    counterexample: Confirmation | None
-    best: Evaluation | None
-    evaluations: tuple[Evaluation, ...]
-    refuted: tuple[Confirmation, ...]
-    spent: Spent
-    directory: Path | None = None
-    fragile: tuple[Confirmation, ...] = ()
 
 
 def falsify(

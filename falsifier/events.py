@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from falsifier.budget import Budget, Spent
+from falsifier.confirm import Confirmation
 from falsifier.evaluation import Evaluation
 from falsifier.problem import Problem
+from falsifier.result import Result
 
 if TYPE_CHECKING:
-    from falsifier.confirm import Confirmation
-    from falsifier.engine import Result
     from falsifier.llm.messages import Exchange
 
 
@@ -47,14 +47,14 @@ class Evaluated:
 class Confirmed:
     """A violation was simulated again and judged by a second monitor."""
 
-    confirmation: "Confirmation"
+    confirmation: Confirmation
 
 
 @dataclass(frozen=True, slots=True)
 class RunEnded:
     """The run is over."""
 
-    result: "Result"
+    result: Result
 
 
 Event = RunStarted | Exchanged | Evaluated | Confirmed | RunEnded

@@ -12,8 +12,9 @@ from falsifier.adhoc import adhoc_problem, changes_from_options
 from falsifier.budget import Budget
 from falsifier.errors import SpecError
 from falsifier.journal import Keep
+from falsifier.loading import find_spec, load_problem
 from falsifier.model import Interface
-from falsifier.problem import Problem, alike, find_spec, load_problem
+from falsifier.problem import Problem, alike
 from falsifier.spec import read_spec
 
 Effort = Literal["low", "medium", "high"]

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from falsifier.engine import Result, search_together
+from falsifier.engine import search_together
 from falsifier.errors import JournalError
 from falsifier.events import Listener
 from falsifier.execution import local_executor
@@ -12,6 +12,7 @@ from falsifier.journal import Journal, Record, open_journal, read_journal, read_
 from falsifier.manifest import Manifest, check_unchanged, manifest, recorded_request
 from falsifier.problem import Problem, alike, conjunction
 from falsifier.request import RunRequest
+from falsifier.result import Result
 from falsifier.wiring import proposer_builder
 
 

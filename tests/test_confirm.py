@@ -7,7 +7,8 @@ from falsifier.confirm import confirm, half_step, other_interface
 from falsifier.engine import falsify
 from falsifier.errors import MonitorError, SpecError
 from falsifier.evaluation import Evaluation, evaluate
-from falsifier.problem import Problem, load_problem
+from falsifier.loading import load_problem
+from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
 from falsifier.stl import reference
 from tests.problems import lag_problem

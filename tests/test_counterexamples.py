@@ -11,7 +11,8 @@ from falsifier.confirm import Confirmation, confirm
 from falsifier.counterexamples import Database, load, problem_of, replay, save, to_store
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation import evaluate
-from falsifier.problem import Problem, bundled
+from falsifier.loading import bundled
+from falsifier.problem import Problem
 from falsifier.request import ProblemRequest, RunRequest
 from falsifier.session import execute
 from falsifier.stl import parse

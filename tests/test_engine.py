@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.budget import Budget
 from falsifier.confirm import Confirmation
-from falsifier.engine import Result, falsify, search
+from falsifier.engine import falsify, search
 from falsifier.errors import ChatError, JournalError
 from falsifier.evaluation import Evaluation
 from falsifier.events import Evaluated, Event, RunEnded, RunStarted
@@ -20,6 +20,7 @@ from falsifier.journal import (
 )
 from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
+from falsifier.result import Result
 from falsifier.space import Candidate
 from tests.problems import broken, lag_problem, never
 

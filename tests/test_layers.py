@@ -10,7 +10,7 @@ import falsifier
 PACKAGE = Path(falsifier.__file__).parent
 LAYERS = [
     ("values", ["errors", "signals", "space", "trajectory"]),
-    ("meaning", ["model", "stl", "fmu", "spec", "problem", "adhoc"]),
+    ("meaning", ["model", "stl", "fmu", "spec", "loading", "problem", "adhoc"]),
     ("evaluate", ["evaluation", "execution"]),
     ("search", ["llm", "proposers"]),
     (
@@ -26,6 +26,7 @@ LAYERS = [
             "neighbourhood",
             "manifest",
             "request",
+            "result",
             "session",
             "shrink",
             "wiring",

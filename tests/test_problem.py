@@ -7,7 +7,7 @@ import pytest
 from falsifier.adhoc import adhoc_problem, changes_from_options, starter_spec
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
-from falsifier.problem import bundled, load_problem, load_problems
+from falsifier.loading import bundled, load_problem, load_problems
 
 AT = bundled("fmus") / "AT.fmu"
 GOOD = """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.problem import bundled
+from falsifier.loading import bundled
 from tests.command import ROOT
 
 SPEC = """

@@ -7,7 +7,8 @@ import pytest
 from falsifier.confirm import half_step
 from falsifier.errors import SpecError
 from falsifier.evaluation import Evaluation, evaluate
-from falsifier.problem import Problem, load_problem
+from falsifier.loading import load_problem
+from falsifier.problem import Problem
 from falsifier.shrink import PASSES, Shrunk, shrink
 from falsifier.signals import Signal
 from falsifier.simplicity import digits, rest_value, rounder, simplicity

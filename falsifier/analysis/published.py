@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.errors import SpecError
-from falsifier.problem import bundled
+from falsifier.loading import bundled
 
 # Published means have one decimal, so ours are compared at one decimal: 1.3 and 1.34 share a rank.
 _DECIMALS = 1

@@ -3,7 +3,7 @@
 import tomllib
 
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.problem import bundled, find_spec
+from falsifier.loading import bundled, find_spec
 from falsifier.request import ProblemRequest
 from falsifier.spec import read_spec
 

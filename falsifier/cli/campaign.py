@@ -17,7 +17,7 @@ from falsifier.campaign import resume_campaign as _resume
 from falsifier.campaign.suites import SUITES
 from falsifier.cli.options import asking, asking_options, json_option, quiet_option
 from falsifier.journal import write_whole
-from falsifier.problem import bundled, find_spec, load_problems
+from falsifier.loading import bundled, find_spec, load_problems
 from falsifier.request import Effort, ModelRequest, ProblemRequest
 from falsifier.scoreboard import campaign_display, overall_line
 

@@ -12,8 +12,9 @@ import click
 from falsifier.adhoc import default_interface, default_interval, starter_spec
 from falsifier.cli.options import json_option
 from falsifier.errors import SpecError
+from falsifier.loading import bundled, load_problems
 from falsifier.model import Experiment, ModelInfo, Variable
-from falsifier.problem import Problem, bundled, load_problems
+from falsifier.problem import Problem
 from falsifier.signals import Signal
 
 if TYPE_CHECKING:

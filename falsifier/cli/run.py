@@ -21,10 +21,10 @@ from falsifier.cli.options import (
     quiet_option,
 )
 from falsifier.display import counterexample_name, make_display, result_json, result_text, results_text
-from falsifier.engine import Result
 from falsifier.export import write_counterexample
 from falsifier.manifest import recorded_request
 from falsifier.request import RunRequest
+from falsifier.result import Result
 from falsifier.session import execute, execute_all, resume_run
 
 # Where several requirements end differently, the first of these that occurs.

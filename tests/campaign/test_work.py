@@ -9,8 +9,9 @@ from falsifier.budget import Budget
 from falsifier.campaign.work import Done, Missing, Task, run_task, unpack
 from falsifier.fmu import FmuModel
 from falsifier.journal import EvaluatedRecord, read_journal
+from falsifier.loading import load_problem
 from falsifier.manifest import manifest
-from falsifier.problem import Problem, load_problem
+from falsifier.problem import Problem
 from falsifier.request import ProblemRequest, RunRequest
 from tests.problems import easy
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.journal import read_journal
-from falsifier.problem import bundled
+from falsifier.loading import bundled
 from tests.command import ROOT, falsifier
 
 
@@ -63,7 +63,7 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
         (["run", "AT1", "--input", "throtle=0:100:7"], "did you mean 'throttle'"),
         (["run", "AT1", "--budget", "0"], "simulations must be positive"),
         (["run", "AT1", "--budget", "many"], "many"),
-        (["run", "AT1", "--effort", "low"], "needs --model"),
+        (["run", "AT1", "--effort", "low"], "need --model"),
         (["run", "gone.toml"], "no such spec file"),
         (["run", "gone.fmu", "--stl", "G (x >= 0)"], "there is no file gone.fmu"),
         (["run", "gone.fmu"], "--stl"),

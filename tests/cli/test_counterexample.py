@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.cli import main
-from falsifier.problem import bundled
+from falsifier.loading import bundled
 from tests.command import Done
 from tests.llm.server import Step, serving
 

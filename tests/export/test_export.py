@@ -14,7 +14,8 @@ from falsifier.evaluation import Evaluation, evaluate
 from falsifier.export import export_counterexample
 from falsifier.export.inputs import input_table, start_values
 from falsifier.export.tables import matlab_name, write_csv, write_json, write_mat, write_ssv
-from falsifier.problem import Problem, bundled, load_problem
+from falsifier.loading import bundled, load_problem
+from falsifier.problem import Problem
 from falsifier.request import ProblemRequest
 from falsifier.signals import Signal
 from falsifier.space import Candidate, Freedom

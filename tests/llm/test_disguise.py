@@ -8,7 +8,7 @@ import pytest
 from falsifier.evaluation import Evaluation, evaluate
 from falsifier.llm.disguise import Disguise, renamed
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
-from falsifier.problem import load_problem
+from falsifier.loading import load_problem
 from falsifier.signals import Signal
 from falsifier.space import Candidate
 from falsifier.stl import parse

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from falsifier.budget import Budget
-from falsifier.engine import Result, search
+from falsifier.engine import search
 from falsifier.errors import ChatError
 from falsifier.evaluation import Evaluation, evaluate
 from falsifier.journal import ExchangeRecord, open_journal, read_journal
@@ -21,10 +21,12 @@ from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.llm.replay import RecordedChat
 from falsifier.llm.retry import Gate, RetryingChat
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.problem import Problem, load_problem
+from falsifier.loading import load_problem
+from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
 from falsifier.proposers.llm import make_llm_proposer, preview
 from falsifier.proposers.protocol import Proposer
+from falsifier.result import Result
 from falsifier.space import Freedom
 from falsifier.testing import ProposerContract
 from tests.llm.server import Step, serving

@@ -11,8 +11,9 @@ import pytest
 from falsifier.errors import SpecError
 from falsifier.evaluation import Evaluation, evaluate
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
+from falsifier.loading import load_problem
 from falsifier.model import Variable
-from falsifier.problem import Problem, Requirement, load_problem
+from falsifier.problem import Problem, Requirement
 from falsifier.signals import Signal
 from falsifier.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.stl import Verdict, parse
