@@ -21,8 +21,8 @@ from falsifier.loading import load_problem
 from falsifier.manifest import environment, manifest
 from falsifier.proposers import make_proposer
 from falsifier.report import html_report
-from falsifier.request import ProblemRequest, RunRequest, fixed_parameterization
-from falsifier.session import execute
+from falsifier.request import ProblemRequest, RunRequest
+from falsifier.session import perform
 
 SIMULATIONS = 1000
 LONG_JOURNAL = 10_000
@@ -54,13 +54,14 @@ def overhead(target: str, directory: Path) -> str:
     without that of the same asking and the same evaluating.
     """
     request = cross(suite_of(target), [Method("uniform")], seeds=[0], budget=Budget(SIMULATIONS))[0]
-    execute(request, None)
+    problem = request.problem.load()
+    described = manifest(request, problem)
+    perform(request, [problem], described, None)
     started = process_time()
-    execute(request, directory)
+    perform(request, [problem], described, directory)
     whole = process_time() - started
     records = read_journal(directory)
     seconds = [r.seconds for r in records if isinstance(r, EvaluatedRecord)]
-    problem = fixed_parameterization(load_problem(target))
     proposer = make_proposer("uniform", problem, seed=0)
     started = process_time()
     candidates = [proposer.ask(1)[0] for _ in seconds]
