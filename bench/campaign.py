@@ -17,7 +17,6 @@ from falsifier.campaign import CampaignRequest, Method, cross, suite
 from falsifier.campaign.directory import CampaignRecord, run_directory, write_campaign
 from falsifier.evaluation import evaluate, monitor_for
 from falsifier.journal import EndedRecord, EvaluatedRecord, VerdictRecord, read_journal
-from falsifier.loading import load_problem
 from falsifier.manifest import environment, manifest
 from falsifier.proposers import make_proposer
 from falsifier.report import html_report
