@@ -43,7 +43,6 @@ def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:
     long = histories(runs)
     assert len(long["best"]) == sum(run.simulations for run in runs)
     assert long["simulation"][: runs[0].simulations] == list(range(1, runs[0].simulations + 1))
-    pytest.importorskip("pandas")
     assert frame(runs).groupby("requirement").falsified.mean().to_dict() == {"HARD": 1.0, "NEVER": 0.0}
 
 

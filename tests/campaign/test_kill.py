@@ -14,6 +14,7 @@ from falsifier.campaign import Follower, resume_campaign, run_campaign
 from falsifier.campaign.directory import is_campaign
 from tests.campaign.processes import WANTED
 from tests.campaigns import outcomes, request, work_in_threads
+from tests.command import listen_to_interrupts
 
 ROOT = Path(__file__).resolve().parents[2]
 KILLS = 2
@@ -21,7 +22,8 @@ KILLS = 2
 
 def start(directory: Path) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "tests.campaign.processes", str(directory)]
-    return subprocess.Popen(command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, cwd=ROOT, env=environment, preexec_fn=listen_to_interrupts)
 
 
 def simulations(directory: Path) -> int:

@@ -10,7 +10,7 @@ import pytest
 
 from falsifier.journal import read_journal
 from falsifier.loading import bundled
-from tests.command import ROOT, falsifier
+from tests.command import ROOT, falsifier, listen_to_interrupts
 
 
 def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
@@ -137,6 +137,7 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
+        preexec_fn=listen_to_interrupts,
     )
     journal = tmp_path / "run" / "journal.jsonl"
     until = time.monotonic() + 60
