@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -30,8 +31,11 @@ formula = "G[0,20] (speed <= 500)"
 
 
 def run_pytest(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    # Where the package is installed pytest finds the plugin itself, and must not be given it twice.
+    installed = any(point.value == "pytest_falsifier" for point in entry_points(group="pytest11"))
+    plugin = [] if installed else ["-p", "pytest_falsifier"]
     return subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "pytest_falsifier", *arguments],
+        [sys.executable, "-m", "pytest", *plugin, *arguments],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"},
         capture_output=True,
@@ -78,7 +82,6 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
 
 
 def test_distributed_tests_give_the_same(repository: Path) -> None:
-    pytest.importorskip("xdist")
     done = run_pytest(repository, "--falsifier", "specs", "-n", "2")
     assert "1 failed, 1 passed" in done.stdout, done.stdout
 

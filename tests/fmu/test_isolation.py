@@ -16,6 +16,7 @@ import pytest
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel, worker
 from falsifier.fmu.isolation import REGISTRY
+from tests.command import listen_to_interrupts
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated, run
 
@@ -183,6 +184,7 @@ def script(body: str, **environment: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
+        preexec_fn=listen_to_interrupts,
     )
 
 
