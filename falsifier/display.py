@@ -24,13 +24,18 @@ _SHOWN_POINTS = 12
 
 @contextmanager
 def make_display(*, quiet: bool = False) -> Iterator[Listener]:
-    """Listener that shows progress on stderr: a live line on a terminal, plain lines elsewhere."""
+    """Listener that shows progress: live on a terminal or in a notebook, plain lines on stderr elsewhere."""
     if quiet:
         yield lambda event: None
         return
     from rich.console import Console
 
     console = Console(stderr=True)
+    if console.is_jupyter:  # there rich's own live line needs widgets
+        from falsifier.notebook import progress as notebook_progress
+
+        yield notebook_progress()
+        return
     if not console.is_terminal:
         yield PlainDisplay(console)
         return
@@ -52,7 +57,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                     total = event.budget.simulations
                     progress.update(task, description=f"{event.problem.name} {event.proposer}", total=total)
                 case Evaluated():
-                    progress.update(task, completed=event.spent.simulations, note=_note(event))
+                    progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
                     progress.update(task, note=f"model answered, {event.spent.tokens} tokens so far")
                 case Confirmed():
@@ -84,7 +89,7 @@ class PlainDisplay:
             case Evaluated(evaluation=evaluation, best=best) if (
                 best is not None and best.candidate is evaluation.candidate
             ):
-                self._line(f"simulation {event.index + 1}: {_note(event)}")
+                self._line(f"simulation {event.index + 1}: {note(event)}")
             case Confirmed():
                 self._line(f"violation {event.confirmation.outcome}: {event.confirmation.reason}")
             case _:
@@ -98,7 +103,7 @@ def result_text(result: Result) -> str:
     """Result for people."""
     name, count = result.problem.name, result.spent.simulations
     simulations = f"{count} simulation{'' if count == 1 else 's'}"
-    lines = [f"{name}: {result.status} after {simulations} ({_seconds(result.spent)})"]
+    lines = [f"{name}: {result.status} after {simulations} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
         lines.append(f"  confirmed      {result.counterexample.reason}")
@@ -132,7 +137,7 @@ def results_text(results: Sequence[Result]) -> str:
         )
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
-    return "\n".join([*lines, f"{falsified} of {len(results)} falsified ({_seconds(total)})"])
+    return "\n".join([*lines, f"{falsified} of {len(results)} falsified ({seconds_text(total)})"])
 
 
 def counterexample_name(result: Result) -> str:
@@ -220,7 +225,8 @@ def _picture(result: Result) -> Path:
     return (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
 
 
-def _note(event: Evaluated) -> str:
+def note(event: Evaluated) -> str:
+    """Best robustness so far, in a few words."""
     best = event.best
     if best is None or best.verdict is None:
         return "no successful simulation yet"
@@ -233,7 +239,8 @@ def _model_use(spent: Spent) -> str:
     return f"{spent.calls} calls, {spent.tokens} tokens{reasoning}, {cost}"
 
 
-def _seconds(spent: Spent) -> str:
+def seconds_text(spent: Spent) -> str:
+    """Seconds of a run and where they went."""
     return (
         f"{spent.seconds:.1f} s; simulator {spent.simulation_seconds:.2f} s, "
         f"engine {spent.proposal_seconds:.2f} s"

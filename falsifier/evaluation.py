@@ -50,6 +50,11 @@ class Evaluation:
         """Whether the requirement is violated; a failed simulation violates nothing."""
         return self.verdict is not None and self.verdict.violated
 
+    def _repr_html_(self) -> str:
+        from falsifier.notebook import evaluation_html
+
+        return evaluation_html(self)
+
 
 def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     """Simulate one candidate and judge it.

@@ -42,6 +42,7 @@ LAYERS = [
             "display",
             "explain",
             "export",
+            "notebook",
             "panels",
             "plotting",
             "report",

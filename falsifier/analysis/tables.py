@@ -40,6 +40,9 @@ class Table:
         notes = "".join(f"\n\n{note}" for note in self.notes)
         return f"**{self.title}**\n\n{body}{notes}\n"
 
+    def _repr_markdown_(self) -> str:
+        return self.markdown()
+
     def csv(self) -> str:
         """As comma-separated values."""
         buffer = StringIO()

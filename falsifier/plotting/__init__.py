@@ -5,15 +5,24 @@ nothing here needs a display.
 """
 
 from falsifier.plotting.campaign import plot_comparison, plot_history, plot_rates
-from falsifier.plotting.evaluation import plot_evaluation, plot_panel, save_figure
+from falsifier.plotting.diagnosis import plot_diagnosis
+from falsifier.plotting.evaluation import plot_evaluation, plot_panel, plot_requirement, png, save_figure
 from falsifier.plotting.neighbourhood import plot_neighbourhood
+from falsifier.plotting.prediction import plot_predictions
+from falsifier.plotting.trajectory import plot_signal, plot_trajectory
 
 __all__ = [
     "plot_comparison",
+    "plot_diagnosis",
     "plot_evaluation",
     "plot_history",
     "plot_neighbourhood",
     "plot_panel",
+    "plot_predictions",
     "plot_rates",
+    "plot_requirement",
+    "plot_signal",
+    "plot_trajectory",
+    "png",
     "save_figure",
 ]

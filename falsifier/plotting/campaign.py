@@ -7,6 +7,7 @@ import numpy as np
 
 from falsifier.analysis import Run, Statistics, group, statistics
 from falsifier.analysis.curves import falsification_curve
+from falsifier.plotting.axes import figure_of, own_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,7 @@ def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
         run: of load or load_run.
         ax: where to draw; None: a figure of its own.
     """
-    ax = ax if ax is not None else _axes()
+    ax = ax if ax is not None else own_axes()
     numbers = np.arange(1, len(run.robustness) + 1)
     ax.plot(numbers, run.robustness, ".", color=_VALUE, markersize=4, label="robustness")
     ax.step(numbers, run.best_so_far, where="post", color=_BEST, linewidth=1.4, label="smallest so far")
@@ -32,12 +33,12 @@ def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
         ax.plot(found + 1, run.robustness[found], "o", color=_FOUND, label="counterexample")
     ax.set(xlabel="simulation", ylabel="robustness", title=f"{run.requirement}: {run.method.label}")
     ax.legend()
-    return _figure(ax)
+    return figure_of(ax)
 
 
 def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     """Share of runs that are falsified after so many simulations, one curve for each method."""
-    ax = ax if ax is not None else _axes()
+    ax = ax if ax is not None else own_axes()
     by_method: dict[str, list[Run]] = {}
     for run in runs:
         by_method.setdefault(run.method.label, []).append(run)
@@ -47,7 +48,7 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
     if by_method:
         ax.legend()
-    return _figure(ax)
+    return figure_of(ax)
 
 
 def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
@@ -55,7 +56,7 @@ def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     cells = {key: statistics(members) for key, members in group(runs).items()}
     requirements = list(dict.fromkeys(requirement for requirement, _ in cells))
     methods = list(dict.fromkeys(method for _, method in cells))
-    ax = ax if ax is not None else _axes(max(6.0, 1.2 * len(requirements)))
+    ax = ax if ax is not None else own_axes(max(6.0, 1.2 * len(requirements)))
     width = 0.8 / max(len(methods), 1)
     for i, method in enumerate(methods):
         found = [cells.get((requirement, method)) for requirement in requirements]
@@ -68,23 +69,9 @@ def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     ax.set_xticks(np.arange(len(requirements)), requirements)
     ax.set(ylabel="simulations (mean, standard deviation)")
     ax.legend()
-    return _figure(ax)
+    return figure_of(ax)
 
 
 def _each(found: Sequence[Statistics | None], value: Callable[[Statistics], float | None]) -> list[float]:
     """The value of each, 0 where there is none."""
     return [(value(s) or 0.0) if s is not None else 0.0 for s in found]
-
-
-def _axes(width: float = 8.0) -> "Axes":
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, 4), layout="constrained").subplots()
-
-
-def _figure(ax: "Axes") -> "Figure":
-    from matplotlib.figure import Figure
-
-    figure = ax.get_figure(root=True)
-    assert isinstance(figure, Figure)
-    return figure

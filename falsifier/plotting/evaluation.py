@@ -1,10 +1,12 @@
 """Pictures of one simulation."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from falsifier.evaluation import Evaluation
 from falsifier.panels import Panel, panels
+from falsifier.plotting.axes import figure_of, own_axes
 from falsifier.problem import Problem
 
 if TYPE_CHECKING:
@@ -48,6 +50,31 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
     return figure
 
 
+def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
+    """The quantity that decided the verdict, with its bound, its window and the critical time.
+
+    Args:
+        problem: what was required.
+        evaluation: an evaluation with its trajectory.
+        ax: where to draw; None: a figure of its own.
+
+    Raises:
+        ValueError: when the evaluation has no trajectory.
+    """
+    trajectory, verdict = evaluation.trajectory, evaluation.verdict
+    if trajectory is None or verdict is None:
+        raise ValueError("a simulation that failed has nothing to draw")
+    ax = ax if ax is not None else own_axes(8, 3)
+    drawn = panels(problem.requirement.formula, trajectory, evaluation.candidate, (), verdict)
+    plot_panel(ax, next(panel for panel in drawn if panel.critical is not None))
+    ax.axvline(verdict.critical_time, color=_CRITICAL, linewidth=0.8, linestyle=":")
+    ax.set(
+        xlabel="time [s]",
+        title=f"robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s",
+    )
+    return figure_of(ax)
+
+
 def plot_panel(ax: "Axes", panel: Panel) -> None:
     """Draw a quantity with its bounds, windows and critical point, or an input with its control points."""
     is_input = panel.limits is not None
@@ -75,3 +102,10 @@ def plot_panel(ax: "Axes", panel: Panel) -> None:
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write a figure; the file's ending decides the format."""
     figure.savefig(path, dpi=130)
+
+
+def png(figure: "Figure", *, dpi: int) -> bytes:
+    """A figure as the content of a PNG file."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
