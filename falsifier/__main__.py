@@ -1,0 +1,6 @@
+"""``python -m falsifier``: the command line, where ``falsifier`` itself is not on the path."""
+
+from falsifier.cli import main
+
+if __name__ == "__main__":
+    main()
