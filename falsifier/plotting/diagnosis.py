@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _COLOURS = ("#8a5a00", "#2f7d4f", "#6a3d9a", "#1f5fa8")
 # Height of a window's bar and of its row, as a share of the axes.
-_BAR, _ROW = 0.035, 0.085
+_BAR, _ROW = 0.025, 0.11
 
 
 def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
@@ -44,5 +44,5 @@ def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" =
         y, colour = _ROW * (len(windows) - row), _COLOURS[row % len(_COLOURS)]
         ax.fill_between([start, end], y, y - _BAR, color=colour, transform=in_axes, linewidth=0, alpha=0.8)
         operator = step.text.partition(" was ")[0]
-        ax.text(end, y - _BAR / 2, f"  {operator}", color=colour, transform=in_axes, va="center", fontsize=8)
+        ax.text(start, y, operator, color=colour, transform=in_axes, va="bottom", fontsize=8)
     return figure_of(ax)
