@@ -31,6 +31,15 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
 
+    def only(self, *names: str) -> "Table":
+        """Return the same table with these columns alone, in this order.
+
+        Raises:
+            ValueError: for a name that is no column.
+        """
+        picked = [self.header.index(name) for name in names]
+        return replace(self, header=names, rows=tuple(tuple(row[i] for i in picked) for row in self.rows))
+
     def markdown(self) -> str:
         """As a Markdown table with its title and notes."""
         lines = [self.header, tuple("---" for _ in self.header), *self.rows]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.analysis import Published, Run, Score, ablation_table, load, main_table, models_table
-from falsifier.analysis.tables import statistics_json
+from falsifier.analysis.tables import Table, statistics_json
 from falsifier.campaign import Method
 
 PUBLISHED = Published(
@@ -91,3 +91,10 @@ def test_formats_carry_the_same_cells(runs: list[Run]) -> None:
         ("HARD", "uniform", 2),
         ("HARD", "corners", 2),
     ]
+
+
+def test_a_table_can_be_narrowed_to_some_columns() -> None:
+    table = Table("t", ("a", "b", "c"), (("1", "2", "3"),), ("note",))
+    assert table.only("c", "a") == Table("t", ("c", "a"), (("3", "1"),), ("note",))
+    with pytest.raises(ValueError, match="not in tuple"):
+        table.only("d")
