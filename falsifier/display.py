@@ -109,6 +109,8 @@ def result_text(result: Result) -> str:
         lines.append(f"  confirmed      {result.counterexample.reason}")
     else:
         lines.append(f"  reason         {result.reason}")
+        if result.status in ("interrupted", "failed") and result.directory is not None and result.evaluations:
+            lines.append(f"  go on with     falsifier resume '{result.directory}'")
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += _evaluation_lines(result, shown)

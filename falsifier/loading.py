@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from falsifier.errors import FormulaError, SpecError, did_you_mean
+from falsifier.errors import FormulaError, ModelError, SpecError, did_you_mean
 from falsifier.model import Experiment, Interface, ModelInfo, Variable
 from falsifier.problem import Problem, Requirement
 from falsifier.space import Freedom, InputRange, ParameterRange, SearchSpace
@@ -179,9 +179,14 @@ def parse_requirement(
 
 def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
     stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
-    offered = " and ".join(info.interfaces) or "no interface that this tool knows"
+    if not info.interfaces:
+        raise ModelError(
+            f"{info.name}: it offers neither co-simulation nor model exchange, and scheduled execution is "
+            "not supported; export it for co-simulation"
+        )
     if stated is None and len(info.interfaces) == 1:
         return info.interfaces[0]
+    offered = " and ".join(info.interfaces)
     if stated is None or stated not in info.interfaces:
         raise SpecError(f"the FMU offers {offered}: say which", file=file, key="model.interface")
     return stated

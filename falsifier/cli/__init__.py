@@ -4,11 +4,15 @@ import os
 import sys
 import traceback
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
 from falsifier import __version__
 from falsifier.errors import FalsifierError
+
+# What a shell reports of a program whose reader has gone: 128 + SIGPIPE.
+_PIPE_CLOSED = 141
 
 # name: (module, what --help says)
 _COMMANDS = {
@@ -73,22 +77,39 @@ def main() -> None:
     # The engines' matrices are small: threads of the algebra library only get in each other's way.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
-        sys.exit(cli.main(prog_name="falsifier", standalone_mode=False))
+        # Not cli.main, which ends with 1, the code of a falsification, when a pipe is closed.
+        with cli.make_context("falsifier", sys.argv[1:]) as context:
+            cli.invoke(context)
+        sys.exit(0)
     except click.exceptions.Exit as end:
         sys.exit(end.exit_code)
     except click.ClickException as error:
         error.show()
         sys.exit(2)
+    except BrokenPipeError:  # who read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more fails at exit
+        sys.exit(_PIPE_CLOSED)
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         sys.exit(130)
     except FalsifierError as error:
         click.echo(f"falsifier: {error}", err=True)
         sys.exit(error.exit_code)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(3)
+    except OSError as error:
+        if error.filename is None:
+            _report_defect()
+        click.echo(
+            f"falsifier: {error.filename}: {error.strerror}; choose a place that can be read and written, "
+            "for example with --out DIR",
+            err=True,
+        )
+        sys.exit(2)
     except Exception:
-        traceback.print_exc()
-        click.echo("falsifier: this is a defect of falsifier itself; please report the lines above", err=True)
-        sys.exit(3)
+        _report_defect()
+
+
+def _report_defect() -> NoReturn:
+    """Print the exception that is being handled and end with the code of a failure."""
+    traceback.print_exc()
+    click.echo("falsifier: this is a defect of falsifier itself; please report the lines above", err=True)
+    sys.exit(3)

@@ -19,12 +19,14 @@ from falsifier.signals import Signal
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
+    from rich.console import Console
     from rich.table import Table
 
 # Rows of a table of parameters or states; models have thousands of them.
 _SHOWN_VARIABLES = 60
 # Seconds that are simulated to check the step where the FMU gives no stop time.
 _CHECKED_SECONDS = 10.0
+_NO_INTERFACE = "no interface that can be simulated (scheduled execution is not supported)"
 # Columns of text where the width of the terminal cannot be asked.
 _PIPED_WIDTH = 160
 
@@ -72,15 +74,19 @@ def build(*, fmu: Path, out: Path | None) -> None:
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(*, fmu: Path, out: Path | None, force: bool) -> None:
     """Write a starter spec for an FMU; it loads as it is."""
-    from falsifier.fmu import read_info
+    from falsifier.fmu import FmuModel, read_info
 
     source = _existing_fmu(fmu)
     path = out or fmu.with_suffix(".toml")
     if path.exists() and not force:
         raise SpecError(f"{path} exists already: give another --out, or --force to replace it")
-    path.write_text(starter_spec(_relative(source, path), read_info(source)), encoding="utf-8")
+    found = read_info(source)
+    FmuModel(
+        source, interface=default_interface(found) or "co-simulation"
+    )  # refuses what cannot be simulated
+    path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
     load_problems(str(path))
-    click.echo(f"{path} written. Put in the real ranges and the requirement, then: falsifier run {path}")
+    click.echo(f"{path} written. Put in the real ranges and the requirement, then: falsifier run '{path}'")
 
 
 @click.command()
@@ -175,7 +181,16 @@ def _print_info(found: ModelInfo, *, everything: bool) -> None:
     from rich.console import Console
 
     console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPED_WIDTH)
-    console.print(f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces)}")
+    # In one piece and by click: rich would end with 1, the code of a falsification, when a pipe is closed.
+    with console.capture() as text:
+        _describe(console, found, everything=everything)
+    click.echo(text.get(), nl=False)
+
+
+def _describe(console: "Console", found: ModelInfo, *, everything: bool) -> None:
+    console.print(
+        f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces) or _NO_INTERFACE}"
+    )
     if found.description:
         console.print(found.description, markup=False)
     console.print(

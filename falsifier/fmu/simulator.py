@@ -147,8 +147,8 @@ def _check_interface(model: FmuModel) -> None:
     info = description.info
     if description.clocks:
         raise ModelError(
-            f"{model.path}: its clocks {', '.join(description.clocks)} would have to be ticked from outside, "
-            "which is not supported; export the model without input clocks"
+            f"{model.path}: its clocks {', '.join(map(repr, description.clocks))} would have to be ticked "
+            "from outside, which is not supported; export the model without input clocks"
         )
     if model.interface in info.interfaces:
         return

@@ -104,7 +104,7 @@ class RetryingChat:
                 own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
                 delay = min(own, self.longest_delay) if asked is None else asked
                 _LOG.warning(
-                    "%s Asking again in %.0f s (%d of %d).", error, delay, attempt + 1, self.attempts
+                    "%s. Asking again in %.0f s (%d of %d).", error, delay, attempt + 1, self.attempts
                 )
                 (self.gate.pause if error.for_all else self.gate.wait)(delay)
         raise AssertionError("attempts is at least 1")

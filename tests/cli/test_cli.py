@@ -176,3 +176,30 @@ def test_help_is_fast_and_names_the_commands(tmp_path: Path) -> None:
     assert done.code == 0
     for name in ("run", "info", "check", "prompt", "resume"):
         assert f"  {name}" in done.out
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = falsifier("run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "file/run", cwd=tmp_path)
+    assert done.code == 2
+    assert "file/run" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_closed_pipe_is_not_a_falsification(tmp_path: Path) -> None:
+    program = f"{sys.executable} -c 'from falsifier.cli import main; main()'"
+    command = program + " info AT.fmu | true; echo ${PIPESTATUS[0]}"
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"}
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "141"
+    assert "Traceback" not in done.stderr
+
+
+def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "tests" / "fixtures" / "fmus" / "Scheduled_3.fmu", tmp_path)
+    done = falsifier("init", "Scheduled_3.fmu", cwd=tmp_path)
+    assert done.code == 3
+    assert "scheduled execution is not supported" in done.err
+    assert not (tmp_path / "Scheduled_3.toml").exists()
