@@ -1,6 +1,7 @@
 """The notebooks run from start to end, without keys, as they are committed."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 # Bytes of all notebooks together, outputs included.
 MOST_BYTES = 1_500_000
+ABSOLUTE_PATH = re.compile(r"(?:^|[\s'\"(=])/\w[\w.-]*/\w", re.MULTILINE)
 
 
 class ThisPython(AsyncKernelManager):
@@ -47,6 +49,14 @@ def test_a_notebook_is_committed_executed_and_in_order(path: Path) -> None:
     nbformat.validate(notebook)
     counts = [cell.execution_count for cell in notebook.cells if cell.cell_type == "code"]
     assert counts == list(range(1, len(counts) + 1))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_tells_no_path_of_the_machine_that_ran_it(path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    texts = [output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs]
+    assert not [text for text in texts if ABSOLUTE_PATH.search(text)]
 
 
 def test_there_are_notebooks_and_they_are_small() -> None:
