@@ -274,10 +274,11 @@ class _Loop:
             self.spent,
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
+            seconds=perf_counter() - self.started,
         )
         if self.journal is not None and not replayed:
             self.journal.evaluated(self.count, evaluation, improved=improved)
-        self.emit(Evaluated(self.count, evaluation, target.best, self.clock(), replayed))
+        self.emit(Evaluated(self.count, evaluation, target.best, self.spent, replayed))
         self.count += 1
         return evaluation
 

@@ -75,16 +75,12 @@ class Signal:
     def sample(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the given times in s, shape as times."""
         at = np.asarray(times, dtype=np.float64)
-        if self.hold is not None:
-            at = np.floor(at / self.hold + _TIME_ROUNDING) * self.hold
         if len(self.times) == 1:
             return np.full(at.shape, self.values[0])
-        knots, values = np.asarray(self.times), np.asarray(self.values)
-        if self.interpolation == "linear":
-            return np.asarray(np.interp(at, knots, values))
-        if self.interpolation == "constant":
-            return np.asarray(values[np.searchsorted(knots, at + _TIME_ROUNDING, side="right") - 1])
-        return _evaluate(_pchip(self.times, self.values), at)
+        if self.hold is not None:
+            period = np.floor(at / self.hold + _TIME_ROUNDING).astype(np.intp)
+            return _held_values(self, int(period.max(initial=0)) + 1)[period]
+        return _interpolate(self, at)
 
     def pieces(self, stop_time: float) -> NDArray[np.float64]:
         """The signal on [0, stop_time] as cubic pieces, for solvers that evaluate it at times of their own.
@@ -94,9 +90,8 @@ class Signal:
             (t - s)**2 and (t - s)**3. The last piece has no end.
         """
         if self.hold is not None and len(self.times) > 1:
-            starts = np.arange(int(stop_time / self.hold + _TIME_ROUNDING) + 1, dtype=np.float64)
-            starts *= self.hold
-            return _constant_pieces(starts, self.sample(starts))
+            values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
+            return _constant_pieces(np.arange(len(values)) * self.hold, values)
         knots, values = np.asarray(self.times), np.asarray(self.values)
         if self.interpolation == "constant" or len(knots) == 1:
             return _constant_pieces(knots, values)
@@ -122,6 +117,7 @@ class Signal:
         return min((b - a for a, b in pairwise(changes)), default=None)
 
 
+@lru_cache(maxsize=256)
 def even_times(count: int, *, stop_time: float, interpolation: Interpolation) -> tuple[float, ...]:
     """Times in s of evenly spaced control points.
 
@@ -132,6 +128,26 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
         raise ValueError(f"a signal needs at least one control point, got {count}")
     pieces = count if interpolation == "constant" else max(count - 1, 1)
     return tuple(stop_time * i / pieces for i in range(count))
+
+
+# A simulation and the columns of its inputs ask for the same values one after the other.
+@lru_cache(maxsize=16)
+def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
+    """Values at the first sampling instants of a held signal, shape (count,)."""
+    assert signal.hold is not None, "only held signals have sampling instants"
+    values = _interpolate(signal, np.arange(count) * signal.hold)
+    values.flags.writeable = False
+    return values
+
+
+def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of a signal of two or more control points, whether or not it is held."""
+    knots, values = np.asarray(signal.times), np.asarray(signal.values)
+    if signal.interpolation == "linear":
+        return np.asarray(np.interp(at, knots, values))
+    if signal.interpolation == "constant":
+        return np.asarray(values[np.searchsorted(knots, at + _TIME_ROUNDING, side="right") - 1])
+    return _evaluate(_pchip(signal.times, signal.values), at)
 
 
 @lru_cache(maxsize=256)

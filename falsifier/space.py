@@ -198,8 +198,9 @@ class SearchSpace:
             CandidateError: when the vector has the wrong length or leaves the box by more than rounding.
         """
         values = [float(v) for v in vector]
-        if len(values) != len(self.dimensions):
-            raise CandidateError(f"expected {len(self.dimensions)} numbers, got {len(values)}")
+        expected = sum(r.control_points for r in self.inputs) + len(self.parameters)
+        if len(values) != expected:
+            raise CandidateError(f"expected {expected} numbers, got {len(values)}")
         signals = {}
         start = 0
         for r in self.inputs:
@@ -254,18 +255,21 @@ class SearchSpace:
 
     def _admit_signal(self, r: InputRange, signal: Signal) -> Signal:
         fixed = even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
-        is_fixed = (
-            signal.interpolation == r.interpolation
-            and len(signal.times) == len(fixed)
-            and np.allclose(signal.times, fixed, rtol=0, atol=1e-9 * max(self.stop_time, 1.0))
+        is_fixed = signal.interpolation == r.interpolation and (
+            signal.times == fixed or _are_close(signal.times, fixed, 1e-9 * max(self.stop_time, 1.0))
         )
         if not is_fixed:
             _check_freedom(r, signal, self.stop_time)
-        values = tuple(
-            _into_range(f"input {r.name!r} at t = {t:g} s", v, r.low, r.high)
-            for t, v in zip(signal.times, signal.values, strict=True)
-        )
-        return replace(signal, times=fixed if is_fixed else signal.times, values=values, hold=r.hold)
+        times, values = fixed if is_fixed else signal.times, signal.values
+        if min(values) < r.low or max(values) > r.high:
+            values = tuple(
+                _into_range(f"input {r.name!r} at t = {t:g} s", v, r.low, r.high)
+                for t, v in zip(times, values, strict=True)
+            )
+        admitted = times, values, r.hold
+        if admitted == (signal.times, signal.values, signal.hold):
+            return signal
+        return Signal(times, values, signal.interpolation, r.hold)
 
 
 def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
@@ -291,6 +295,12 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
             f"input {r.name!r}: control point at {signal.times[-1]:g} s lies behind the stop time "
             f"{stop_time:g} s"
         )
+
+
+def _are_close(times: Sequence[float], others: Sequence[float], tolerance: float) -> bool:
+    return len(times) == len(others) and all(
+        abs(a - b) <= tolerance for a, b in zip(times, others, strict=True)
+    )
 
 
 def _into_range(what: str, value: float, low: float, high: float) -> float:
