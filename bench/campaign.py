@@ -7,21 +7,31 @@ import json
 import platform
 import shutil
 import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future
 from pathlib import Path
-from statistics import quantiles
-from time import perf_counter, process_time
+from time import perf_counter
+from typing import Any
 
 from falsifier.analysis import load, load_run
 from falsifier.budget import Budget
 from falsifier.campaign import CampaignRequest, Method, cross, suite
 from falsifier.campaign.directory import CampaignRecord, run_directory, write_campaign
-from falsifier.evaluation import evaluate, monitor_for
-from falsifier.journal import EndedRecord, EvaluatedRecord, VerdictRecord, read_journal
+from falsifier.engine import falsify, search
+from falsifier.evaluation import Evaluation, evaluate
+from falsifier.journal import (
+    EndedRecord,
+    EvaluatedRecord,
+    VerdictRecord,
+    open_journal,
+    write_manifest,
+)
 from falsifier.manifest import environment, manifest
 from falsifier.proposers import make_proposer
+from falsifier.proposers.protocol import Proposer
 from falsifier.report import html_report
 from falsifier.request import ProblemRequest, RunRequest
-from falsifier.session import perform
+from falsifier.space import Candidate
 
 SIMULATIONS = 1000
 LONG_JOURNAL = 10_000
@@ -46,41 +56,61 @@ def main() -> None:
 
 
 def overhead(target: str, directory: Path) -> str:
-    """Return where a simulation's time goes in a recorded run, as a row of the table.
+    """Return where the wall-clock time of a recorded run goes, per simulation, as a row of the table.
 
-    Simulations: lower decile of wall-clock time, for the machine is rarely alone. All else: processor time of
-    this process, in which the FMU does not run; recording and the loop are what is left of a whole run's
-    without that of the same asking and the same evaluating.
+    Judging is sampling the inputs and the monitor; record and loop is what is left beside the simulations,
+    the engine and judging.
     """
     request = cross(suite_of(target), [Method("uniform")], seeds=[0], budget=Budget(SIMULATIONS))[0]
     problem = request.problem.load()
-    described = manifest(request, problem)
-    perform(request, [problem], described, None)
-    started = process_time()
-    perform(request, [problem], described, directory)
-    whole = process_time() - started
-    records = read_journal(directory)
-    seconds = [r.seconds for r in records if isinstance(r, EvaluatedRecord)]
-    proposer = make_proposer("uniform", problem, seed=0)
-    started = process_time()
-    candidates = [proposer.ask(1)[0] for _ in seconds]
-    engine = process_time() - started
-    started = process_time()
-    evaluations = [evaluate(problem, candidate) for candidate in candidates]
-    evaluating = process_time() - started
-    started = process_time()
-    for evaluation in evaluations:
-        assert evaluation.trajectory is not None
-        monitor_for(problem).evaluate(evaluation.trajectory)
-    judging = process_time() - started
+    falsify(problem, "uniform", budget=10)
+    write_manifest(directory, manifest(request, problem).model_dump(mode="json"))
+    engine, executor = TimedEngine(make_proposer("uniform", problem, seed=0)), TimedExecutor()
+    with open_journal(directory, keep=request.keep) as journal:
+        started = perf_counter()
+        result = search(problem, lambda *_: engine, request.budget, executor=executor, journal=journal)
+        whole = perf_counter() - started
     problem.model.close()
-    count = len(seconds)
-    parts = [
-        quantiles(seconds, n=10)[0],
-        *(x / count for x in (engine, judging, whole - engine - evaluating)),
-    ]
-    cells = (f"{1e3 * part:.3f}" for part in parts)
-    return f"| {target.split(':')[1]} | {' | '.join(cells)} | {parts[-1] / sum(parts):.1%} |"
+    simulating = result.spent.simulation_seconds
+    judging = executor.seconds - simulating
+    parts = [simulating, engine.seconds, judging, whole - executor.seconds - engine.seconds]
+    cells = (f"{1e3 * part / result.spent.simulations:.3f}" for part in parts)
+    return f"| {target.split(':')[1]} | {' | '.join(cells)} | {parts[-1] / whole:.1%} |"
+
+
+class TimedEngine:
+    """An engine and the seconds that it took."""
+
+    def __init__(self, engine: Proposer) -> None:
+        self.engine, self.seconds = engine, 0.0
+        self.name = engine.name
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """See Proposer.ask."""
+        started = perf_counter()
+        candidates = self.engine.ask(n)
+        self.seconds += perf_counter() - started
+        return candidates
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """See Proposer.tell."""
+        started = perf_counter()
+        self.engine.tell(evaluations)
+        self.seconds += perf_counter() - started
+
+
+class TimedExecutor(Executor):
+    """Runs what it is given at once and counts the seconds."""
+
+    seconds = 0.0
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """See Executor.submit."""
+        done: Future[Any] = Future()
+        started = perf_counter()
+        done.set_result(fn(*args, **kwargs))
+        self.seconds += perf_counter() - started
+        return done
 
 
 def suite_of(target: str) -> list[ProblemRequest]:

@@ -91,7 +91,7 @@ class Signal:
         """
         if self.hold is not None and len(self.times) > 1:
             values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
-            return _constant_pieces(np.arange(len(values)) * self.hold, values)
+            return _constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
         knots, values = np.asarray(self.times), np.asarray(self.values)
         if self.interpolation == "constant" or len(knots) == 1:
             return _constant_pieces(knots, values)
@@ -135,7 +135,7 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
 def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
     """Values at the first sampling instants of a held signal, shape (count,)."""
     assert signal.hold is not None, "only held signals have sampling instants"
-    values = _interpolate(signal, np.arange(count) * signal.hold)
+    values = _interpolate(signal, np.arange(count, dtype=np.float64) * signal.hold)
     values.flags.writeable = False
     return values
 
