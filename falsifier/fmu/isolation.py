@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,10 +30,12 @@ from numpy.typing import NDArray
 from falsifier.errors import FailureStatus, ModelError, SimulationError
 from falsifier.fmu import nursery
 from falsifier.fmu.channel import (
+    QUICK_SECONDS,
     Closed,
     Reply,
     receive_reply,
     send_request,
+    watch,
 )
 from falsifier.fmu.environment import worker_environment
 from falsifier.fmu.order import Order, Reuse
@@ -132,6 +135,7 @@ class _Worker:
         self.plan: Plan | None = None
         self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
         self.awaits_test = False
+        self.is_quick = False
 
     def prepare(self, plan: Plan) -> Reply:
         """Share memory for a plan and have the worker look up its names."""
@@ -142,6 +146,20 @@ class _Worker:
             send_request(self.sock, PREPARE, pickle.dumps(plan), (file.fileno(),))
         reply = receive_reply(self.sock, _LOADING_SECONDS)
         self.plan = plan if reply.status == "ok" else None
+        return reply
+
+    def wait(self, limit: float) -> Reply:
+        """Outcome of a simulation that was begun.
+
+        Raises:
+            TimeoutError: when there is none within limit seconds.
+            Closed: when the process has died.
+        """
+        started = time.perf_counter()
+        if self.is_quick:
+            watch(self.sock, QUICK_SECONDS)
+        reply = receive_reply(self.sock, limit)
+        self.is_quick = time.perf_counter() - started < QUICK_SECONDS
         return reply
 
     def take_log(self) -> tuple[str, ...]:
@@ -197,7 +215,7 @@ class IsolatedFmu:
             try:
                 fill(worker.room)
                 worker = self._started(worker, plan, fill)
-                reply = receive_reply(worker.sock, plan.time_limit + _GRACE_SECONDS)
+                reply = worker.wait(plan.time_limit + _GRACE_SECONDS)
             except TimeoutError:
                 raise self._end(
                     f"stopped after the time limit of {plan.time_limit:g} s without an answer", "timeout"

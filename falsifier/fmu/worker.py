@@ -16,7 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from falsifier.errors import FalsifierError, SimulationError
-from falsifier.fmu.channel import Closed, Reply, close_all, receive_request, send_reply
+from falsifier.fmu.channel import (
+    QUICK_SECONDS,
+    Closed,
+    Reply,
+    close_all,
+    receive_request,
+    send_reply,
+    watch,
+)
 from falsifier.fmu.description import Description
 from falsifier.fmu.order import Reuse
 from falsifier.fmu.plan import Plan
@@ -55,13 +63,17 @@ def serve(
             send_reply(sock, worker.prepare(pickle.loads(payload), descriptors[0]))
             close_all(descriptors)
             continue
+        started = time.perf_counter()
         reply = worker.run()
+        is_quick = time.perf_counter() - started < QUICK_SECONDS
         send_reply(sock, reply)
         if reply.more:
             reply = worker.find_reuse()
             send_reply(sock, reply)
         if reply.leaving:
             return
+        if is_quick:
+            watch(sock, QUICK_SECONDS)
 
 
 class _Worker:
