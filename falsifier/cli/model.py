@@ -17,6 +17,13 @@ from falsifier.cli.options import json_option, problem_options, problem_request
     "--run", "directory", type=click.Path(path_type=Path), help="Show the prompt behind this run's samples."
 )
 @click.option("--samples", type=int, help="With --run: only its first samples.")
+@click.option(
+    "--engine",
+    type=click.Choice(["llm", "hybrid"]),
+    default="llm",
+    show_default=True,
+    help="Who asks; hybrid: for several candidates at a time, with the tool that it offers.",
+)
 @json_option
 def prompt(
     *,
@@ -24,22 +31,28 @@ def prompt(
     anonymous: bool,
     directory: Path | None,
     samples: int | None,
+    engine: str,
     as_json: bool,
     **options: Any,
 ) -> None:
     """Print exactly what would be sent next; send nothing."""
     from falsifier.journal import read_journal, recorded_evaluations
-    from falsifier.proposers.llm import preview
+    from falsifier.proposers.llm import preview, preview_tool
 
     if samples is not None and directory is None:
         raise click.UsageError("--samples needs --run DIR")
     problem = problem_request(options).load()
     evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
-    messages = preview(problem, variant=variant, evaluations=evaluations[:samples], anonymous=anonymous)
-    if as_json:
-        click.echo(json.dumps([message.model_dump() for message in messages], indent=2))
+    told = evaluations[:samples]
+    if engine == "llm":
+        _print_prompt(preview(problem, variant=variant, evaluations=told, anonymous=anonymous), as_json=as_json)
         return
-    click.echo("\n\n".join(f"--- {message.role} ---\n{message.content}" for message in messages))
+    from falsifier.proposers.hybrid import Settings
+
+    settings = Settings()
+    count = settings.count if told else settings.opening
+    messages = preview(problem, variant=variant, evaluations=told, count=count, anonymous=anonymous)
+    _print_prompt(messages, as_json=as_json)
 
 
 @click.command()

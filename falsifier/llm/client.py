@@ -11,6 +11,7 @@ from falsifier.llm.messages import ChatReply, ChatRequest
 from falsifier.llm.modes import MODES, Mode
 from falsifier.llm.providers import find_key, known
 from falsifier.llm.usage import Price, usage_of
+from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, storable
 
 # Reasoning models may think for minutes; seconds.
 DEFAULT_TIMEOUT = 600.0
@@ -52,6 +53,7 @@ class LiteLLMChat:
         Raises:
             TransientChatError: for what may be gone the next time.
             FormatUnsupportedError: when the server refuses this way of asking for JSON.
+            ToolsUnsupportedError: when the server refuses the tools that are offered.
             ChatError: for everything else, naming the model and the key's variable.
         """
         key = find_key(self.model, api_base=self.api_base)
@@ -61,7 +63,7 @@ class LiteLLMChat:
         try:
             response = litellm.completion(
                 model=self.model,
-                messages=[m.model_dump() for m in request.messages],
+                messages=[sent_message(m) for m in request.messages],
                 api_base=self.api_base,
                 timeout=self.timeout,
                 drop_params=True,
@@ -75,6 +77,7 @@ class LiteLLMChat:
                 api_base=self.api_base,
                 key_variables=known(self.model).keys,
                 secrets=(key or "", *self._secret_options()),
+                offers_tools=bool(request.tools),
             ) from None
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
@@ -106,6 +109,8 @@ class LiteLLMChat:
             }
         elif request.reply_schema is not None and self.mode == "json_object":
             arguments["response_format"] = {"type": "json_object"}
+        if request.tools:
+            arguments["tools"] = [sent_tool(tool) for tool in request.tools]
         if request.room > 1 and "max_tokens" in arguments:
             arguments["max_tokens"] *= request.room
         return arguments
@@ -116,16 +121,20 @@ class LiteLLMChat:
         choice = response.choices[0]
         refusal = _refusal(choice.message)
         refused = bool(refusal) and not choice.message.content
-        text = _storable(choice.message.content or refusal)
+        text = storable(choice.message.content or refusal)
+        echo = known(self.model).echo
+        calls = calls_in(choice.message, echo)
         reported = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         return ChatReply(
             text=text,
-            reasoning=_storable(getattr(choice.message, "reasoning_content", None) or ""),
+            tool_calls=calls,
+            echo=echo_of(choice.message, echo) if calls else {},
+            reasoning=storable(getattr(choice.message, "reasoning_content", None) or ""),
             finish_reason="refusal" if refused else choice.finish_reason or "",
             usage=usage_of(
                 getattr(response, "usage", None),
                 request=request,
-                text=text,
+                text="".join((text, *(call.arguments for call in calls))),
                 price=self.price,
                 reported_cost=self._believed(reported),
             ),
@@ -146,14 +155,11 @@ class LiteLLMChat:
         omitted = {own_names.get(name, name) for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
         effective["mode"] = arguments.get("response_format", {}).get("type", "prompt")
+        if "tools" in arguments:
+            effective["tools"] = [tool["function"]["name"] for tool in arguments["tools"]]
         if "max_tokens" in effective:
             effective["max_tokens"] = arguments["max_tokens"]
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
-
-
-def _storable(text: str) -> str:
-    """Text without the halves of surrogate pairs, which no file can hold."""
-    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _refusal(message: Any) -> str:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from falsifier.errors import ChatError, FalsifierError
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Message, ToolCall
 
 T = TypeVar("T")
 OnExchange = Callable[[Exchange], None]
+Respond = Callable[[ToolCall], str]
 
 MAX_REASKS = 2
 # A rejected reply is shown to its author again, but a runaway one not in full.
@@ -29,29 +30,37 @@ def converse(
     on_exchange: OnExchange,
     *,
     reasks: int = MAX_REASKS,
+    respond: Respond | None = None,
 ) -> T:
-    """Ask, and ask again with what was wrong.
+    """Ask, answer what the model asks in its turn, and ask again with what was wrong.
 
     Args:
         chat: who is asked.
         request: the question.
         read: makes a value of a reply's text, or raises RejectedReplyError.
         on_exchange: called with every question and answer, rejected ones included.
-        reasks: how often a rejected reply is asked for again.
+        reasks: how often a rejected reply is asked for again; one in which no call of a tool could be
+            answered counts as rejected.
+        respond: answers a call of a tool that the question offers, or raises RejectedReplyError, as it must
+            after some calls, for each is a request more; None: no tool is offered.
 
     Raises:
         NoValidReplyError: when no answer was valid.
         ChatError: when no answer came.
     """
     problems: list[str] = []
-    for _ in range(reasks + 1):
+    while len(problems) <= reasks:
         reply = chat.complete(request)
-        value: T | None = None
+        values: list[T] = []
         problem = None
-        try:
-            value = read(_usable_text(reply))
-        except RejectedReplyError as rejection:
-            problem = _explained(reply, str(rejection))
+        if respond is not None and reply.tool_calls:
+            following, problem = _called(request, reply, respond)
+        else:
+            try:
+                values.append(read(_usable_text(reply)))
+            except RejectedReplyError as rejection:
+                problem = _explained(reply, str(rejection))
+            following = _asked_again(request, reply, problem or "")
         on_exchange(
             Exchange(
                 model=chat.model,
@@ -61,14 +70,40 @@ def converse(
                 problem=problem,
             )
         )
-        if problem is None and value is not None:
+        if problem is None:
             chat.accepted(request, reply)
-            return value
-        problems.append(problem or "")
-        request = _asked_again(request, reply, problem or "")
+            if values:
+                return values[0]
+        else:
+            problems.append(problem)
+        request = following
     raise NoValidReplyError(
         f"{chat.model} gave no valid reply in {reasks + 1} tries; what was wrong: {' | '.join(problems)}"
     )
+
+
+def _called(request: ChatRequest, reply: ChatReply, respond: Respond) -> tuple[ChatRequest, str | None]:
+    """Answer the calls of a reply: what is sent next, and what was wrong if no call could be answered."""
+    answers, problems = [], []
+    for call in reply.tool_calls:
+        try:
+            answers.append(respond(call))
+        except RejectedReplyError as rejection:
+            problems.append(str(rejection))
+            answers.append(f"That call cannot be answered: {rejection}.")
+    following = request.model_copy(
+        update={
+            "messages": (
+                *request.messages,
+                Message(role="assistant", content=reply.text, tool_calls=reply.tool_calls, echo=reply.echo),
+                *(
+                    Message(role="tool", content=answer, tool_call_id=call.id)
+                    for call, answer in zip(reply.tool_calls, answers, strict=True)
+                ),
+            )
+        }
+    )
+    return following, problems[0] if len(problems) == len(answers) else None
 
 
 def _usable_text(reply: ChatReply) -> str:

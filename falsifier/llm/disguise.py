@@ -10,6 +10,7 @@ from falsifier.llm.prompts.view import View
 from falsifier.model import ModelInfo
 from falsifier.problem import Requirement
 from falsifier.space import Candidate
+from falsifier.stl import Verdict
 from falsifier.stl.expression import Name
 from falsifier.trajectory import Trajectory
 
@@ -79,13 +80,16 @@ class Disguise:
         return replace(
             evaluation,
             candidate=self.hidden_candidate(evaluation.candidate),
-            verdict=verdict
-            and replace(
-                verdict, predicate=self._predicate(verdict.predicate), values=self._told(verdict.values)
-            ),
+            verdict=verdict and self.hidden_verdict(verdict),
             trajectory=trajectory and Trajectory(trajectory.times, self._told(trajectory.columns)),
             reason="",
             log=(),
+        )
+
+    def hidden_verdict(self, verdict: Verdict) -> Verdict:
+        """Return a verdict under neutral names."""
+        return replace(
+            verdict, predicate=self._predicate(verdict.predicate), values=self._told(verdict.values)
         )
 
     def hidden_candidate(self, candidate: Candidate) -> Candidate:

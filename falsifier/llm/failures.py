@@ -8,7 +8,17 @@ from falsifier.errors import ChatError
 
 # 200 is an answer that is no JSON: a page of some machine in between.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
-_FORMAT_WORDS = ("response_format", "json_schema", "json_object", "structured output", "grammar", "schema")
+_FORMAT_WORDS = (
+    "response_format",
+    "json_schema",
+    "json_object",
+    "structured output",
+    "grammar",
+    "schema",
+    "json mode",
+    "response mime type",
+)
+_TOOL_WORDS = ("tool", "function call", "function_call")
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
 _REDACTED = "[redacted]"
 _SECRET_PATTERNS = (
@@ -42,6 +52,10 @@ class FormatUnsupportedError(ChatError):
     """The server does not accept this way of asking for JSON."""
 
 
+class ToolsUnsupportedError(ChatError):
+    """The server, or the model behind it, takes no tools."""
+
+
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
     """Text without keys: the given ones, those in the environment, and what looks like one."""
     environment = (v for k, v in os.environ.items() if k.upper().endswith(_SECRET_NAMES))
@@ -60,6 +74,7 @@ def classify(
     api_base: str | None,
     key_variables: tuple[str, ...],
     secrets: Iterable[str],
+    offers_tools: bool = False,
 ) -> ChatError:
     """Error of this package for whatever a request raised; its text holds no secret."""
     status = _status(error)
@@ -69,6 +84,15 @@ def classify(
     keys = " or ".join(key_variables) or "the API key"
     if status in (401, 403):
         return ChatError(f"{model}{where}: the provider refused the key; check {keys}. {detail}")
+    speaks_of_format = any(word in lowered for word in _FORMAT_WORDS)
+    # Some servers say so by 404 (no route with tools) or 500 (not started with them).
+    if (
+        offers_tools
+        and status in (400, 404, 422, 500, 501)
+        and any(word in lowered for word in _TOOL_WORDS)
+        and not speaks_of_format
+    ):
+        return ToolsUnsupportedError(f"{model}{where}: {detail}")
     if status == 404:
         return ChatError(
             f"{model}{where}: there is no such model or address; check the model's name, --api-base and "
@@ -83,7 +107,7 @@ def classify(
         return ChatError(f"{model}{where}: the prompt is too long; lower its token limit. {detail}")
     if status == 429 and any(word in lowered for word in _QUOTA_WORDS):
         return ChatError(f"{model}{where}: the account behind {keys} has no quota left. {detail}")
-    if status in (400, 422, 501) and any(word in lowered for word in _FORMAT_WORDS):
+    if status in (400, 422, 501) and speaks_of_format:
         return FormatUnsupportedError(f"{model}{where}: {detail}")
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or _is_connection(error):
         return TransientChatError(

@@ -70,6 +70,21 @@ def listed_price(model: str) -> Price | None:
     return Price(1000 * prompt, 1000 * completion)
 
 
+def may_take_tools(model: str, *, api_base: str | None = None) -> bool:
+    """Whether tools are worth offering: False only where litellm lists the model as one that takes none.
+
+    What a server of one's own takes, only the server can say.
+    """
+    if api_base is not None or known(model).local:
+        return True
+    litellm = load_litellm()
+    try:
+        litellm.get_model_info(model)
+    except Exception:  # not in the table
+        return True
+    return bool(litellm.supports_function_calling(model))
+
+
 def dropped_parameters(model: str, arguments: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of those arguments that litellm leaves out because the model does not take them."""
     allowed = set(arguments.get("allowed_openai_params", ()))

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any, Literal, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
-Role = Literal["system", "user", "assistant"]
+Role = Literal["system", "user", "assistant", "tool"]
 Source = Literal["model", "script", "recording", "cache"]
 
 
@@ -13,11 +13,46 @@ class _Value(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Message(_Value):
+class _MayUseTools(_Value):
+    """Leaves out empty fields of tools, so that records and cache keys without tools stay what they were."""
+
+    @model_serializer(mode="wrap")
+    def _without_empty_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {k: v for k, v in handler(self).items() if v or k not in _FIELDS_OF_TOOLS}
+
+
+_FIELDS_OF_TOOLS = frozenset({"tools", "tool_calls", "tool_call_id", "echo"})
+
+
+class Tool(_Value):
+    """Something that a model may call before it answers."""
+
+    name: str
+    description: str
+    parameters: dict[str, Any] = Field(description="JSON Schema of the arguments, strict subset.")
+
+
+class ToolCall(_MayUseTools):
+    """One call of a tool, as the model made it."""
+
+    id: str
+    name: str
+    arguments: str = Field(description="JSON text; whether it is valid, the tool must see.")
+    echo: dict[str, Any] = Field(
+        default_factory=dict, description="What the provider wants back with the call, such as a signature."
+    )
+
+
+class Message(_MayUseTools):
     """One message of a conversation."""
 
     role: Role
     content: str
+    tool_calls: tuple[ToolCall, ...] = Field(default=(), description="Of an assistant's message.")
+    tool_call_id: str = Field(default="", description="Of a tool's message: the call that it answers.")
+    echo: dict[str, Any] = Field(
+        default_factory=dict, description="What the provider wants back with the message, such as thoughts."
+    )
 
 
 class Usage(_Value):
@@ -39,7 +74,7 @@ class Usage(_Value):
         return self.prompt_tokens + self.completion_tokens
 
 
-class ChatRequest(_Value):
+class ChatRequest(_MayUseTools):
     """What is asked.
 
     Everything that shapes the answer is either here or among the chat's own parameters.
@@ -49,16 +84,21 @@ class ChatRequest(_Value):
     reply_schema: dict[str, Any] | None = Field(
         default=None, description="JSON Schema of the reply, strict subset."
     )
+    tools: tuple[Tool, ...] = Field(default=(), description="What may be called before the answer.")
     sample: int = Field(default=0, description="Which of several answers to the same question this is.")
     room: int = Field(
         default=1, description="Multiplies the limit on tokens, after an answer that was cut off."
     )
 
 
-class ChatReply(_Value):
+class ChatReply(_MayUseTools):
     """What came back."""
 
     text: str
+    tool_calls: tuple[ToolCall, ...] = Field(default=(), description="To be answered before there is a text.")
+    echo: dict[str, Any] = Field(
+        default_factory=dict, description="What the provider wants back with the calls, such as thoughts."
+    )
     reasoning: str = Field(default="", description="What the provider shows of the model's reasoning.")
     finish_reason: str = "stop"
     usage: Usage = Usage()

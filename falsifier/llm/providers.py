@@ -21,6 +21,8 @@ class Provider:
         defaults: parameters that are sent unless the user states them.
         effort: how reasoning effort is passed: ``native``, or ``allowed`` where the client library must be
             told to let it through.
+        echo: fields that come with calls of tools and must be sent back with them: signed thoughts, which
+            the provider refuses to do without.
     """
 
     keys: tuple[str, ...] = ()
@@ -28,6 +30,7 @@ class Provider:
     openai_client: bool = False
     defaults: Mapping[str, Any] = field(default_factory=dict)
     effort: Literal["native", "allowed"] = "native"
+    echo: tuple[str, ...] = ()
 
 
 # Ollama cuts off the beginning of a prompt that is longer than its context, without a word. Its own default
@@ -38,12 +41,12 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     {
         "openai": Provider(("OPENAI_API_KEY",), openai_client=True),
         "azure": Provider(("AZURE_API_KEY",), openai_client=True),
-        "anthropic": Provider(("ANTHROPIC_API_KEY",)),
-        "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY")),
+        "anthropic": Provider(("ANTHROPIC_API_KEY",), echo=("thinking_blocks",)),
+        "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY"), echo=("provider_specific_fields",)),
         "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), effort="allowed"),
         "mistral": Provider(("MISTRAL_API_KEY",)),
         "groq": Provider(("GROQ_API_KEY",)),
-        "deepseek": Provider(("DEEPSEEK_API_KEY",)),
+        "deepseek": Provider(("DEEPSEEK_API_KEY",), echo=("reasoning_content",)),
         "openrouter": Provider(("OPENROUTER_API_KEY",)),
         "together_ai": Provider(("TOGETHERAI_API_KEY", "TOGETHER_API_KEY")),
         "xai": Provider(("XAI_API_KEY",)),

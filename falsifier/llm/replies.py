@@ -34,12 +34,14 @@ class ReplyForm:
         named: signals and parameters by name; else one list of numbers in the order of the dimensions.
         free: whether a free parameterization may be used where the space allows it.
         count: how many candidates.
+        reasoned: whether each candidate bears a rationale.
     """
 
     space: SearchSpace
     named: bool = True
     free: bool = False
     count: int = 1
+    reasoned: bool = True
 
     @property
     def is_free(self) -> bool:
@@ -48,11 +50,12 @@ class ReplyForm:
 
     def schema(self) -> dict[str, Any]:
         """JSON Schema within the subset that strict servers take: all required, nothing more, no maps."""
-        candidate = self._named_schema() if self.named else _object(rationale=_TEXT, point=_NUMBERS)
+        parts: dict[str, Any] = {"rationale": _TEXT} if self.reasoned else {}
+        candidate = _object(**parts, **(self._named_parts() if self.named else {"point": _NUMBERS}))
         return candidate if self.count == 1 else _object(candidates={"type": "array", "items": candidate})
 
-    def _named_schema(self) -> dict[str, Any]:
-        parts: dict[str, Any] = {"rationale": _TEXT}
+    def _named_parts(self) -> dict[str, Any]:
+        parts: dict[str, Any] = {}
         if self.space.inputs:
             name = {"type": "string", "enum": [r.name for r in self.space.inputs]}
             signal = _object(name=name, values=_NUMBERS)
@@ -67,7 +70,7 @@ class ReplyForm:
         if self.space.parameters:
             name = {"type": "string", "enum": [p.name for p in self.space.parameters]}
             parts["parameters"] = {"type": "array", "items": _object(name=name, value={"type": "number"})}
-        return _object(**parts)
+        return parts
 
     def read(self, text: str, *, origin: str = "") -> list[Candidate]:
         """Candidates of a reply: the valid ones among several.
@@ -75,18 +78,31 @@ class ReplyForm:
         Raises:
             RejectedReplyError: telling what is wrong, when none is valid.
         """
+        found = self.read_each(text, origin=origin)
+        candidates = [one for one in found if isinstance(one, Candidate)]
+        if not candidates:
+            raise next(one for one in found if isinstance(one, RejectedReplyError))
+        return candidates
+
+    def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
+        """Candidates of a reply in its order; in place of an invalid one, what is wrong with it.
+
+        Raises:
+            RejectedReplyError: when there is none, valid or not.
+        """
         text = _THOUGHT.sub("", text)
         found = _candidate_objects(text) or [{"point": numbers} for numbers in _points(text)]
-        candidates, problems = [], []
+        if not found:
+            raise RejectedReplyError(
+                "it holds neither a JSON object with a candidate nor <point> ... </point>"
+            )
+        each: list[Candidate | RejectedReplyError] = []
         for one in found:
             try:
-                candidates.append(self._candidate(_validated(one), origin))
+                each.append(self._candidate(_validated(one), origin))
             except RejectedReplyError as rejection:
-                problems.append(str(rejection))
-        if not candidates:
-            nothing = "it holds neither a JSON object with a candidate nor <point> ... </point>"
-            raise RejectedReplyError(problems[0] if problems else nothing)
-        return candidates
+                each.append(rejection)
+        return each
 
     def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:
         if reply.point is not None:

@@ -1,5 +1,6 @@
 """What a request cost, in tokens and in money; an unknown price is None and never zero."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,7 +43,7 @@ def usage_of(
     Args:
         response_usage: as the provider sent it, by OpenAI's field names; None or zeros: it sent nothing.
         request: what was asked.
-        text: what was answered.
+        text: what was answered, calls of tools included.
         price: the user's own price, which goes before anything reported.
         reported_cost: US dollars as the client library works them out; None where the price is unknown.
     """
@@ -52,7 +53,7 @@ def usage_of(
     reasoning = int(getattr(details, "reasoning_tokens", None) or 0)
     estimated = prompt == 0 and completion == 0
     if estimated:
-        prompt = sum(estimate_tokens(m.content) for m in request.messages)
+        prompt = sum(estimate_tokens(part) for part in _sent(request))
         completion = estimate_tokens(text)
     cost = price.cost(prompt, completion) if price is not None else None if estimated else reported_cost
     return Usage(
@@ -62,3 +63,10 @@ def usage_of(
         cost=cost,
         estimated=estimated,
     )
+
+
+def _sent(request: ChatRequest) -> Iterator[str]:
+    for message in request.messages:
+        yield message.content
+        yield from (call.arguments for call in message.tool_calls)
+    yield from (tool.model_dump_json() for tool in request.tools)

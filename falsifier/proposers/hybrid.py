@@ -2,51 +2,28 @@
 
 The model opens, because its first guess is worth more than any corner. Later it is asked for several
 candidates at a time; the surrogate ranks them before one is simulated, and breeds from them. The model may
-answer the surrogate's predictions once before anything is simulated. When its candidates stop helping, the
+call the surrogate for predictions in its turn; one that does not hears them afterwards and may answer them
+once. When its candidates stop helping, the
 surrogate goes on alone, near the critical time; when the surrogate stops helping or errs, the model is asked
 again and told why.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
 from falsifier.errors import ChatError
 from falsifier.evaluation import Evaluation
+from falsifier.llm.tools import WhatIf
 from falsifier.problem import Problem
+from falsifier.proposers.adviser import Adviser
 from falsifier.proposers.surrogate import Settings as SurrogateSettings
 from falsifier.proposers.surrogate import Surrogate
 from falsifier.space import Candidate
 
 # The model's first inputs stand for the constants; one switching or stepping input still teaches more.
 ADVISED = SurrogateSettings(constants=0, bangs=1, probes=1)
-
-
-class Adviser(Protocol):
-    """The language model's side."""
-
-    @property
-    def name(self) -> str:
-        """What its candidates bear as origin."""
-        ...
-
-    def propose(self, count: int, notes: Sequence[str] = ()) -> list[Candidate]:
-        """Return up to ``count`` candidates, at least one, after a single question.
-
-        Args:
-            count: how many are wanted.
-            notes: lines that the question carries beside problem and history.
-
-        Raises:
-            ChatError: when no valid answer can be had.
-        """
-        ...
-
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """Learn from evaluations, whoever proposed their candidates."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +38,9 @@ class Settings:
         patience_growth: factor of the patience after each answer that helped nothing, so that a model that
             does not help costs little.
         misses: predicted violations in a row that did not happen after which the model is told so.
-        what_if: whether the model may revise its candidates once, knowing their predictions.
+        what_if: whether the model hears predictions of its candidates before one is simulated.
+        what_if_calls: how often it may call for them in a turn. Each call sends the whole conversation once
+            more, so a turn costs four requests at most: enough to compare, to correct and to check.
     """
 
     opening: int = 2
@@ -71,6 +50,7 @@ class Settings:
     patience_growth: float = 2.0
     misses: int = 3
     what_if: bool = True
+    what_if_calls: int = 3
 
 
 @dataclass(slots=True)
@@ -128,7 +108,7 @@ class Hybrid:
     def _ask_one(self) -> Candidate:
         if not self._is_opened:
             self._is_opened = True
-            opening = self.adviser.propose(self.settings.opening)
+            opening = self.adviser.propose(self.settings.opening).candidates
             self._turn = _Turn(opening[: self.settings.opening], self._best)
         elif self._turn is None and (reason := self._reason_to_ask()):
             self._consult(reason)
@@ -163,11 +143,13 @@ class Hybrid:
         settings = self.settings
         notes = [reason, *self._prediction_notes()]
         try:
-            candidates = self.adviser.propose(settings.count, notes)
+            advice = self.adviser.propose(settings.count, notes, what_if=self._offer())
+            candidates = advice.candidates
             predictions = self._trusted_predictions(candidates)
-            if settings.what_if and predictions is not None and min(predictions) >= 0:
+            unheard = settings.what_if and not advice.foresaw
+            if unheard and predictions is not None and min(predictions) >= 0:
                 revised = self.adviser.propose(settings.count, [*notes, *_what_if(candidates, predictions)])
-                candidates = [*candidates, *revised]
+                candidates = [*candidates, *revised.candidates]
                 predictions = self._trusted_predictions(candidates)
         except ChatError:
             # The search need not end because advice is not to be had; it is asked for again much later.
@@ -192,11 +174,23 @@ class Hybrid:
         self._patience *= self.settings.patience_growth
         self._since_best = 0
 
+    @property
+    def _is_trusted(self) -> bool:
+        """Whether predictions were good of late."""
+        return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
+
+    def _offer(self) -> WhatIf | None:
+        """Leave to call for predictions, where they are worth it."""
+        settings = self.settings
+        if not (settings.what_if and settings.what_if_calls and self._is_trusted):
+            return None
+        return WhatIf(self.surrogate, settings.what_if_calls)
+
     def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[float] | None:
         """Predicted robustness of candidates, or None where predictions were bad of late."""
-        if not self.surrogate.is_trusted or self.surrogate.misses >= self.settings.misses:
+        if not self._is_trusted:
             return None
-        return self.surrogate.predict(candidates)
+        return [verdict.robustness for verdict in self.surrogate.foresee(candidates)] or None
 
     def _prediction_notes(self) -> list[str]:
         """What the surrogate would simulate next, for the model."""

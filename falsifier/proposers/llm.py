@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from falsifier.errors import ChatError
 from falsifier.evaluation import Evaluation
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.disguise import Disguise
-from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, Tool
 from falsifier.llm.prompts import (
     DEFAULT_PROMPT_TOKENS,
     Variant,
@@ -17,10 +18,15 @@ from falsifier.llm.prompts import (
     trimmed,
     variant_named,
 )
+from falsifier.llm.prompts.what_if import what_if_tool
 from falsifier.llm.replies import ReplyForm
+from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.problem import Problem
+from falsifier.proposers.adviser import Advice
 from falsifier.proposers.protocol import Proposer
 from falsifier.space import Candidate
+
+T = TypeVar("T")
 
 # Trajectories of older evaluations are let go, except for the best ones: prompts tell of few old samples.
 _KEPT_RECENT = 40
@@ -97,19 +103,17 @@ class LLMProposer:
             candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
         return candidates
 
-    def propose(self, count: int, notes: Sequence[str] = ()) -> list[Candidate]:
-        """Return up to ``count`` new candidates, at least one, of a single question.
-
-        Args:
-            count: how many are wanted.
-            notes: lines that the question carries beside problem and history.
+    def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
+        """Return up to ``count`` new candidates, at least one, of a single question; see Adviser.propose.
 
         Raises:
             ChatError: when the model cannot be reached or gives no valid reply.
         """
-        found = self._ask_once(count, notes)
+        tool = None if what_if is None else self._tool(what_if)
+        found = self._ask_once(count, notes, tool)
         self._pending += found
-        return [self._disguise.revealed(c) for c in found] if self._disguise else found
+        revealed = [self._disguise.revealed(c) for c in found] if self._disguise else found
+        return Advice(revealed, foresaw=tool is not None and tool.answered > 0)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, whoever proposed their candidates."""
@@ -120,17 +124,28 @@ class LLMProposer:
         self._pending = [c for c in self._pending if c.key not in keys]
         self._evaluations = _thinned([*self._evaluations, *told])
 
-    def _ask_once(self, count: int, notes: Sequence[str] = ()) -> list[Candidate]:
-        variant = self._variant
-        form = ReplyForm(
-            self._view.space, named=variant.has("names"), free=variant.has("freedom"), count=count
+    def _tool(self, what_if: WhatIf) -> PredictionTool:
+        disguise = self._disguise
+        return PredictionTool(
+            what_if,
+            _form(self._view, self._variant, count=MOST_CANDIDATES, reasoned=False),
+            self._variant,
+            reveal=disguise.revealed if disguise else _unchanged,
+            hide=disguise.hidden_verdict if disguise else _unchanged,
         )
+
+    def _ask_once(
+        self, count: int, notes: Sequence[str] = (), tool: PredictionTool | None = None
+    ) -> list[Candidate]:
+        variant = self._variant
+        form = _form(self._view, variant, count=count)
         prompt = build_prompt(
             self._view, variant, self._evaluations, pending=self._pending, notes=notes, count=count
         )
         request = ChatRequest(
             messages=render(trimmed(prompt, self._prompt_tokens)),
             reply_schema=form.schema(),
+            tools=() if tool is None else (tool.offer,),
             sample=self._sample,
         )
         try:
@@ -139,6 +154,7 @@ class LLMProposer:
                 request,
                 lambda text: self._new(form.read(text, origin=self.name))[:count],
                 self._on_exchange,
+                respond=None if tool is None else tool.respond,
             )
         except NoValidReplyError:
             raise
@@ -205,6 +221,30 @@ def preview(
         view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
     prompt = build_prompt(view, variant_named(variant), evaluations, count=count)
     return render(trimmed(prompt, prompt_tokens))
+
+
+def preview_tool(
+    problem: Problem, *, calls: int, variant: str | None = None, anonymous: bool = False
+) -> Tool:
+    """Tool that a question with leave to ask for predictions would offer; sends nothing."""
+    view = View.of(problem)
+    shown = Disguise.of(view).view if anonymous else view
+    form = _form(shown, variant_named(variant), count=MOST_CANDIDATES, reasoned=False)
+    return what_if_tool(form.schema(), calls=calls)
+
+
+def _form(view: View, variant: Variant, *, count: int, reasoned: bool = True) -> ReplyForm:
+    return ReplyForm(
+        view.space,
+        named=variant.has("names"),
+        free=variant.has("freedom"),
+        count=count,
+        reasoned=reasoned,
+    )
+
+
+def _unchanged(value: T) -> T:
+    return value
 
 
 def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:

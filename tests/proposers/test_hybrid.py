@@ -8,8 +8,10 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.evaluation import Evaluation
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.tools import WhatIf
 from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
+from falsifier.proposers.adviser import Advice
 from falsifier.proposers.hybrid import Hybrid
 from falsifier.proposers.llm import make_llm_proposer
 from falsifier.proposers.protocol import Proposer
@@ -43,12 +45,14 @@ class Script:
     notes: list[Sequence[str]] = field(default_factory=list)
     told: list[Evaluation] = field(default_factory=list)
 
-    def propose(self, count: int, notes: Sequence[str] = ()) -> list[Candidate]:
+    def propose(
+        self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None
+    ) -> Advice:
         self.notes.append(tuple(notes))
         answer = self.answers[min(len(self.notes), len(self.answers)) - 1]
         if isinstance(answer, Exception):
             raise answer
-        return [self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]]
+        return Advice([self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]])
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         self.told += evaluations

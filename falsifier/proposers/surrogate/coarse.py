@@ -163,6 +163,20 @@ class CoarseFormula:
         """Robustness at time 0 of each trace, shape (m,), from one margin array (m, n) for each leaf."""
         return self.root.value(margins)[:, 0]
 
+    def deciding(self, margins: Sequence[Array]) -> list[tuple[int, int]]:
+        """Leaf and grid index that decide the robustness of each trace.
+
+        Only minima and maxima are taken, so the robustness is one of the margins. Equal margins are told
+        apart by increments of their own, far too small to matter.
+        """
+        stacked = np.stack(margins, axis=1).astype(np.float64)
+        traces, _, points = stacked.shape
+        marks = np.linspace(0.0, 1e-9 * max(1.0, float(np.abs(stacked).max())), stacked[0].size)
+        marked = stacked + marks.reshape(stacked.shape[1:])
+        values = self.robustness([marked[:, i] for i in range(len(margins))])
+        places = np.abs(marked.reshape(traces, -1) - values[:, None]).argmin(axis=1)
+        return [divmod(int(place), points) for place in places]
+
 
 def coarse_formula(
     formula: Formula, step: float, *, discrete: frozenset[str] = frozenset(), stretch: float = 1.0

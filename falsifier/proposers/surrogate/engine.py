@@ -22,6 +22,7 @@ from falsifier.proposers.surrogate.settings import Settings
 from falsifier.proposers.surrogate.trust_region import TrustRegion
 from falsifier.proposers.surrogate.variation import random_points, stepping, switching
 from falsifier.space import Candidate
+from falsifier.stl import Verdict
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,17 +94,22 @@ class Surrogate:
             if pending is not None:
                 self._settle(pending, sample)
 
-    def predict(self, candidates: Sequence[Candidate]) -> list[float] | None:
-        """Robustness that the better model predicts for candidates, without a simulation.
+    def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
+        """Verdicts that the better model predicts for candidates, without a simulation.
 
-        None before two simulations are known. The values are in the requirement's own unit.
+        Empty before two simulations are known. The values are in the requirement's own unit.
         """
         if len(self.history.samples) < 2 or not candidates:
-            return None
+            return []
         rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
         self._fit(rng)
         points = np.array([self.layout.point(c) for c in candidates])
-        return [float(v) for v in self.models.predictor(self.layout, self.history.plain_objective())(points)]
+        return self.models.verdicts(self.layout, self.history.plain_objective(), points)
+
+    @property
+    def recent_error(self) -> float:
+        """Error of recent predictions, as a share of the spread of the margins; inf while there are none."""
+        return self.models.recent_error
 
     def suggest(self, candidates: Sequence[Candidate]) -> None:
         """Let the next plan breed from these candidates, too."""

@@ -17,6 +17,7 @@ from falsifier.proposers.surrogate.grid import Trace
 from falsifier.proposers.surrogate.layout import Layout
 from falsifier.proposers.surrogate.objective import LeafValues, Objective
 from falsifier.proposers.surrogate.settings import Settings
+from falsifier.stl import Verdict
 
 _MODELS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
     "nonlinear": FourierDynamics,
@@ -61,6 +62,11 @@ class Ensemble:
         return bool(errors) and min(errors.values()) < self._settings.trusted_error
 
     @property
+    def recent_error(self) -> float:
+        """Recent error of the model that was chosen last, as a share of the margins' spread; inf: unknown."""
+        return self._recent_errors().get(self.chosen, float("inf"))
+
+    @property
     def misses(self) -> int:
         """How many of the last forecasts in a row foretold a violation that did not happen."""
         count = 0
@@ -88,6 +94,11 @@ class Ensemble:
             return corrected.cost(self._values(self.chosen, layout, corrected, points))
 
         return predict
+
+    def verdicts(self, layout: Layout, objective: Objective, points: Array) -> list[Verdict]:
+        """Verdicts that the chosen model predicts for points, shape (m, d)."""
+        corrected = self._corrected(objective)
+        return corrected.verdicts(self._values(self.chosen, layout, corrected, points))
 
     def forecast(self, layout: Layout, objective: Objective, point: Array) -> Forecast:
         """Predictions of both models for one point, to be judged when it was simulated."""

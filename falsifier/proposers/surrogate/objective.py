@@ -10,6 +10,7 @@ from falsifier.proposers.surrogate.coarse import CoarseFormula, Leaf, coarse_for
 from falsifier.proposers.surrogate.coordinates import Coordinates
 from falsifier.proposers.surrogate.grid import Grid
 from falsifier.space import SearchSpace
+from falsifier.stl import Verdict
 from falsifier.stl.formula import Formula
 
 LeafValues = list[Array]
@@ -83,6 +84,14 @@ class Objective:
         """Scaled robustness of each trace from its leaf values, shape (m,)."""
         scaled = self.scaled(values)
         return np.asarray(np.mean([formula.robustness(scaled) for formula in self.formulas], axis=0))
+
+    def verdicts(self, values: LeafValues) -> list[Verdict]:
+        """Verdict of each trace from its leaf values, by this objective's cost and the formula as it is."""
+        deciding = self.formulas[0].deciding(self.scaled(values))
+        return [
+            Verdict(float(cost), self.grid.step * point, str(self.leaves[leaf].predicate))
+            for cost, (leaf, point) in zip(self.cost(values), deciding, strict=True)
+        ]
 
     def rescaled(self, seen: Sequence[LeafValues]) -> "Objective":
         """Return the objective with each leaf's scale set to the standard deviation of its seen values."""

@@ -1,0 +1,58 @@
+"""Messages and tools as the client library takes them, and what comes back of calls."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from falsifier.llm.messages import Message, Tool, ToolCall
+
+
+def sent_message(message: Message) -> dict[str, Any]:
+    """Message by OpenAI's field names; an assistant's message that only calls has no content."""
+    sent: dict[str, Any] = {"role": message.role, "content": message.content}
+    if message.tool_call_id:
+        sent["tool_call_id"] = message.tool_call_id
+    if message.tool_calls:
+        sent |= {
+            "content": message.content or None,
+            "tool_calls": [_sent_call(c) for c in message.tool_calls],
+        }
+    return {**sent, **message.echo}
+
+
+def sent_tool(tool: Tool) -> dict[str, Any]:
+    """Tool by OpenAI's field names."""
+    return {"type": "function", "function": tool.model_dump()}
+
+
+def calls_in(message: Any, echo: Sequence[str]) -> tuple[ToolCall, ...]:
+    """Calls of an answer, in order.
+
+    Args:
+        message: as the client library gives it.
+        echo: fields of a call that the provider wants back.
+    """
+    return tuple(
+        ToolCall(
+            id=call.id or f"call-{number}",
+            name=call.function.name or "",
+            arguments=storable(call.function.arguments or ""),
+            echo=echo_of(call, echo),
+        )
+        for number, call in enumerate(getattr(message, "tool_calls", None) or (), start=1)
+    )
+
+
+def echo_of(source: Any, names: Sequence[str]) -> dict[str, Any]:
+    """Those fields of an answer, or of a call in it, that the provider wants back."""
+    found = {name: getattr(source, name, None) for name in names}
+    return {name: value for name, value in found.items() if value}
+
+
+def storable(text: str) -> str:
+    """Text without the halves of surrogate pairs, which no file can hold."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def _sent_call(call: ToolCall) -> dict[str, Any]:
+    function = {"name": call.name, "arguments": call.arguments}
+    return {"id": call.id, "type": "function", "function": function, **call.echo}

@@ -1,0 +1,48 @@
+"""What the hybrid engine asks of a language model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from falsifier.evaluation import Evaluation
+from falsifier.llm.tools import WhatIf
+from falsifier.space import Candidate
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What one question brought.
+
+    Attributes:
+        candidates: at least one, as many as were asked for at most.
+        foresaw: whether the model asked for predictions, and got some, before it answered.
+    """
+
+    candidates: list[Candidate]
+    foresaw: bool = False
+
+
+class Adviser(Protocol):
+    """The language model's side."""
+
+    @property
+    def name(self) -> str:
+        """What its candidates bear as origin."""
+        ...
+
+    def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
+        """Return up to ``count`` candidates, at least one, after a single question.
+
+        Args:
+            count: how many are wanted.
+            notes: lines that the question carries beside problem and history.
+            what_if: leave to ask for predictions in between; a model that takes no tools goes without.
+
+        Raises:
+            ChatError: when no valid answer can be had.
+        """
+        ...
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Learn from evaluations, whoever proposed their candidates."""
+        ...
