@@ -1,12 +1,16 @@
 """``falsifier prompt`` and ``falsifier models``: what a language model is sent, and whether it answers."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from falsifier.cli.options import json_option, problem_options, problem_request
+
+if TYPE_CHECKING:
+    from falsifier.llm.messages import Message, Tool
 
 
 @click.command()
@@ -37,6 +41,7 @@ def prompt(
 ) -> None:
     """Print exactly what would be sent next; send nothing."""
     from falsifier.journal import read_journal, recorded_evaluations
+    from falsifier.proposers.hybrid import Settings as HybridSettings
     from falsifier.proposers.llm import preview, preview_tool
 
     if samples is not None and directory is None:
@@ -44,15 +49,34 @@ def prompt(
     problem = problem_request(options).load()
     evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
     told = evaluations[:samples]
-    if engine == "llm":
-        _print_prompt(preview(problem, variant=variant, evaluations=told, anonymous=anonymous), as_json=as_json)
-        return
-    from falsifier.proposers.hybrid import Settings
-
-    settings = Settings()
-    count = settings.count if told else settings.opening
+    settings = HybridSettings()
+    count = 1 if engine == "llm" else settings.count if told else settings.opening
     messages = preview(problem, variant=variant, evaluations=told, count=count, anonymous=anonymous)
-    _print_prompt(messages, as_json=as_json)
+    tools: tuple[Tool, ...] = ()
+    if engine == "hybrid" and told:
+        tools = (preview_tool(problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous),)
+    click.echo(_as_json(messages, tools) if as_json else _as_text(messages, tools))
+
+
+def _as_json(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
+    sent = [message.model_dump() for message in messages]
+    return json.dumps(
+        {"messages": sent, "tools": [t.model_dump() for t in tools]} if tools else sent, indent=2
+    )
+
+
+def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
+    parts = [f"--- {message.role} ---\n{message.content}" for message in messages]
+    if tools:
+        parts.append(
+            "(The engine adds why it asks, and what its numerical model expects, to the last message.)"
+        )
+    parts += [
+        f"--- tool {tool.name}, offered while the engine's forecasts are good ---\n{tool.description}\n"
+        f"arguments: {json.dumps(tool.parameters)}"
+        for tool in tools
+    ]
+    return "\n\n".join(parts)
 
 
 @click.command()

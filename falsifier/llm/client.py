@@ -111,6 +111,9 @@ class LiteLLMChat:
             arguments["response_format"] = {"type": "json_object"}
         if request.tools:
             arguments["tools"] = [sent_tool(tool) for tool in request.tools]
+            # With tools litellm imports its gateway for MCP servers, whose packages are not among its own
+            # requirements; it pops this again before anything is sent.
+            arguments["_skip_mcp_handler"] = True
         if request.room > 1 and "max_tokens" in arguments:
             arguments["max_tokens"] *= request.room
         return arguments

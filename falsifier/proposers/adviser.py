@@ -30,6 +30,10 @@ class Adviser(Protocol):
         """What its candidates bear as origin."""
         ...
 
+    def describe(self, candidate: Candidate) -> str:
+        """A candidate in a few words and by the names that the model knows, for notes."""
+        ...
+
     def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
         """Return up to ``count`` candidates, at least one, after a single question.
 
@@ -46,3 +50,14 @@ class Adviser(Protocol):
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Learn from evaluations, whoever proposed their candidates."""
         ...
+
+
+def in_few_words(candidate: Candidate) -> str:
+    """A candidate in a few words: pieces of long signals are left out."""
+    parts = []
+    for name, signal in candidate.signals.items():
+        pairs = [f"{v:.4g} from {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
+        more = f", ... {len(pairs)} points in all" if len(pairs) > 8 else ""
+        parts.append(f"{name} {signal.interpolation}: {', '.join(pairs[:8])}{more}")
+    parts += [f"{name} = {value:.6g}" for name, value in candidate.parameters.items()]
+    return "; ".join(parts)

@@ -148,7 +148,8 @@ class Hybrid:
             predictions = self._trusted_predictions(candidates)
             unheard = settings.what_if and not advice.foresaw
             if unheard and predictions is not None and min(predictions) >= 0:
-                revised = self.adviser.propose(settings.count, [*notes, *_what_if(candidates, predictions)])
+                heard = self._predictions_told(candidates, predictions)
+                revised = self.adviser.propose(settings.count, [*notes, *heard])
                 candidates = [*candidates, *revised.candidates]
                 predictions = self._trusted_predictions(candidates)
         except ChatError:
@@ -198,30 +199,19 @@ class Hybrid:
         predictions = self._trusted_predictions([self._numeric])
         if predictions is None:
             return ["The numerical model's predictions were bad of late; judge by the trajectories alone."]
-        told = _told(self._numeric)
+        told = self.adviser.describe(self._numeric)
         return [f"The numerical model expects robustness {predictions[0]:.4g} of its own best input: {told}."]
 
-
-def _what_if(candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
-    """Predictions of the model's candidates, one line each."""
-    lines = [
-        f"Your candidate {i} ({_told(c)}) was not simulated; its predicted robustness is {p:.4g}."
-        for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
-    ]
-    return [*lines, "None is predicted to violate the requirement: revise them, or insist with a reason."]
+    def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
+        """Predictions of the model's candidates, one line each."""
+        lines = [
+            f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; its predicted robustness is "
+            f"{p:.4g}."
+            for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
+        ]
+        return [*lines, "None is predicted to violate the requirement: revise them, or insist with a reason."]
 
 
 def _ranked(candidate: Candidate, prediction: float) -> Candidate:
     text = f"{candidate.rationale} [predicted robustness {prediction:.4g}]"
     return replace(candidate, rationale=text.strip())
-
-
-def _told(candidate: Candidate) -> str:
-    """A candidate in a few words: pieces of long signals are left out."""
-    parts = []
-    for name, signal in candidate.signals.items():
-        pairs = [f"{v:.4g} from {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
-        more = f", ... {len(pairs)} points in all" if len(pairs) > 8 else ""
-        parts.append(f"{name} {signal.interpolation}: {', '.join(pairs[:8])}{more}")
-    parts += [f"{name} = {value:.6g}" for name, value in candidate.parameters.items()]
-    return "; ".join(parts)

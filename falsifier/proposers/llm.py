@@ -22,7 +22,7 @@ from falsifier.llm.prompts.what_if import what_if_tool
 from falsifier.llm.replies import ReplyForm
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.problem import Problem
-from falsifier.proposers.adviser import Advice
+from falsifier.proposers.adviser import Advice, in_few_words
 from falsifier.proposers.protocol import Proposer
 from falsifier.space import Candidate
 
@@ -114,6 +114,10 @@ class LLMProposer:
         self._pending += found
         revealed = [self._disguise.revealed(c) for c in found] if self._disguise else found
         return Advice(revealed, foresaw=tool is not None and tool.answered > 0)
+
+    def describe(self, candidate: Candidate) -> str:
+        """See Adviser.describe."""
+        return in_few_words(self._disguise.hidden_candidate(candidate) if self._disguise else candidate)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, whoever proposed their candidates."""

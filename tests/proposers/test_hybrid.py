@@ -45,14 +45,15 @@ class Script:
     notes: list[Sequence[str]] = field(default_factory=list)
     told: list[Evaluation] = field(default_factory=list)
 
-    def propose(
-        self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None
-    ) -> Advice:
+    def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
         self.notes.append(tuple(notes))
         answer = self.answers[min(len(self.notes), len(self.answers)) - 1]
         if isinstance(answer, Exception):
             raise answer
         return Advice([self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]])
+
+    def describe(self, candidate: Candidate) -> str:
+        return str(candidate.key)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         self.told += evaluations

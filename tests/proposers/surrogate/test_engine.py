@@ -115,7 +115,7 @@ def test_arms_are_judged_by_their_latest_ranks() -> None:
 def test_predictions_without_simulation_rank_inputs() -> None:
     problem = lag_problem("G[0,10] (y <= 9)", free=True, parameters=0)
     engine = Surrogate(problem, seed=0)
-    assert engine.predict(engine.ask(2)) is None
+    assert engine.foresee(engine.ask(2)) == []
     for _ in range(6):
         (candidate,) = engine.ask()
         engine.tell([evaluate(problem, candidate)])
@@ -123,9 +123,9 @@ def test_predictions_without_simulation_rank_inputs() -> None:
         engine.layout.candidate(engine.layout.constant([level]), origin="t", rationale="t")
         for level in (0.0, 0.5, 1.0)
     ]
-    predicted = engine.predict(constants)
+    predicted = [verdict.robustness for verdict in engine.foresee(constants)]
     true = [evaluate(problem, c).robustness for c in constants]
-    assert predicted is not None and predicted == pytest.approx(true, abs=1.0)
+    assert predicted == pytest.approx(true, abs=1.0)
     assert predicted == sorted(predicted, reverse=True)
 
 
