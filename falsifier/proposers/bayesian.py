@@ -1,5 +1,7 @@
 """Bayesian optimisation: a Gaussian process of the robustness, and where it expects most improvement."""
 
+from abc import abstractmethod
+
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
@@ -16,10 +18,8 @@ _STARTS = 3
 _SAMPLES = 512
 
 
-class Bayesian(BoxProposer):
-    """Sobol points first, then maxima of the logarithm of the expected improvement."""
-
-    name = "bayesian"
+class ModelBased(BoxProposer):
+    """Sobol points first, then what a model of the costs so far makes most promising."""
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
@@ -28,7 +28,6 @@ class Bayesian(BoxProposer):
         self._start = min(20, 2 * d + 2)
         self._points: list[Vector] = []
         self._costs: list[float] = []
-        self._lengths = np.full(d, 0.35 * np.sqrt(d))
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         if self._asked < self._start or len(self._costs) < 2:
@@ -36,10 +35,11 @@ class Bayesian(BoxProposer):
             point[: self._sequence.d] = self._sequence.random(1)[0]
             return Proposal(point, "a Sobol point, before the Gaussian process knows enough")
         points, costs = self._kept()
-        process = fit_lengths(points, standardised(costs), self._lengths, rng, noise=_NOISE)
-        self._lengths = process.lengths
-        best, improvement = _most_promising(process, standardised(costs), rng)
-        return Proposal(best, f"log expected improvement {improvement:.3g} of the scaled robustness")
+        return self._most_promising(points, standardised(costs), rng)
+
+    @abstractmethod
+    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+        """Return the next point, given standardised costs, shape (n,), at points, shape (n, d)."""
 
     def _learn(self, point: Vector, cost: float | None) -> None:
         if cost is not None:
@@ -54,6 +54,22 @@ class Bayesian(BoxProposer):
         latest = np.arange(len(costs) - _MOST_POINTS // 2, len(costs))
         keep = np.unique(np.concatenate([order, latest]))
         return points[keep], costs[keep]
+
+
+class Bayesian(ModelBased):
+    """Maxima of the logarithm of the expected improvement of a Gaussian process."""
+
+    name = "bayesian"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
+
+    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+        process = fit_lengths(points, targets, self._lengths, rng, noise=_NOISE)
+        self._lengths = process.lengths
+        best, improvement = _most_promising(process, targets, rng)
+        return Proposal(best, f"log expected improvement {improvement:.3g} of the scaled robustness")
 
 
 def _most_promising(

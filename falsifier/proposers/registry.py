@@ -18,15 +18,29 @@ class Engine:
     Attributes:
         target: ``module:class``; the class is called as ``class(problem, seed=seed, **options)``.
         summary: what it does, in one line for ``--help``.
+        extra: package that it needs beyond the required ones, and name of the extra that brings it.
     """
 
     target: str
     summary: str
+    extra: str = ""
 
     def load(self) -> Any:
-        """Import the engine's class."""
+        """Import the engine's class.
+
+        Raises:
+            SpecError: when the package that it needs is not installed.
+        """
         module, _, name = self.target.partition(":")
-        return getattr(import_module(module), name)
+        try:
+            return getattr(import_module(module), name)
+        except ImportError as error:
+            if not self.extra:
+                raise
+            raise SpecError(
+                f"this engine needs the package {self.extra!r} ({error}): "
+                f"pip install 'falsifier[{self.extra}]'"
+            ) from None
 
 
 ENGINES: Mapping[str, Engine] = MappingProxyType(
@@ -41,6 +55,12 @@ ENGINES: Mapping[str, Engine] = MappingProxyType(
         "cma": Engine("falsifier.proposers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Engine(
             "falsifier.proposers.bayesian:Bayesian", "Gaussian process and expected improvement"
+        ),
+        "optuna": Engine(
+            "falsifier.proposers.tpe:TPE", "optuna's tree-structured Parzen estimators", extra="optuna"
+        ),
+        "botorch": Engine(
+            "falsifier.proposers.torch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
         ),
         "hybrid": Engine("falsifier.proposers.hybrid:Hybrid", "a language model and the surrogate together"),
     }
@@ -59,7 +79,8 @@ def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> 
         options: what the engine takes beside that; ``hybrid`` needs the language model's side.
 
     Raises:
-        SpecError: for an unknown name, or a problem in which nothing may be varied.
+        SpecError: for an unknown name, an engine whose package is not installed, or a problem in which
+            nothing may be varied.
     """
     if name not in ENGINES:
         raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")

@@ -1,3 +1,5 @@
+import pytest
+
 from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
 from falsifier.proposers.protocol import Proposer
@@ -34,6 +36,20 @@ class TestCMA(EngineContract):
 
 class TestBayesian(EngineContract):
     engine = "bayesian"
+
+
+class TestOptuna(EngineContract):
+    engine = "optuna"
+
+
+class TestBoTorch(EngineContract):
+    engine = "botorch"
+    # Enough to get beyond the Sobol points, which are twice the coordinates and two.
+    rounds = 15
+
+    @pytest.fixture(autouse=True)
+    def installed(self) -> None:
+        pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
 
 
 # The contract does not depend on how thorough a plan is.

@@ -29,8 +29,11 @@ def best_of(engine: str, *, simulations: int) -> float:
     return min(costs)
 
 
-@pytest.mark.parametrize(("engine", "simulations"), [("cma", 150), ("bayesian", 40)])
+@pytest.mark.parametrize(
+    ("engine", "simulations"), [("cma", 150), ("bayesian", 40), ("optuna", 80), ("botorch", 30)]
+)
 def test_learning_engines_go_down_a_bowl(engine: str, simulations: int) -> None:
+    need(engine)
     assert best_of(engine, simulations=simulations) < 1.3 < best_of("uniform", simulations=simulations)
 
 
@@ -42,11 +45,30 @@ def test_annealing_is_scipys_and_ends_its_thread() -> None:
     assert not [t for t in threading.enumerate() if t.name == "annealing"]
 
 
-def test_parallel_candidates_of_a_generation_differ() -> None:
+@pytest.mark.parametrize("engine", ["annealing", "cma", "bayesian", "optuna", "botorch"])
+def test_parallel_candidates_of_a_generation_differ(engine: str) -> None:
+    need(engine)
+    keys = {c.key for c in make_proposer(engine, lag_problem(), seed=3).ask(12)}
+    assert len(keys) == 12
+
+
+@pytest.mark.parametrize("engine", ["optuna", "botorch"])
+def test_a_batch_spreads_around_a_known_valley(engine: str) -> None:
+    need(engine)
     problem = lag_problem()
-    for engine in ("annealing", "cma", "bayesian"):
-        keys = {c.key for c in make_proposer(engine, problem, seed=3).ask(12)}
-        assert len(keys) == 12
+    proposer = make_proposer(engine, problem, seed=2)
+    for _ in range(20):
+        (candidate,) = proposer.ask()
+        cost = bowl(problem, candidate)
+        proposer.tell([simulated(problem, lambda y, cost=cost: cost)(candidate)])  # type: ignore[misc]
+    batch = np.array([problem.space.encode(c) for c in proposer.ask(4)])
+    distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
+    assert distances.min() > 1e-2
+
+
+def need(engine: str) -> None:
+    if engine == "botorch":
+        pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
 
 
 def test_process_interpolates_and_is_unsure_far_away() -> None:

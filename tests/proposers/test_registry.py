@@ -1,3 +1,5 @@
+import sys
+
 import pytest
 
 from falsifier.errors import SpecError
@@ -7,8 +9,25 @@ from falsifier.testing import lag_problem
 
 def test_every_engine_loads_and_bears_its_name() -> None:
     problem = lag_problem()
-    for name in set(ENGINES) - {"hybrid"}:
+    for name in set(ENGINES) - {"hybrid", "botorch"}:
         assert make_proposer(name, problem, seed=0).name == name
+
+
+def test_botorch_loads_where_it_is_installed() -> None:
+    pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
+    assert make_proposer("botorch", lag_problem(), seed=0).name == "botorch"
+
+
+@pytest.mark.parametrize(("engine", "module"), [("optuna", "tpe"), ("botorch", "torch_gp")])
+def test_an_absent_package_is_an_error_with_the_command_that_brings_it(
+    engine: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, engine, None)
+    monkeypatch.delitem(sys.modules, f"falsifier.proposers.{module}", raising=False)
+    with pytest.raises(
+        SpecError, match=rf"needs the package '{engine}'.*pip install 'falsifier\[{engine}\]'"
+    ):
+        make_proposer(engine, lag_problem(), seed=0)
 
 
 def test_a_wrong_name_is_an_error_with_a_suggestion() -> None:
