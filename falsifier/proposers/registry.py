@@ -18,7 +18,7 @@ class Engine:
     Attributes:
         target: ``module:class``; the class is called as ``class(problem, seed=seed, **options)``.
         summary: what it does, in one line for ``--help``.
-        extra: package that it needs beyond the required ones, and name of the extra that brings it.
+        extra: of this project, which brings the package that the engine needs and is named after.
     """
 
     target: str
@@ -38,7 +38,7 @@ class Engine:
             if not self.extra:
                 raise
             raise SpecError(
-                f"this engine needs the package {self.extra!r} ({error}): "
+                f"the engine {self.extra!r} needs a package that is not installed ({error}): "
                 f"pip install 'falsifier[{self.extra}]'"
             ) from None
 

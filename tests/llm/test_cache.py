@@ -1,7 +1,11 @@
 from pathlib import Path
 
+import pytest
+
+from falsifier.errors import ChatError
 from falsifier.llm.cache import CachedChat
-from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.conversation import converse
+from falsifier.llm.messages import ChatReply, ChatRequest, Message, Tool, ToolCall, Usage
 from falsifier.llm.scripted import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
@@ -52,3 +56,16 @@ def test_nothing_else_is_left_behind(tmp_path: Path) -> None:
     chat.accepted(QUESTION, reply)
     chat.accepted(QUESTION, reply)
     assert [p.suffix for p in tmp_path.rglob("*") if p.is_file()] == [".json"]
+
+
+def test_calls_of_tools_are_kept_like_answers(tmp_path: Path) -> None:
+    question = QUESTION.model_copy(update={"tools": (Tool(name="t", description="", parameters={}),)})
+    call = ChatReply(text="", tool_calls=(ToolCall(id="1", name="t", arguments="{}"),), usage=PAID.usage)
+    inner = ScriptedChat([call, PAID])
+    for _ in range(2):
+        text = converse(CachedChat(inner, tmp_path), question, str, lambda _: None, respond=lambda _: "seen")
+        assert text == "answer"
+    assert len(inner.requests) == 2
+    # Another answer of the tool makes another question of what follows.
+    with pytest.raises(ChatError, match="the script"):
+        converse(CachedChat(inner, tmp_path), question, str, lambda _: None, respond=lambda _: "other")

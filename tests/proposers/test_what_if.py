@@ -180,6 +180,25 @@ def test_a_server_that_refuses_tools_gets_the_second_round() -> None:
     assert "response_format" in later[0].body
 
 
+def test_calls_come_over_the_wire_beside_the_schema() -> None:
+    asking = Step(calls=(("predict", json.loads(candidates(1.25))),))
+    with serving() as server:
+        engine = hybrid(LadderChat(LiteLLMChat("openai/mine", api_base=server.url)))
+        judge = simulated(problem(), lambda y: float(9 - y.max()))
+        for turn in range(20):
+            server.script[:] = [Step(candidates(0.011 * turn - 0.9, 0.013 * turn + 0.3))] * 3
+            if engine.surrogate.is_trusted:
+                server.script[:0] = [asking]
+            engine.tell([judge(c) for c in engine.ask()])
+            if any("tools" in r.body for r in server.received):
+                break
+    first, second = (r.body for r in server.received[-2:])
+    assert first["response_format"] == second["response_format"]
+    assert first["tools"] == second["tools"]
+    assert [m["role"] for m in second["messages"]] == ["system", "user", "assistant", "tool"]
+    assert second["messages"][-1]["content"].startswith("Candidate 1: predicted robustness +7.")
+
+
 def test_neutral_names_hold_in_calls_and_answers() -> None:
     def script(request: ChatRequest) -> Line:
         if not request.tools:
