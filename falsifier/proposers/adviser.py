@@ -34,13 +34,22 @@ class Adviser(Protocol):
         """A candidate in a few words and by the names that the model knows, for notes."""
         ...
 
-    def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
+    def propose(
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        *,
+        what_if: WhatIf | None = None,
+        dispensable: bool = False,
+    ) -> Advice:
         """Return up to ``count`` candidates, at least one, after a single question.
 
         Args:
             count: how many are wanted.
             notes: lines that the question carries beside problem and history.
             what_if: leave to ask for predictions in between; a model that takes no tools goes without.
+            dispensable: the search goes on where no answer comes. That none came is put on record then, so
+                that a resumed run goes on in the same way.
 
         Raises:
             ChatError: when no valid answer can be had.

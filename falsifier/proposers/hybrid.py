@@ -3,9 +3,8 @@
 The model opens, because its first guess is worth more than any corner. Later it is asked for several
 candidates at a time; the surrogate ranks them before one is simulated, and breeds from them. The model may
 call the surrogate for predictions in its turn; one that does not hears them afterwards and may answer them
-once. When its candidates stop helping, the
-surrogate goes on alone, near the critical time; when the surrogate stops helping or errs, the model is asked
-again and told why.
+once. When its candidates stop helping, the surrogate goes on alone, near the critical time; when the
+surrogate stops helping or errs, the model is asked again and told why.
 """
 
 from collections.abc import Sequence
@@ -40,7 +39,7 @@ class Settings:
         misses: predicted violations in a row that did not happen after which the model is told so.
         what_if: whether the model hears predictions of its candidates before one is simulated.
         what_if_calls: how often it may call for them in a turn. Each call sends the whole conversation once
-            more, so a turn costs four requests at most: enough to compare, to correct and to check.
+            more, so a turn costs four requests, rejected replies apart: enough to compare, correct and check.
     """
 
     opening: int = 2
@@ -143,13 +142,13 @@ class Hybrid:
         settings = self.settings
         notes = [reason, *self._prediction_notes()]
         try:
-            advice = self.adviser.propose(settings.count, notes, what_if=self._offer())
+            advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
             candidates = advice.candidates
             predictions = self._trusted_predictions(candidates)
             unheard = settings.what_if and not advice.foresaw
             if unheard and predictions is not None and min(predictions) >= 0:
                 heard = self._predictions_told(candidates, predictions)
-                revised = self.adviser.propose(settings.count, [*notes, *heard])
+                revised = self.adviser.propose(settings.count, [*notes, *heard], dispensable=True)
                 candidates = [*candidates, *revised.candidates]
                 predictions = self._trusted_predictions(candidates)
         except ChatError:

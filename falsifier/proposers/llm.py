@@ -93,7 +93,7 @@ class LLMProposer:
             if self._handed_over and self._fallback is not None:
                 return candidates + self._fallback.ask(n - len(candidates))
             try:
-                found = self._ask_once(n - len(candidates))
+                found = self._ask_once(n - len(candidates), dispensable=self._fallback is not None)
             except ChatError:
                 if self._fallback is None:
                     raise
@@ -103,14 +103,21 @@ class LLMProposer:
             candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
         return candidates
 
-    def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
+    def propose(
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        *,
+        what_if: WhatIf | None = None,
+        dispensable: bool = False,
+    ) -> Advice:
         """Return up to ``count`` new candidates, at least one, of a single question; see Adviser.propose.
 
         Raises:
             ChatError: when the model cannot be reached or gives no valid reply.
         """
         tool = None if what_if is None else self._tool(what_if)
-        found = self._ask_once(count, notes, tool)
+        found = self._ask_once(count, notes, tool, dispensable=dispensable)
         self._pending += found
         revealed = [self._disguise.revealed(c) for c in found] if self._disguise else found
         return Advice(revealed, foresaw=tool is not None and tool.answered > 0)
@@ -139,7 +146,12 @@ class LLMProposer:
         )
 
     def _ask_once(
-        self, count: int, notes: Sequence[str] = (), tool: PredictionTool | None = None
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        tool: PredictionTool | None = None,
+        *,
+        dispensable: bool,
     ) -> list[Candidate]:
         variant = self._variant
         form = _form(self._view, variant, count=count)
@@ -163,7 +175,7 @@ class LLMProposer:
         except NoValidReplyError:
             raise
         except ChatError as error:
-            if self._fallback is not None:  # so that a resumed run hands over at the same place
+            if dispensable:  # so that a resumed run goes without at the same place
                 self._on_exchange(_unanswered(self._chat, request, error))
             raise
 

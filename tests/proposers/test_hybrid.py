@@ -45,7 +45,14 @@ class Script:
     notes: list[Sequence[str]] = field(default_factory=list)
     told: list[Evaluation] = field(default_factory=list)
 
-    def propose(self, count: int, notes: Sequence[str] = (), *, what_if: WhatIf | None = None) -> Advice:
+    def propose(
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        *,
+        what_if: WhatIf | None = None,
+        dispensable: bool = False,
+    ) -> Advice:
         self.notes.append(tuple(notes))
         answer = self.answers[min(len(self.notes), len(self.answers)) - 1]
         if isinstance(answer, Exception):

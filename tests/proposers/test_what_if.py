@@ -273,6 +273,24 @@ class TestResume:
         assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
         assert again.requests == []
 
+    def test_a_turn_that_failed_fails_again(self, tmp_path: Path) -> None:
+        """No answer in the second half of a turn: the surrogate goes on, and so it does when resumed."""
+
+        def breaking(request: ChatRequest) -> Line:
+            if len(answers(request)) == 1 and not chat_failed:
+                chat_failed.append(True)
+                return ChatError("the server is gone")
+            return self.script(request)
+
+        chat_failed: list[bool] = []
+        whole = self.search(tmp_path / "run", ScriptedChat(breaking), 16)
+        assert chat_failed
+        nobody = ScriptedChat([ChatError("nobody is asked")])
+        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "run")), nobody)
+        resumed = self.search(tmp_path / "run", played, 16)
+        assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
+        assert nobody.requests == []
+
     def calls(self, directory: Path) -> list[Exchange]:
         return [e for e in recorded_exchanges(read_journal(directory)) if e.reply and e.reply.tool_calls]
 
