@@ -312,7 +312,11 @@ class _Loop:
         return target.name if len(self.targets) > 1 else ""
 
     def exchanged(self, exchange: "Exchange") -> None:
-        """Count, record and announce an exchange with a language model."""
+        """Count, record and announce an exchange with a language model.
+
+        Raises:
+            ChatError: when the budget is used up while the model is in the middle of its turn.
+        """
         usage = exchange.usage
         self.spent = self.spent.plus_call(
             prompt=usage.prompt_tokens,
@@ -320,11 +324,15 @@ class _Loop:
             reasoning=usage.reasoning_tokens,
             cost=usage.cost,
         )
-        if self.replayed_exchanges:
+        replayed = self.replayed_exchanges > 0
+        if replayed:
             self.replayed_exchanges -= 1
         elif self.journal is not None:
             self.journal.write(ExchangeRecord(exchange=exchange.model_dump(mode="json")), at_once=True)
         self.emit(Exchanged(exchange, self.clock()))
+        goes_on = exchange.reply is not None and bool(exchange.reply.tool_calls)
+        if goes_on and not replayed and (limit := self.budget.exceeded(self.clock())):
+            raise ChatError(f"the model's turn was cut short: {limit}")
 
     def clock(self) -> Spent:
         """What is spent by now."""

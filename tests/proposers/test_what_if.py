@@ -233,13 +233,19 @@ class TestResume:
         told = answers(request)
         return call(1.0 + 0.01 * len(told)) if len(told) < 2 else candidates(1.5 + 0.01 * samples)
 
-    def search(self, directory: Path, chat: Chat, simulations: int) -> Result:
+    def search(self, directory: Path, chat: Chat, simulations: int, tokens: int | None = None) -> Result:
         def build(_: Problem, on_exchange: OnExchange) -> Proposer:
             return hybrid(chat, on_exchange=on_exchange)
 
         records = read_journal(directory)
         with open_journal(directory) as journal:
-            return search(problem(), build, Budget(simulations=simulations), journal=journal, records=records)
+            return search(
+                problem(),
+                build,
+                Budget(simulations=simulations, tokens=tokens),
+                journal=journal,
+                records=records,
+            )
 
     def test_mid_turn(self, tmp_path: Path) -> None:
         whole = self.search(tmp_path / "whole", ScriptedChat(self.script), 14)
@@ -272,6 +278,19 @@ class TestResume:
         resumed = self.search(tmp_path / "old", played, 14)
         assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
         assert again.requests == []
+
+    def test_a_turn_ends_where_the_budget_does(self, tmp_path: Path) -> None:
+        chat = ScriptedChat(self.script)
+        cut = self.search(tmp_path / "run", chat, 16, tokens=5)
+        assert cut.status == "not falsified" and "5 tokens is used up" in cut.reason
+        assert chat.requests[-1].tools and answers(chat.requests[-1]) == [], "the call was not answered"
+        assert cut.spent.tokens == 10
+        # With more to spend the run goes on, from the same candidates.
+        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "run")), ScriptedChat(self.script))
+        resumed = self.search(tmp_path / "run", played, 16)
+        assert len(resumed.evaluations) == 16 > len(cut.evaluations)
+        for before, after in zip(cut.evaluations, resumed.evaluations, strict=False):
+            assert before.candidate.key == after.candidate.key
 
     def test_a_turn_that_failed_fails_again(self, tmp_path: Path) -> None:
         """No answer in the second half of a turn: the surrogate goes on, and so it does when resumed."""
