@@ -14,6 +14,7 @@ from falsifier.llm.prompts import (
     Variant,
     View,
     build_prompt,
+    choices,
     render,
     trimmed,
     variant_named,
@@ -124,7 +125,10 @@ class LLMProposer:
 
     def describe(self, candidate: Candidate) -> str:
         """See Adviser.describe."""
-        return in_few_words(self._disguise.hidden_candidate(candidate) if self._disguise else candidate)
+        shown = self._disguise.hidden_candidate(candidate) if self._disguise else candidate
+        if not self._variant.has("names"):
+            return "; ".join(choices.as_point(self._view, shown))
+        return in_few_words(shown)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, whoever proposed their candidates."""

@@ -285,7 +285,7 @@ class TestPredictionTool:
         told = made.respond(about(0.5, -0.25))
         assert "Candidate 1: predicted robustness +0.5, decided at about t = 2.5 s by x <= 0.9" in told
         assert "Candidate 2: predicted robustness -0.25" in told
-        assert "12%" in told and "2 more calls" in told
+        assert "12 %" in told and "2 more calls" in told
         assert [c.signals["u"].values[-1] for c in foreteller.seen] == [0.5, -0.25]
 
     def test_only_what_the_variant_tells_of_samples(self) -> None:

@@ -220,6 +220,20 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
     assert shown == sent[0].tools[0]
 
 
+def test_candidates_are_described_as_the_model_knows_them() -> None:
+    made = problem().space.decode([0.5, 1.0, -1.0, 2.0])
+    told = {
+        (variant, anonymous): make_llm_proposer(
+            problem(), ScriptedChat([]), variant=variant, anonymous=anonymous
+        ).describe(made)
+        for variant in ("MP1", "MP5")
+        for anonymous in (False, True)
+    }
+    assert told["MP5", False].startswith("u0 pchip: 0.5 from 0 s, 1 from 3.333 s")
+    assert told["MP5", True].startswith("u1 pchip: 0.5 from 0 s")
+    assert told["MP1", False] == told["MP1", True] == "point = [0.5, 1, -1, 2]"
+
+
 class TestResume:
     """A run that was killed in the middle of a turn goes on with the same candidate."""
 

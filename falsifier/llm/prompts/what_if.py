@@ -52,8 +52,8 @@ def answer(lines: Sequence[str], *, error: float, left: int) -> str:
     return "\n".join(
         (
             *(f"Candidate {i}: {line}" for i, line in enumerate(lines, start=1)),
-            f"Recent predictions of the signals were off by {error:.0%} of their usual spread "
-            "(root mean square).",
+            f"Recent predictions of the signals were off by {100 * error:.2g} % of their usual "
+            "spread (root mean square).",
             f"{more}; then reply with your candidates.",
         )
     )
