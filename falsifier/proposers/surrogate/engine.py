@@ -104,7 +104,7 @@ class Surrogate:
         rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
         self._fit(rng)
         points = np.array([self.layout.point(c) for c in candidates])
-        return self.models.verdicts(self.layout, self.history.plain_objective(), points)
+        return self.models.verdicts(self.layout, self.history.scaled_objective(), points)
 
     @property
     def recent_error(self) -> float:

@@ -96,8 +96,8 @@ class Ensemble:
         return predict
 
     def verdicts(self, layout: Layout, objective: Objective, points: Array) -> list[Verdict]:
-        """Verdicts that the chosen model predicts for points, shape (m, d)."""
-        corrected = self._corrected(objective)
+        """Verdicts in the requirement's own unit that the chosen model predicts for points, shape (m, d)."""
+        corrected = self._corrected(objective).plain()
         return corrected.verdicts(self._values(self.chosen, layout, corrected, points))
 
     def forecast(self, layout: Layout, objective: Objective, point: Array) -> Forecast:

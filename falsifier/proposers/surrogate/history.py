@@ -1,7 +1,7 @@
 """What was simulated so far, as the models and the planner need it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -97,11 +97,6 @@ class History:
         if self._scaled is None:
             self._scaled = self.objective.rescaled([s.values for s in self.samples])
         return self._scaled
-
-    def plain_objective(self) -> Objective:
-        """Objective in the requirement's own unit, without relaxation."""
-        assert self.objective is not None
-        return replace(self.objective, formulas=self.objective.formulas[:1])
 
     @property
     def points(self) -> Array:

@@ -101,6 +101,10 @@ class Objective:
             scales.append(0.5 if leaf.discrete else max(spread, 1e-9))
         return replace(self, scales=tuple(scales))
 
+    def plain(self) -> "Objective":
+        """Return the objective in the requirement's own unit, without relaxation; offsets stay."""
+        return replace(self, formulas=self.formulas[:1], scales=(1.0,) * len(self.leaves))
+
     def shifted(self, offsets: Sequence[float], *, limit: float) -> "Objective":
         """Return the objective with offsets, clipped to ``limit`` scales; discrete leaves have none."""
         clipped = [
