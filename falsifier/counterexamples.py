@@ -134,11 +134,14 @@ def load(path: Path) -> StoredCounterexample:
 def counterexample_file(path: Path) -> Path:
     """Path of a counterexample file, given itself or its run directory.
 
-    Runs of a campaign keep a journal only; their counterexample is written from it.
+    Runs that were killed, and those of a campaign, keep a journal only; what they found is written from it.
 
     Raises:
         SpecError: when there is none, or more than one.
     """
+    directory = path if path.is_dir() else path.parent
+    if not path.is_file() and (directory / "manifest.json").exists():
+        _keep_recorded(directory)
     if not path.is_dir():
         if not path.is_file():
             raise SpecError(
@@ -149,30 +152,59 @@ def counterexample_file(path: Path) -> Path:
     if len(found) > 1:
         names = ", ".join(str(f) for f in found)
         raise SpecError(f"this run has several counterexamples, give one of them: {names}", file=str(path))
-    return found[0] if found else save(_recorded(path), path / FILE_NAME)
+    if not found:
+        raise SpecError("this run has found no confirmed counterexample", file=str(path))
+    return found[0]
 
 
-def _recorded(directory: Path) -> StoredCounterexample:
-    """Counterexample of a run directory's journal."""
+def file_name(requirement: str = "") -> str:
+    """Name of the counterexample's file in a run directory; of one requirement where several shared a search.
+
+    >>> file_name(), file_name("AT1")
+    ('counterexample.json', 'counterexample-AT1.json')
+    """
+    return f"counterexample-{requirement}.json" if requirement else FILE_NAME
+
+
+def _keep_recorded(directory: Path) -> None:
+    """Write the counterexamples of a run directory's journal that have no file yet."""
     records = read_journal(directory)
     confirmed = [r for r in records if isinstance(r, ConfirmedRecord) and r.outcome == "confirmed"]
-    if not confirmed or confirmed[0].requirement:
-        raise SpecError("this run has found no confirmed counterexample", file=str(directory))
+    missing = [r for r in confirmed if not (directory / file_name(r.requirement)).exists()]
+    if not missing:
+        return
     described = Manifest.model_validate(read_manifest(directory))
-    evaluation = recorded_evaluations(directory, records)[confirmed[0].index]
+    evaluations = recorded_evaluations(directory, records)
+    for record in missing:
+        save(_stored(described, record, evaluations[record.index]), directory / file_name(record.requirement))
+
+
+def _stored(described: Manifest, confirmed: ConfirmedRecord, evaluation: Evaluation) -> StoredCounterexample:
+    """Counterexample of one requirement; where several shared a search, it is simulated again."""
+    requirement, problem = described.requirement, described.request.problem
+    if confirmed.requirement:
+        requirement = described.of(confirmed.requirement).requirement
+        target = f"{described.source.rpartition(':')[0]}:{confirmed.requirement}"
+        problem = problem.model_copy(update={"target": target})
+        loaded = problem.load()
+        evaluation = evaluate(loaded, evaluation.candidate)
+        loaded.model.close()
     verdict = evaluation.verdict
-    assert verdict is not None
+    if verdict is None:
+        raise SimulationError(
+            f"{requirement['name']}: the simulation {evaluation.status}: {evaluation.reason}"
+        )
     digests = [digest for name, digest in described.hashes.items() if name.endswith(".fmu")]
     return StoredCounterexample(
-        requirement=described.requirement["name"],
-        formula=described.requirement["formula"],
-        problem=described.request.problem,
+        requirement=requirement["name"],
+        formula=requirement["formula"],
+        problem=problem,
         candidate=evaluation.candidate.to_json(),
         robustness=verdict.robustness,
         critical_time=verdict.critical_time,
         predicate=verdict.predicate,
         outcome="confirmed",
-        reason=confirmed[0].reason,
+        reason=confirmed.reason,
         fmu_sha256=digests[0] if digests else None,
     )
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from falsifier.budget import Spent
+from falsifier.counterexamples import file_name
 from falsifier.evaluation import Evaluation
 from falsifier.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunStarted
 from falsifier.manifest import recorded_request
@@ -145,7 +146,7 @@ def results_text(results: Sequence[Result]) -> str:
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; several results in one directory have one each."""
     shared = result.directory is not None and len(recorded_request(result.directory).together) > 1
-    return f"counterexample-{result.problem.name}.json" if shared else "counterexample.json"
+    return file_name(result.problem.name if shared else "")
 
 
 def result_json(result: Result) -> dict[str, Any]:

@@ -205,11 +205,12 @@ class _Loop:
             turn = standing[turns % len(standing)]
             turns += 1
             told: dict[str, list[Evaluation]] = {target.name: [] for target in standing}
-            for evaluation in self.evaluate(turn, self.ask(turn, batch), executor):
-                for target in standing:
-                    judged = evaluation if target is turn else judge(target.problem, evaluation)
-                    told[target.name].append(judged)
-                    self.consider(target, judged, first=target is turn)
+            for evaluation, replayed in self.evaluate(turn, self.ask(turn, batch), executor):
+                judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
+                self.note(turn, evaluation, judged, replayed=replayed)
+                for target, seen in judged:
+                    told[target.name].append(seen)
+                    self.consider(target, seen)
             for target in standing:
                 if target.counterexample is None:
                     target.proposer.tell(told[target.name])
@@ -252,14 +253,15 @@ class _Loop:
 
     def evaluate(
         self, target: _Target, candidates: Sequence[Candidate], executor: Executor | None
-    ) -> Iterable[Evaluation]:
+    ) -> Iterable[tuple[Evaluation, bool]]:
+        """Yield evaluations in the order of the candidates, each with whether it was recorded before."""
         known = [
             self.recorded[i] for i in range(self.count, self.count + len(candidates)) if i in self.recorded
         ]
         for evaluation in known:
-            yield self.note(target, self.with_trajectory(target, evaluation), replayed=True)
+            yield self.with_trajectory(target, evaluation), True
         for evaluation in evaluate_all(target.problem, candidates[len(known) :], executor):
-            yield self.note(target, evaluation, replayed=False)
+            yield evaluation, False
 
     def with_trajectory(self, target: _Target, evaluation: Evaluation) -> Evaluation:
         """Simulate a recorded evaluation again when its trajectory was not kept."""
@@ -267,9 +269,16 @@ class _Loop:
             return evaluation
         return replace(evaluation, trajectory=evaluate(target.problem, evaluation.candidate).trajectory)
 
-    def note(self, target: _Target, evaluation: Evaluation, *, replayed: bool) -> Evaluation:
-        """Count, record and announce one simulation."""
-        improved = target.note(evaluation)
+    def note(
+        self,
+        turn: _Target,
+        evaluation: Evaluation,
+        judged: Sequence[tuple[_Target, Evaluation]],
+        *,
+        replayed: bool,
+    ) -> None:
+        """Count, record and announce one simulation, judged by each requirement that stands."""
+        improved = [target.note(seen) for target, seen in judged]
         self.spent = replace(
             self.spent,
             simulations=self.spent.simulations + 1,
@@ -277,15 +286,13 @@ class _Loop:
             seconds=perf_counter() - self.started,
         )
         if self.journal is not None and not replayed:
-            self.journal.evaluated(self.count, evaluation, improved=improved)
-        self.emit(Evaluated(self.count, evaluation, target.best, self.spent, replayed))
+            verdicts = {target.name: seen.verdict for target, seen in judged} if self.shared else None
+            self.journal.evaluated(self.count, evaluation, improved=any(improved), verdicts=verdicts)
+        self.emit(Evaluated(self.count, evaluation, turn.best, self.spent, replayed))
         self.count += 1
-        return evaluation
 
-    def consider(self, target: _Target, evaluation: Evaluation, *, first: bool) -> None:
+    def consider(self, target: _Target, evaluation: Evaluation) -> None:
         """Confirm a violation of one requirement; a fragile or refuted one does not end its search."""
-        if not first:
-            target.note(evaluation)
         if not evaluation.violated or target.counterexample is not None:
             return
         confirmation = confirm(target.problem, evaluation)
@@ -302,6 +309,7 @@ class _Loop:
             reason=confirmation.reason,
             halved=confirmation.halved,
             requirement=self.label(target),
+            spent=_amounts(self.clock()) if self.shared else None,
         )
         if self.journal is not None and (record.index, record.requirement) not in self.confirmed:
             self.journal.write(record, at_once=True)
@@ -309,7 +317,12 @@ class _Loop:
 
     def label(self, target: _Target) -> str:
         """Name of the requirement, where a record must say which one is meant."""
-        return target.name if len(self.targets) > 1 else ""
+        return target.name if self.shared else ""
+
+    @property
+    def shared(self) -> bool:
+        """Whether several requirements are falsified together."""
+        return len(self.targets) > 1
 
     def exchanged(self, exchange: "Exchange") -> None:
         """Count, record and announce an exchange with a language model.
@@ -349,8 +362,8 @@ class _Loop:
 
     def write_end(self, status: ResultStatus, reason: str) -> None:
         if self.journal is not None:
-            spent = {name: getattr(self.spent, name) for name in Spent.__dataclass_fields__}
-            self.journal.write(EndedRecord(status=status, reason=reason, spent=spent), at_once=True)
+            record = EndedRecord(status=status, reason=reason, spent=_amounts(self.spent))
+            self.journal.write(record, at_once=True)
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         fallen = target.counterexample
@@ -375,6 +388,10 @@ def _check_alike(one: Problem, other: Problem) -> None:
             f"{one.name} and {other.name} differ in what is varied or in how it is simulated: "
             "search for them one after the other"
         )
+
+
+def _amounts(spent: Spent) -> dict[str, float | None]:
+    return {name: getattr(spent, name) for name in Spent.__dataclass_fields__}
 
 
 def _smaller(evaluation: Evaluation, best: Evaluation | None) -> bool:

@@ -13,7 +13,7 @@ cut off by a crash is dropped when the journal is opened again.
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
@@ -63,6 +63,18 @@ class VerdictRecord(_Record):
     predicate: str
     values: dict[str, float]
 
+    @classmethod
+    def of(cls, verdict: Verdict | None) -> "VerdictRecord | None":
+        """Return the record of a verdict, None where there is none."""
+        if verdict is None:
+            return None
+        return cls(
+            robustness=verdict.robustness,
+            critical_time=verdict.critical_time,
+            predicate=verdict.predicate,
+            values=dict(verdict.values),
+        )
+
 
 class EvaluatedRecord(_Record):
     """Evaluation index has ended."""
@@ -75,6 +87,9 @@ class EvaluatedRecord(_Record):
     seconds: float
     log: list[str] = []
     trajectory: str | None = Field(None, description="File below the run directory.")
+    verdicts: dict[str, VerdictRecord | None] | None = Field(
+        None, description="Of every requirement that stood, where several are falsified together."
+    )
 
 
 class ExchangeRecord(_Record):
@@ -95,6 +110,9 @@ class ConfirmedRecord(_Record):
     reason: str
     halved: float | None = None
     requirement: str = Field("", description="Which one, where several are falsified together.")
+    spent: dict[str, float | None] | None = Field(
+        None, description="What the run had used by then, where several are falsified together."
+    )
 
 
 class EndedRecord(_Record):
@@ -144,8 +162,22 @@ class Journal:
             os.fsync(self._file.fileno())
             self._synced = monotonic()
 
-    def evaluated(self, index: int, evaluation: Evaluation, *, improved: bool) -> None:
-        """Append an evaluation, and save its trajectory where it is one to keep."""
+    def evaluated(
+        self,
+        index: int,
+        evaluation: Evaluation,
+        *,
+        improved: bool,
+        verdicts: Mapping[str, Verdict | None] | None = None,
+    ) -> None:
+        """Append an evaluation, and save its trajectory where it is one to keep.
+
+        Args:
+            index: of the evaluation.
+            evaluation: judged by the requirement whose turn it was.
+            improved: whether it is the best so far.
+            verdicts: by requirement, where several are falsified together.
+        """
         name = None
         every = self._keep == "history" and index < _KEPT_TRAJECTORIES
         if evaluation.trajectory is not None and (improved or every):
@@ -155,18 +187,14 @@ class Journal:
             EvaluatedRecord(
                 index=index,
                 status=evaluation.status,
-                verdict=None
-                if evaluation.verdict is None
-                else VerdictRecord(
-                    robustness=evaluation.verdict.robustness,
-                    critical_time=evaluation.verdict.critical_time,
-                    predicate=evaluation.verdict.predicate,
-                    values=dict(evaluation.verdict.values),
-                ),
+                verdict=VerdictRecord.of(evaluation.verdict),
                 reason=evaluation.reason,
                 seconds=evaluation.seconds,
                 log=list(evaluation.log),
                 trajectory=name,
+                verdicts=None
+                if verdicts is None
+                else {who: VerdictRecord.of(verdict) for who, verdict in verdicts.items()},
             )
         )
         if name is not None and self._keep == "best":

@@ -13,9 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from falsifier import __version__
 from falsifier.errors import JournalError
 from falsifier.journal import read_manifest
-from falsifier.problem import Problem
+from falsifier.problem import Problem, conjunction
 from falsifier.request import RunRequest
 from falsifier.space import InputRange, ParameterRange
+from falsifier.stl import Formula, parse
 
 _RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
 
@@ -45,11 +46,49 @@ class Manifest(_Strict):
     request: RunRequest
     source: str = Field(description="Where the problem was loaded from.")
     requirement: dict[str, str] = Field(description="name, formula and description of the requirement.")
+    requirements: tuple[dict[str, str], ...] = Field(
+        (), description="The same of each, where several are falsified together."
+    )
     model: str = Field(description="Name of the model.")
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
     stop_time: float = Field(description="End of each simulation in s.")
     hashes: dict[str, str] = Field(description="SHA-256 by path of the FMU and the spec.")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the requirements; several where they are falsified together."""
+        return self.request.together if self.shared else (self.requirement["name"],)
+
+    @property
+    def shared(self) -> bool:
+        """Whether several requirements are falsified together."""
+        return len(self.request.together) > 1
+
+    def of(self, name: str) -> "Manifest":
+        """Return the same with one of the requirements alone.
+
+        Raises:
+            JournalError: for another name; it says which ones there are.
+        """
+        if name not in self.names:
+            raise JournalError(f"this run searched {', '.join(self.names)}, not {name}")
+        if not self.shared:
+            return self
+        found = {each["name"]: each for each in self.requirements} or self._parts()
+        return self.model_copy(update={"requirement": found[name]})
+
+    def _parts(self) -> dict[str, dict[str, str]]:
+        """Take the requirements apart where only their conjunction was recorded."""
+        rest: Formula = parse(self.requirement["formula"])
+        parts: list[Formula] = []
+        for _ in self.names[1:]:
+            rest, last = rest.children
+            parts.insert(0, last)
+        return {
+            name: {"name": name, "formula": str(formula), "description": ""}
+            for name, formula in zip(self.names, [rest, *parts], strict=True)
+        }
 
 
 def recorded_request(directory: Path) -> RunRequest:
@@ -57,18 +96,16 @@ def recorded_request(directory: Path) -> RunRequest:
     return RunRequest.model_validate(read_manifest(directory)["request"])
 
 
-def manifest(request: RunRequest, problem: Problem) -> Manifest:
-    """Describe a run before it starts."""
-    space, requirement = problem.space, problem.requirement
+def manifest(request: RunRequest, *problems: Problem) -> Manifest:
+    """Describe a run before it starts; several problems are falsified together."""
+    problem = conjunction(problems)
+    space = problem.space
     return Manifest(
         **environment(),
         request=request,
         source=problem.source,
-        requirement={
-            "name": problem.name,
-            "formula": str(requirement.formula),
-            "description": requirement.description,
-        },
+        requirement=_requirement_record(problem),
+        requirements=tuple(map(_requirement_record, problems)) if len(problems) > 1 else (),
         model=problem.info.name,
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
@@ -104,6 +141,15 @@ def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, 
     for path, digest in found.items():
         if recorded.get(path, digest) != digest:
             raise JournalError(f"{directory}: {path} has changed since this was started; start anew")
+
+
+def _requirement_record(problem: Problem) -> dict[str, str]:
+    requirement = problem.requirement
+    return {
+        "name": problem.name,
+        "formula": str(requirement.formula),
+        "description": requirement.description,
+    }
 
 
 def _range_record(range_: InputRange | ParameterRange) -> InputRecord:

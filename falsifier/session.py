@@ -10,7 +10,7 @@ from falsifier.events import Listener
 from falsifier.execution import local_executor
 from falsifier.journal import Journal, Record, open_journal, read_journal, read_manifest, write_manifest
 from falsifier.manifest import Manifest, check_unchanged, manifest, recorded_request
-from falsifier.problem import Problem, alike, conjunction
+from falsifier.problem import Problem, alike
 from falsifier.request import RunRequest
 from falsifier.result import Result
 from falsifier.wiring import proposer_builder
@@ -31,7 +31,7 @@ def execute(
         ChatError: when the language model cannot be used, before the first simulation.
     """
     problems = request.problem.load_all(request.together) if request.together else [request.problem.load()]
-    described = manifest(request, conjunction(problems))
+    described = manifest(request, *problems)
     return perform(request, problems, described, directory, listeners=listeners, resume=resume)
 
 

@@ -1,4 +1,7 @@
-"""Runs as values, and as tidy columns."""
+"""Runs as values, and as tidy columns.
+
+A search for several requirements together is a run for each of them.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +15,9 @@ from pydantic import ValidationError
 from falsifier.budget import Spent
 from falsifier.campaign.directory import run_directories
 from falsifier.campaign.plan import Method, method_of
+from falsifier.campaign.shared import shared_tally
 from falsifier.campaign.tally import RunStatus, read_tally
+from falsifier.counterexamples import file_name
 from falsifier.errors import JournalError
 from falsifier.journal import read_manifest
 from falsifier.manifest import Manifest
@@ -34,7 +39,7 @@ class Run:
         reason: why it ended.
         robustness: of each evaluation in order, shape (n,); NaN where the simulation gave none.
         best: index of the smallest robustness, or None.
-        verdict: of the best evaluation, or None.
+        verdict: of the counterexample; without one, of the best evaluation; or None.
         counterexample: index of the confirmed violation, or None.
         unconfirmed: violations that were not confirmed, by index, with what was said of them.
         trajectories: names of kept trajectory files by evaluation.
@@ -58,6 +63,11 @@ class Run:
     def requirement(self) -> str:
         """Name of the requirement."""
         return self.manifest.requirement["name"]
+
+    @property
+    def counterexample_file(self) -> Path:
+        """File of the counterexample, for ``falsifier replay``; it is written when it is first asked for."""
+        return self.directory / file_name(self.requirement if self.manifest.shared else "")
 
     @property
     def seed(self) -> int:
@@ -86,26 +96,42 @@ class Run:
 
 
 def load(directory: Path) -> list[Run]:
-    """Load all runs of a campaign, or the one of a run directory.
+    """Load all runs of a campaign, of a run directory, or of a folder of run directories.
 
     Raises:
-        JournalError: when the directory is neither, or a file in it cannot be understood.
+        JournalError: when the directory is none of these, or a file in it cannot be understood.
     """
-    return [load_run(path) for path in run_directories(directory)]
+    described = ((path, _manifest(path)) for path in run_directories(directory))
+    return [_run(path, manifest.of(name)) for path, manifest in described for name in manifest.names]
 
 
-def load_run(directory: Path) -> Run:
+def load_run(directory: Path, requirement: str | None = None) -> Run:
     """Load one run directory; trajectories are left on disk.
 
+    Args:
+        directory: of the run.
+        requirement: which one, where several were falsified together.
+
     Raises:
-        JournalError: when a file in it cannot be understood.
+        JournalError: when a file in it cannot be understood, or a requirement must be named.
     """
+    manifest = _manifest(directory)
+    if requirement is None and manifest.shared:
+        names = ", ".join(manifest.names)
+        raise JournalError(f"{directory}: several requirements were falsified together, name one of {names}")
+    return _run(directory, manifest.of(requirement or manifest.names[0]))
+
+
+def _manifest(directory: Path) -> Manifest:
     try:
-        manifest = Manifest.model_validate(read_manifest(directory))
+        return Manifest.model_validate(read_manifest(directory))
     except ValidationError as error:
         first = error.errors()[0]
         raise JournalError(f"{directory}/manifest.json: {first['loc']}: {first['msg']}") from None
-    tally = read_tally(directory)
+
+
+def _run(directory: Path, manifest: Manifest) -> Run:
+    tally = shared_tally(directory, manifest.requirement) if manifest.shared else read_tally(directory)
     return Run(
         directory,
         manifest,

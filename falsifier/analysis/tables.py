@@ -127,7 +127,7 @@ def statistics_json(runs: Iterable[Run]) -> str:
 
 def comparable(method: Method) -> bool:
     """Whether published numbers may stand beside this method's."""
-    return method.parameterization == "fixed" and not method.profile
+    return method.parameterization == "fixed" and not method.profile and not method.together
 
 
 def score(found: Statistics) -> Score:

@@ -82,7 +82,9 @@ def run_directory(directory: Path, name: str) -> Path:
 
 
 def run_directories(directory: Path) -> list[Path]:
-    """Directories of all runs that have begun, in the campaign's order; a run directory is its own only run.
+    """Directories of all runs that have begun, in the campaign's order.
+
+    A run directory is its own only run. A folder that is neither, but holds run directories, has those.
 
     Raises:
         JournalError: when the directory holds neither a campaign nor a run.
@@ -92,6 +94,9 @@ def run_directories(directory: Path) -> list[Path]:
         return [p for n in named if ((p := run_directory(directory, n)) / "manifest.json").exists()]
     if (directory / "manifest.json").exists():
         return [directory]
+    below = sorted(path.parent for path in directory.glob("*/manifest.json"))
+    if below:
+        return below
     raise JournalError(f"{directory}: neither a campaign nor a run: no {CAMPAIGN} and no manifest.json")
 
 

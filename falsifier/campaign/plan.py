@@ -29,6 +29,7 @@ class Method:
         profile: of the specs, or empty.
         anonymous: whether the model is told neutral names only.
         fallback: engine that goes on when the model gives up, or empty.
+        together: whether several requirements took turns in one search.
     """
 
     engine: str = ""
@@ -39,6 +40,7 @@ class Method:
     profile: str = ""
     anonymous: bool = False
     fallback: str = ""
+    together: bool = False
 
     @property
     def label(self) -> str:
@@ -50,6 +52,7 @@ class Method:
             self.profile: bool(self.profile),
             "neutral names": self.anonymous,
             f"then {self.fallback}": bool(self.fallback),
+            "shared search": self.together,
         }
         return ", ".join([name, *(text for text, said in apart.items() if said)])
 
@@ -133,6 +136,7 @@ def method_of(request: RunRequest) -> Method:
         profile=problem.profile or "",
         anonymous=model.anonymous,
         fallback=model.fallback or "",
+        together=len(request.together) > 1,
     )
 
 

@@ -39,7 +39,7 @@ class Tally:
         reason: why it ended, in words.
         robustness: of each evaluation in order; NaN where the simulation gave none.
         best: index of the smallest robustness, or None.
-        verdict: what the journal says of the best evaluation's verdict.
+        verdict: what the journal says of the counterexample's verdict; without one, of the best evaluation's.
         counterexample: index of the confirmed violation, or None.
         unconfirmed: what was said of violations that were not confirmed.
         trajectories: file names of kept trajectories by evaluation.
@@ -56,6 +56,7 @@ class Tally:
         self._spent = Spent()
         self._simulation_seconds = 0.0
         self._robustness: list[float] = []
+        self._latest: dict[str, Any] | None = None
 
     @property
     def spent(self) -> Spent:
@@ -96,6 +97,7 @@ class Tally:
                 self._evaluated(record)
             case ConfirmedRecord(outcome="confirmed"):
                 self.counterexample = record.index
+                self.verdict = self._latest
             case ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
@@ -116,8 +118,10 @@ class Tally:
     def _evaluated(self, record: EvaluatedRecord) -> None:
         value = record.verdict.robustness if record.verdict else float("nan")
         smallest = self.best_robustness
+        self._latest = record.verdict.model_dump() if record.verdict else None
         if record.verdict is not None and (smallest is None or value < smallest):
-            self.best, self.verdict = record.index, record.verdict.model_dump()
+            self.best = record.index
+            self.verdict = self.verdict if self.counterexample is not None else self._latest
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory
         self._robustness.append(value)

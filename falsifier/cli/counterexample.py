@@ -77,7 +77,7 @@ def shrink(
     from falsifier.shrink import shrink as shrink_violation
 
     stored = load(run)
-    file = out or counterexample_file(run).with_name("shrunk.json")
+    file = out or _beside(run, "shrunk.json")
     with _problem(stored) as problem:
         original = _simulated(stored, problem)
         shrunk = shrink_violation(
@@ -158,7 +158,7 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
     from falsifier.export import export_counterexample
 
     stored = load(run)
-    directory = out or counterexample_file(run).with_name("export")
+    directory = out or _beside(run, "export")
     with _problem(stored) as problem:
         written = export_counterexample(problem, stored, _simulated(stored, problem), directory)
     if store is not None:
@@ -190,7 +190,7 @@ def robustness_map(
     from falsifier.plotting import plot_neighbourhood, save_figure
 
     stored = load(run)
-    picture = out or counterexample_file(run).with_name("robustness-map.png")
+    picture = out or _beside(run, "robustness-map.png")
     with _problem(stored) as problem:
         found = sample_neighbourhood(
             problem, _simulated(stored, problem), radius=radius, samples=samples, points=grid, seed=seed
@@ -206,6 +206,13 @@ def robustness_map(
         return
     click.echo(f"{problem.name}: {found.text}")
     click.echo(f"  picture        {picture}")
+
+
+def _beside(run: Path, name: str) -> Path:
+    """Place beside a counterexample's file; of several in one folder each has its own."""
+    file, place = counterexample_file(run), Path(name)
+    which = file.stem.removeprefix("counterexample") if file.stem.startswith("counterexample-") else ""
+    return file.with_name(f"{place.stem}{which}{place.suffix}")
 
 
 @contextmanager

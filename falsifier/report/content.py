@@ -88,6 +88,22 @@ def gather(directory: Path, published: Published | None = None) -> Content:
     )
 
 
+def replay_command(run: Run) -> str:
+    """Shell command that simulates a run's counterexample again."""
+    place = run.counterexample_file if run.manifest.shared else run.directory
+    return shlex.join(["falsifier", "replay", str(place)])
+
+
+def searches(runs: Iterable[Run]) -> list[Run]:
+    """Of the runs that shared a search, the one that lasted longest: what a directory's search has used."""
+    longest: dict[Path, Run] = {}
+    for run in runs:
+        known = longest.get(run.directory)
+        if known is None or run.simulations > known.simulations:
+            longest[run.directory] = run
+    return list(longest.values())
+
+
 def run_command(request: RunRequest) -> str:
     """Shell command that repeats a run's search.
 
@@ -111,6 +127,7 @@ def run_command(request: RunRequest) -> str:
         ("--max-tokens", budget.tokens),
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
+        ("--all", True if request.together else None),
     ]
     words = ["falsifier", "run", problem.target]
     for name, value in options:

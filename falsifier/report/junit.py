@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from falsifier.analysis import Run, load
-from falsifier.report.content import run_command
+from falsifier.report.content import replay_command, run_command, searches
 
 # What XML 1.0 cannot hold; names and reasons may carry anything that a model printed.
 _NO_CONTROLS = {code: "�" for code in range(32) if chr(code) not in "\t\n\r"}
@@ -32,7 +32,9 @@ def _suite(label: str, runs: list[Run]) -> ElementTree.Element:
         "errors": sum(run.status == "failed" for run in runs),
         "skipped": sum(not run.finished and run.status != "failed" for run in runs),
     }
-    suite = ElementTree.Element("testsuite", name=label, time=f"{sum(r.spent.seconds for r in runs):.3f}")
+    suite = ElementTree.Element(
+        "testsuite", name=label, time=f"{sum(r.spent.seconds for r in searches(runs)):.3f}"
+    )
     for name, count in counts.items():
         suite.set(name, str(count))
     suite.extend(_case(label, run) for run in runs)
@@ -55,7 +57,7 @@ def _case(label: str, run: Run) -> ElementTree.Element:
                 run.manifest.requirement["formula"],
                 f"at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
                 run.reason,
-                f"falsifier replay {run.directory}",
+                replay_command(run),
                 run_command(run.manifest.request),
             )
         )

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from falsifier.report.content import Content, Section, gather, run_command
+from falsifier.report.content import Content, Section, gather, replay_command, run_command
 
 
 def markdown_report(directory: Path) -> str:
@@ -27,7 +27,7 @@ def _section(section: Section) -> str:
             f"`{_inline(run.verdict.predicate)}`, after {run.simulations} simulations of {run.method.label}, "
             f"seed {run.seed}."
         )
-    lines.append(f"```sh\nfalsifier replay {run.directory}\n{run_command(run.manifest.request)}\n```")
+    lines.append(f"```sh\n{replay_command(run)}\n{run_command(run.manifest.request)}\n```")
     return "\n\n".join(lines)
 
 

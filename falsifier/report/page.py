@@ -6,7 +6,7 @@ from pathlib import Path
 from falsifier.analysis import Table
 from falsifier.display import signal_text
 from falsifier.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
-from falsifier.report.content import Content, Section, Shown, gather, run_command
+from falsifier.report.content import Content, Section, Shown, gather, replay_command, run_command, searches
 from falsifier.report.markup import Html, el, join
 
 
@@ -51,7 +51,7 @@ def _overview(content: Content) -> str:
         f"{len(content.sections)} requirements, {len(runs)} runs, {falsified} falsified",
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
-        f"{sum(run.simulations for run in runs)} simulations",
+        f"{sum(run.simulations for run in searches(runs))} simulations",
         f"started {started}",
     ]
     return ", ".join(parts) + "."
@@ -137,7 +137,7 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
     facts += [(f"parameter {name}", f"{value:.10g}") for name, value in shown.candidate.parameters.items()]
     commands = [("repeat the search", run_command(run.manifest.request))]
     if run.falsified:
-        commands.insert(0, ("simulate it again", f"falsifier replay {run.directory}"))
+        commands.insert(0, ("simulate it again", replay_command(run)))
     rationale = shown.candidate.rationale
     return el(
         "details",

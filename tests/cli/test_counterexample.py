@@ -121,3 +121,40 @@ def test_wrong_files_end_with_two(tmp_path: Path, arguments: list[str], message:
     (tmp_path / "broken.json").write_text(json.dumps({"format": 1}))
     done = run(tmp_path, *arguments)
     assert (done.code, message in done.err) == (2, True), done.err
+
+
+@pytest.fixture(scope="module")
+def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one search for two requirements that both fell."""
+    folder = tmp_path_factory.mktemp("together")
+    shutil.copy(bundled("fmus") / "AT.fmu", folder / "AT.fmu")
+    spec = (bundled("specs") / "AT.toml").read_text().replace("../fmus/", "")
+    (folder / "my.toml").write_text(spec.partition("# AT5i")[0])
+    done = run(folder, "run", "my.toml", "--all", "--engine", "corners", "--quiet", "--out", "run")
+    assert done.code == 1, done.err
+    assert "2 of 2 falsified" in done.out
+    return folder
+
+
+def test_of_several_counterexamples_one_must_be_named(together: Path) -> None:
+    done = run(together, "explain", "run")
+    assert done.code == 2
+    assert "run/counterexample-AT1.json, run/counterexample-AT2.json" in done.err
+    for name in ("AT1", "AT2"):
+        done = run(together, "replay", f"run/counterexample-{name}.json")
+        assert (done.code, done.out.partition(":")[0]) == (1, f"{name} violates")
+
+
+def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:
+    for name in ("AT1", "AT2"):
+        assert run(together, "export", f"run/counterexample-{name}.json").code == 0
+        exported = json.loads((together / f"run/export-{name}/counterexample.json").read_text())
+        assert exported["requirement"] == name
+
+
+def test_a_lost_counterexample_is_written_from_the_journal(together: Path) -> None:
+    kept = (together / "run/counterexample-AT2.json").read_text()
+    (together / "run/counterexample-AT2.json").unlink()
+    assert run(together, "replay", "run/counterexample-AT2.json").code == 1
+    again = json.loads((together / "run/counterexample-AT2.json").read_text())
+    assert again == json.loads(kept)
