@@ -87,14 +87,14 @@ def run_line(run: RunProgress) -> str:
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
 
 
-def overall_line(progress: Progress, rate: float | None) -> str:
-    """A whole campaign in a line."""
+def overall_line(progress: Progress, rate: float | None, *, stopped: bool = False) -> str:
+    """A whole campaign in a line; stopped: nobody works on it any more."""
     counts, spent = progress.counts, progress.spent
     parts = [
         f"{progress.finished}/{len(progress.runs)} runs finished",
         f"{counts['falsified']} falsified",
         *([f"{counts['failed']} failed"] if counts["failed"] else []),
-        f"{counts['running']} running",
+        *([] if stopped else [f"{counts['running']} running"]),
         f"{spent.simulations} simulations" + ("" if rate is None else f" ({rate:.0f}/s)"),
     ]
     if spent.calls:

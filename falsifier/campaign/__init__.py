@@ -9,6 +9,7 @@ A campaign is a directory with one run directory for each run. What is finished 
 directories and from nowhere else, so a campaign that was killed goes on where they end.
 """
 
+from falsifier.campaign.directory import is_worked_on
 from falsifier.campaign.plan import CampaignRequest, Method, cross, method_of, run_name
 from falsifier.campaign.progress import Follower, Progress, RunProgress
 from falsifier.campaign.runner import Outcome, resume_campaign, run_campaign
@@ -22,6 +23,7 @@ __all__ = [
     "Progress",
     "RunProgress",
     "cross",
+    "is_worked_on",
     "method_of",
     "resume_campaign",
     "run_campaign",

@@ -23,6 +23,9 @@ from falsifier.request import RunRequest
 
 CAMPAIGN = "campaign.json"
 STOP = "stop"
+_LOCK = "lock"
+# How long in s to wait for the lock: who looks whether it is held holds it for a moment.
+_LOCK_PATIENCE = 0.5
 
 
 class CampaignRecord(BaseModel):
@@ -108,12 +111,24 @@ def locked(directory: Path) -> Iterator[None]:
         JournalError: when another process holds it.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(directory / "lock")
+    lock = FileLock(directory / _LOCK)
     try:
-        lock.acquire(timeout=0)
+        lock.acquire(timeout=_LOCK_PATIENCE)
     except Timeout:
         raise JournalError(f"{directory}: another process is working on this campaign") from None
     try:
         yield
     finally:
         lock.release()
+
+
+def is_worked_on(directory: Path) -> bool:
+    """Whether a process holds the campaign's lock: one that was killed, however it was, holds it no more."""
+    path = directory / _LOCK
+    if not path.exists():
+        return False
+    try:
+        with FileLock(path, timeout=0):
+            return False
+    except (Timeout, OSError):  # OSError: who may only read cannot tell
+        return True

@@ -12,7 +12,16 @@ import click
 from falsifier.analysis import load, read_published
 from falsifier.analysis.tables import TABLES, statistics_json
 from falsifier.budget import Budget
-from falsifier.campaign import CampaignRequest, Follower, Method, Outcome, cross, run_campaign, suite
+from falsifier.campaign import (
+    CampaignRequest,
+    Follower,
+    Method,
+    Outcome,
+    cross,
+    is_worked_on,
+    run_campaign,
+    suite,
+)
 from falsifier.campaign import resume_campaign as _resume
 from falsifier.campaign.suites import SUITES
 from falsifier.cli.options import asking, asking_options, json_option, quiet_option
@@ -138,17 +147,23 @@ def bench(
 @click.argument("directory", type=click.Path(path_type=Path))
 @click.option("--once", is_flag=True, help="Say how far it is, and end.")
 def watch(*, directory: Path, once: bool) -> None:
-    """Follow the campaign in DIRECTORY from another shell; nothing is written there."""
+    """Follow the campaign in DIRECTORY from another shell until it ends or is stopped.
+
+    Nothing is written there.
+    """
     follower = Follower(directory)
-    if once:
-        click.echo(overall_line(follower.look(), None))
-        return
-    with campaign_display() as show:
-        while (progress := follower.look()).counts["running"] + progress.counts["waiting"]:
-            show(progress)
-            time.sleep(_WATCH_PERIOD)
-        show(progress)
-    click.echo(overall_line(progress, None))
+    working = is_worked_on(directory)
+    if not once:
+        with campaign_display() as show:
+            while working:
+                show(follower.look())
+                time.sleep(_WATCH_PERIOD)
+                working = is_worked_on(directory)
+            show(follower.look())
+    progress = follower.look()  # after the lock: who let it go has written everything
+    click.echo(overall_line(progress, None, stopped=not working))
+    if not working and progress.finished < len(progress.runs):
+        click.echo(f"stopped; falsifier resume {directory} goes on")
 
 
 def resume_campaign(

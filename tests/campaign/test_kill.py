@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.campaign import Follower, resume_campaign, run_campaign
+from falsifier.campaign import Follower, is_worked_on, resume_campaign, run_campaign
 from falsifier.campaign.directory import is_campaign
 from tests.campaign.processes import WANTED
 from tests.campaigns import outcomes, request, work_in_threads
@@ -42,9 +42,11 @@ def test_killed_at_random_instants_it_ends_like_an_uninterrupted_one(
         deadline = time.monotonic() + 60
         while simulations(killed) < instant and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.005)
+        assert is_worked_on(killed)
         process.kill()
         assert process.wait() == -signal.SIGKILL, "the campaign ended before it could be killed"
     assert any(not run.finished for run in Follower(killed).look().runs)
+    assert not is_worked_on(killed)
     resume_campaign(killed, jobs=2)
     assert outcomes(killed) == outcomes(whole)
 

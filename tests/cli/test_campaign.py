@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from falsifier.campaign.directory import locked
 from falsifier.cli import cli
 from falsifier.errors import SpecError
 from tests.campaigns import work_in_threads
@@ -149,6 +150,22 @@ def test_watch_says_how_far_a_campaign_is(command: Any) -> None:
         result = command(*arguments)
         assert result.exit_code == 0
         assert "4/4 runs finished, 2 falsified" in result.stdout
+        assert "stopped" not in result.stdout
+
+
+def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:
+    bench(command, "--out", "c", "--quiet")
+    for journal in sorted((tmp_path / "c" / "runs").rglob("journal.jsonl"))[:2]:
+        journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:-1]))  # as after a kill
+    for arguments in (["watch", "c"], ["watch", "c", "--once"]):
+        result = command(*arguments)
+        assert "2/4 runs finished" in result.stdout
+        assert "running" not in result.stdout
+        assert "stopped; falsifier resume c goes on" in result.stdout
+    with locked(tmp_path / "c"):
+        result = command("watch", "c", "--once")
+        assert "2 running" in result.stdout
+        assert "stopped" not in result.stdout
 
 
 def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> None:
