@@ -1,5 +1,6 @@
 """Where work happens: here, or on any ``concurrent.futures`` executor."""
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 # How long in s to wait for a cluster's scheduler.
 _CONNECT_TIMEOUT = 20
+# In the form of python -W: warnings that begin with this word.
+_TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
@@ -104,7 +107,25 @@ def _process_pool(jobs: int) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
+    _start_silent_tracker()
     return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_prepare_worker)
+
+
+def _start_silent_tracker() -> None:
+    """Start the process that frees a pool's semaphores, so that it says nothing of those that a kill left.
+
+    It frees them all the same; its warning would reach the terminal after the command has ended, and nobody
+    could do anything about it.
+    """
+    if sys.platform == "win32":
+        return
+    from multiprocessing.resource_tracker import ensure_running
+
+    sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
+    try:
+        ensure_running()
+    finally:
+        sys.warnoptions.remove(_TRACKER_FILTER)
 
 
 def _prepare_worker() -> None:

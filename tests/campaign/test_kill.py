@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -20,10 +21,12 @@ ROOT = Path(__file__).resolve().parents[2]
 KILLS = 2
 
 
-def start(directory: Path) -> "subprocess.Popen[bytes]":
+def start(directory: Path, stderr: IO[bytes] | None = None) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "tests.campaign.processes", str(directory)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(command, cwd=ROOT, env=environment, preexec_fn=listen_to_interrupts)
+    return subprocess.Popen(
+        command, cwd=ROOT, env=environment, stderr=stderr, preexec_fn=listen_to_interrupts
+    )
 
 
 def simulations(directory: Path) -> int:
@@ -49,6 +52,28 @@ def test_killed_at_random_instants_it_ends_like_an_uninterrupted_one(
     assert not is_worked_on(killed)
     resume_campaign(killed, jobs=2)
     assert outcomes(killed) == outcomes(whole)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")
+def test_a_killed_campaign_says_nothing_after_its_end(tmp_path: Path) -> None:
+    said = tmp_path / "stderr"
+    with said.open("wb") as stderr:
+        process = start(tmp_path / "c", stderr)
+    deadline = time.monotonic() + 60
+    while simulations(tmp_path / "c") < 5 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    helpers = children(process.pid)
+    assert len(helpers) == 3  # two workers, and the one that frees what they share
+    process.kill()
+    process.wait()
+    while any(Path(f"/proc/{pid}").exists() for pid in helpers) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert said.read_text() == ""
+
+
+def children(pid: int) -> list[int]:
+    """Process ids of a process's children."""
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
 def test_a_run_that_kills_its_worker_has_failed(tmp_path: Path) -> None:
