@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, rejected
 from falsifier.loading import build_problem
 from falsifier.model import Interface, ModelInfo, Variable
 from falsifier.problem import Problem
@@ -35,8 +35,9 @@ def changes_from_options(
     """Changes that command-line options ask for.
 
     Args:
-        inputs: ``name=low:high``, ``name=low:high:points``, ``name=low:high:points:interpolation`` (searched)
-            or ``name=value`` (kept constant).
+        inputs: ``name=low:high``, ``name=low:high:points``, ``name=low:high:points:interpolation``
+            (searched), ``name`` (searched as the spec says, or between the FMU's min and max) or
+            ``name=value`` (kept constant).
         parameters: ``name=value`` (fixed) or ``name=low:high`` (searched).
         stop_time: in s.
         output_interval: in s.
@@ -58,7 +59,7 @@ def changes_from_options(
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise SpecError(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
+        raise SpecError(f"{where}: {rejected(first['msg'], first['input'])}") from None
 
 
 def adhoc_problem(fmu: Path, stl: str, *, changes: ModelChanges) -> Problem:
@@ -89,7 +90,7 @@ def adhoc_problem(fmu: Path, stl: str, *, changes: ModelChanges) -> Problem:
                 "stop_time": stop_time,
                 "output_interval": default_interval(info, stop_time),
             },
-            "inputs": {} if searched else _bounded_inputs(info),
+            "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
             "requirements": {"stl": {"formula": stl}},
         },
         file=str(fmu),
@@ -186,6 +187,8 @@ def _requirement_section(info: ModelInfo) -> str:
 
 
 def _input(option: str) -> tuple[str, dict[str, object]]:
+    if option.strip() and "=" not in option:
+        return option.strip(), {}
     name, parts = _split(option, "--input")
     if len(parts) == 1:
         return name, {"value": _number(parts[0], option)}
@@ -232,6 +235,14 @@ def _bounded_inputs(info: ModelInfo) -> dict[str, object]:
         v.name: {"control_points": _DEFAULT_POINTS}
         for v in info.inputs
         if v.kind == "real" and v.low is not None and v.high is not None
+    }
+
+
+def _searched_inputs(changes: ModelChanges) -> dict[str, object]:
+    return {
+        name: {"control_points": _DEFAULT_POINTS}
+        for name, section in changes.inputs.items()
+        if section.value is None
     }
 
 

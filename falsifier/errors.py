@@ -9,6 +9,9 @@ import difflib
 from collections.abc import Iterable
 from typing import Literal
 
+# Characters of a rejected value in a message.
+_SHOWN_INPUT = 60
+
 FailureStatus = Literal["failed", "crashed", "timeout"]
 
 
@@ -82,6 +85,12 @@ class ChatError(FalsifierError):
     exit_code = 3
 
 
+class ChatSetupError(ChatError):
+    """The language model cannot be asked as it was named: unknown provider, missing key."""
+
+    exit_code = 2
+
+
 class JournalError(FalsifierError):
     """A run directory cannot be read, belongs to another problem or is in use."""
 
@@ -92,10 +101,23 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     >>> did_you_mean("sped", ["rpm", "speed"])
     "did you mean 'speed'? Known: rpm, speed"
     """
-    names = list(known)
+    names = list(dict.fromkeys(known))
     listing = "Known: " + (", ".join(names[:30]) + (", ..." if len(names) > 30 else "") if names else "none")
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}? {listing}" if near else listing
+
+
+def rejected(message: str, given: object) -> str:
+    """Message of a validator, with what was given where it only says what was expected.
+
+    >>> rejected("Input should be 'free' or 'fixed'", "fixd")
+    "Input should be 'free' or 'fixed', got 'fixd'"
+    """
+    message = message.removeprefix("Value error, ")
+    if not message.startswith("Input should"):
+        return message
+    text = repr(given)
+    return f"{message}, got {text if len(text) <= _SHOWN_INPUT else f'{text[:_SHOWN_INPUT]} ...'}"
 
 
 def _simulation_error(

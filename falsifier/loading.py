@@ -302,7 +302,8 @@ def input_range(variable: Variable, section: InputSection, *, file: str | None, 
     if limits is None:
         if variable.low is None or variable.high is None:
             raise SpecError(
-                "the FMU gives no min and max for this input: add range = [low, high]",
+                "the FMU gives no min and max for this input: add range = [low, high], or say "
+                f"--input {variable.name}=LOW:HIGH[:POINTS]",
                 file=file,
                 key=f"{key}.range",
             )

@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, rejected
 from falsifier.model import Interface
 from falsifier.signals import Interpolation
 
@@ -200,7 +200,7 @@ def _spec_error(error: ValidationError, file: str) -> SpecError:
         field = _fields(location[:-1]).get(location[-1])
         meaning = f" ({field.description})" if field is not None and field.description else ""
         return SpecError(f"this key is missing{meaning}", file=file, key=key)
-    return SpecError(first["msg"].removeprefix("Value error, "), file=file, key=key)
+    return SpecError(rejected(first["msg"], first["input"]), file=file, key=key)
 
 
 def _fields(location: list[str]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from falsifier.engine import OnExchange, ProposerBuilder
 from falsifier.errors import SpecError
 from falsifier.journal import Record, recorded_exchanges
 from falsifier.problem import Problem
-from falsifier.proposers import DEFAULT_ENGINE, make_proposer
+from falsifier.proposers import DEFAULT_ENGINE, check_engine, make_proposer
 from falsifier.proposers.protocol import Proposer
 from falsifier.request import ModelRequest, RunRequest
 
@@ -39,18 +39,37 @@ def proposer_builder(
         SpecError: for an unknown engine, or an engine and a model that do not go together.
         ChatError: for an unknown provider or a missing key.
     """
+    check_names(request)
     if request.model is None:
         engine = request.engine or DEFAULT_ENGINE
-        if engine in _MODEL_ENGINES:
-            raise SpecError(f"the engine {engine!r} needs a language model: add --model NAME")
         seeds = range(request.seed, request.seed + _SEED_STRIDE * len(problems), _SEED_STRIDE)
         made = {p.name: make_proposer(engine, p, seed=s) for p, s in zip(problems, seeds, strict=True)}
         return lambda problem, _: made[problem.name]
-    if (request.engine or "llm") not in _MODEL_ENGINES:
-        raise SpecError(
-            f"the engine {request.engine!r} asks no language model: leave out --model, or leave out --engine"
-        )
     return _led_by_model(request, request.model, _chat(request, request.model, records))
+
+
+def check_names(request: RunRequest) -> None:
+    """Refuse names that nobody knows; nothing is imported for that and no key is looked for.
+
+    Raises:
+        SpecError: for an unknown engine or prompt variant, or an engine and a model that do not go together.
+    """
+    engine, model = request.engine, request.model
+    if model is None:
+        if engine in _MODEL_ENGINES:
+            raise SpecError(f"the engine {engine!r} needs a language model: add --model NAME")
+        check_engine(engine or DEFAULT_ENGINE)
+        return
+    if (engine or "llm") not in _MODEL_ENGINES:
+        raise SpecError(
+            f"the engine {engine!r} asks no language model: leave out --model, or leave out --engine"
+        )
+    from falsifier.llm.prompts.variants import variant_named
+
+    variant_named(model.variant)
+    if model.fallback in _MODEL_ENGINES:
+        raise SpecError(f"--fallback {model.fallback}: name an engine that asks no language model")
+    check_engine(model.fallback or DEFAULT_ENGINE)
 
 
 def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> ProposerBuilder:
@@ -76,11 +95,12 @@ def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> Pro
 
 def _chat(request: RunRequest, model: ModelRequest, records: Sequence[Record]) -> "Chat":
     from falsifier.llm.cache import default_cache_directory
-    from falsifier.llm.connect import connect
+    from falsifier.llm.connect import connect, preflight
     from falsifier.llm.library import listed_price
     from falsifier.llm.replay import RecordedChat
     from falsifier.llm.usage import Price
 
+    preflight(model.name, api_base=model.api_base)
     price = Price(*model.price) if model.price else None
     if request.budget.cost is not None and (price or listed_price(model.name)) is None:
         raise SpecError(

@@ -101,7 +101,7 @@ def test_equal_questions_are_answered_from_disk(tmp_path: Path) -> None:
 
 def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> None:
     done = falsifier("run", "AT1", "--model", "openai/gpt-5-mini", cwd=tmp_path)
-    assert done.code == 3
+    assert done.code == 2
     assert "set OPENAI_API_KEY" in done.err
     assert not (tmp_path / "runs").exists()
 

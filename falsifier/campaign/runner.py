@@ -28,6 +28,7 @@ from falsifier.journal import EndedRecord, open_journal, write_manifest
 from falsifier.manifest import check_unchanged, environment, file_hashes, manifest
 from falsifier.problem import Problem
 from falsifier.request import ProblemRequest, RunRequest
+from falsifier.wiring import check_names
 
 Listener = Callable[[Progress], None]
 
@@ -68,8 +69,10 @@ def run_campaign(
     Raises:
         JournalError: when the directory is in use or holds a campaign already.
         SpecError: when a problem, an engine or the executor is not what it should be.
+        ChatError: for an unknown provider or a missing key.
         ModelError: when an FMU cannot be used, or the cluster not be reached.
     """
+    _check(request.named().values(), local=executor is None)
     with locked(directory):
         if is_campaign(directory):
             raise JournalError(
@@ -193,6 +196,21 @@ class _Watch:
         """Tell all runs to stop where they are."""
         self.reason = reason
         self._stop.write_text(f"{reason}\n", encoding="utf-8")
+
+
+def _check(requests: Iterable[RunRequest], *, local: bool) -> None:
+    """Refuse names that nobody knows and missing keys before anything is loaded or written.
+
+    Keys are looked for only where the runs are done on this machine: a cluster's workers have their own.
+    """
+    requests = tuple(requests)
+    for request in requests:
+        check_names(request)
+    if local:
+        from falsifier.llm.connect import preflight
+
+        for name, api_base in {(r.model.name, r.model.api_base) for r in requests if r.model is not None}:
+            preflight(name, api_base=api_base)
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemRequest, Problem]:

@@ -9,7 +9,7 @@ from typing import NoReturn
 import click
 
 from falsifier import __version__
-from falsifier.errors import FalsifierError
+from falsifier.errors import FalsifierError, did_you_mean
 
 # What a shell reports of a program whose reader has gone: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
@@ -48,6 +48,13 @@ class _LazyGroup(click.Group):
             return None
         command: click.Command = getattr(import_module(_COMMANDS[cmd_name][0]), cmd_name.replace("-", "_"))
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in _COMMANDS:
+            ctx.fail(f"No such command {args[0]!r}; {did_you_mean(args[0], _COMMANDS)}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -122,12 +122,12 @@ def explain(*, run: Path, model: str | None, effort: str | None, api_base: str |
 
     if model is None and (effort is not None or api_base is not None):
         raise click.UsageError("--effort and --api-base need --model NAME")
+    stored = load(run)
     chat = None
     if model is not None:
         from falsifier.llm.connect import connect
 
         chat = connect(model, effort=effort, api_base=api_base)
-    stored = load(run)
     with _problem(stored) as problem:
         explanation = explain_violation(problem, _simulated(stored, problem))
     words = narrate(explanation, chat) if chat else None

@@ -38,7 +38,8 @@ def problem_options(command: F) -> F:
                 "inputs",
                 multiple=True,
                 metavar="NAME=LOW:HIGH:POINTS",
-                help="Search this input signal (or NAME=VALUE: keep it constant). Repeatable.",
+                help="Search this input signal (NAME alone: as the spec says, or between the FMU's min and "
+                "max; NAME=VALUE: keep it constant). Repeatable.",
             ),
             click.option(
                 "--param",

@@ -5,7 +5,7 @@
     counterexample.json, .png   for falsifier itself and for people
     input.csv                   input signals: FMPy, fmusim, OpenModelica
     start_values.json, .ssv     parameters and start values: scripts; tools that read SSP parameter sets
-    replay.py                   simulates both with FMPy alone and prints the outputs
+    replay.py                   simulates both with FMPy alone, into outputs.csv, and prints what decided
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
     test_NAME.py                a pytest that fails while the counterexample violates

@@ -10,10 +10,12 @@ from falsifier.evaluation import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem import Problem
 
+# Rows that a replay prints before and behind the critical time.
+_SHOWN_ROWS = 3
 _FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
 _REPLAY = '''\
-"""Simulates a counterexample with FMPy alone and prints the outputs as CSV.
+"""Simulates a counterexample with FMPy alone; writes outputs.csv and prints what decided the verdict.
 
     pip install fmpy
     python replay.py [MODEL.fmu]
@@ -45,13 +47,18 @@ result = simulate_fmu(
     input={inputs},
     output={outputs},
 )[::{every}]
-print(",".join(result.dtype.names))
-for row in result:
-    print(",".join(repr(float(value)) for value in row))
 
-critical = result[abs(result["time"] - {critical_time!r}).argmin()]
-values = ", ".join(f"{{name}} = {{float(critical[name]):.6g}}" for name in result.dtype.names)
-print(f"at the critical time: {{values}}", file=sys.stderr)
+lines = [",".join(result.dtype.names)]
+lines += [",".join(repr(float(value)) for value in row) for row in result]
+(HERE / "outputs.csv").write_text("\\n".join(lines) + "\\n")
+
+shown = {shown}
+critical = int(abs(result["time"] - {critical_time!r}).argmin())
+print("".join(f"{{name:>14}}" for name in shown))
+for k in range(max(critical - {around}, 0), min(critical + {around} + 1, len(result))):
+    values = "".join(f"{{float(result[name][k]):14.6g}}" for name in shown)
+    print(values + ("  <- critical time" if k == critical else ""))
+print(f"all {{len(result)}} rows are in outputs.csv beside this script")
 '''
 
 _OPENMODELICA = """\
@@ -104,6 +111,10 @@ def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> 
         tolerance=experiment.tolerance,
         inputs='read_csv(HERE / "input.csv")' if _has_inputs(problem) else "None",
         outputs=json.dumps(list(experiment.outputs)),
+        shown=json.dumps(
+            ["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]
+        ),
+        around=_SHOWN_ROWS,
         every=round(experiment.output_interval / step),
     )
 

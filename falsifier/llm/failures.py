@@ -3,8 +3,10 @@
 import os
 import re
 from collections.abc import Iterable
+from urllib.parse import urlsplit
 
 from falsifier.errors import ChatError
+from falsifier.llm.providers import known, server_address
 
 # 200 is an answer that is no JSON: a page of some machine in between.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
@@ -32,6 +34,8 @@ _SECRET_NAMES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
 # Shorter values are words that happen to be set, and redacting them would garble messages.
 _SHORTEST_SECRET = 6
 _LONGEST_DETAIL = 600
+# Requests to a server on this machine that refuses connections: one that starts this moment is still met.
+_LOCAL_PATIENCE = 3
 
 
 class TransientChatError(ChatError):
@@ -40,11 +44,20 @@ class TransientChatError(ChatError):
     Attributes:
         retry_after: seconds that the server asked to wait, or None.
         for_all: whether other requests of the same account had better wait too, as after a rate limit.
+        patience: most requests that are worth sending, or None where there is no such number.
     """
 
-    def __init__(self, message: str, *, retry_after: float | None = None, for_all: bool = False) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        retry_after: float | None = None,
+        for_all: bool = False,
+        patience: int | None = None,
+    ) -> None:
         self.retry_after = retry_after
         self.for_all = for_all
+        self.patience = patience
         super().__init__(message)
 
 
@@ -82,6 +95,14 @@ def classify(
     lowered = detail.lower()
     where = f" at {redact(api_base, secrets)}" if api_base else ""
     keys = " or ".join(key_variables) or "the API key"
+    address = server_address(model, api_base)
+    if _is_refused(error) and _is_this_machine(address):
+        command = known(model).start
+        start = f"the server with '{command}'" if command else "the model's server"
+        return TransientChatError(
+            f"{model}: nothing listens at {redact(address, secrets)}: start {start}, or correct --api-base",
+            patience=_LOCAL_PATIENCE,
+        )
     if status in (401, 403):
         return ChatError(f"{model}{where}: the provider refused the key; check {keys}. {detail}")
     speaks_of_format = any(word in lowered for word in _FORMAT_WORDS)
@@ -130,6 +151,19 @@ def _status(error: Exception) -> int | None:
 def _is_connection(error: Exception) -> bool:
     # An answer without choices comes back from the client library as a bare IndexError.
     return isinstance(error, ConnectionError | TimeoutError | IndexError)
+
+
+def _is_refused(error: BaseException | None) -> bool:
+    """Whether a connection was refused, which the client libraries wrap several times."""
+    while error is not None:
+        if isinstance(error, ConnectionRefusedError) or "connection refused" in str(error).lower():
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _is_this_machine(address: str) -> bool:
+    return (urlsplit(address).hostname or "") in ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
 def _retry_after(error: Exception) -> float | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from falsifier.errors import ChatError, did_you_mean
+from falsifier.errors import ChatError, ChatSetupError, did_you_mean
 from falsifier.llm.providers import PROVIDERS, known
 from falsifier.llm.usage import Price
 
@@ -45,12 +45,12 @@ def check_name(model: str) -> None:
     """Refuse a name whose provider nobody knows; listed providers need no import for that.
 
     Raises:
-        ChatError: with the form that is expected.
+        ChatSetupError: with the form that is expected.
     """
     provider, _, name = model.partition("/")
     if name and (provider in PROVIDERS or _knows(model)):
         return
-    raise ChatError(
+    raise ChatSetupError(
         f"{model!r} names no known provider and model: expected PROVIDER/MODEL such as openai/gpt-5-mini; "
         f"{did_you_mean(provider, PROVIDERS)}"
     )

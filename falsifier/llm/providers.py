@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
 
-from falsifier.errors import ChatError
+from falsifier.errors import ChatSetupError
 from falsifier.llm.modes import MODES, Mode
 
 
@@ -17,6 +17,8 @@ class Provider:
     Attributes:
         keys: environment variables that may hold its key, the usual one first; empty: none is needed.
         local: runs on the user's own machine, so that a price of zero is true.
+        address: where its server is when nobody says so, for messages.
+        start: command that starts its server, for messages.
         openai_client: served through the OpenAI client, which retries unasked unless told not to.
         defaults: parameters that are sent unless the user states them.
         effort: how reasoning effort is passed: ``native``, or ``allowed`` where the client library must be
@@ -27,6 +29,8 @@ class Provider:
 
     keys: tuple[str, ...] = ()
     local: bool = False
+    address: str = ""
+    start: str = ""
     openai_client: bool = False
     defaults: Mapping[str, Any] = field(default_factory=dict)
     effort: Literal["native", "allowed"] = "native"
@@ -35,7 +39,12 @@ class Provider:
 
 # Ollama cuts off the beginning of a prompt that is longer than its context, without a word. Its own default
 # is shorter than most prompts with a history.
-_OLLAMA = MappingProxyType({"num_ctx": 32_768})
+_OLLAMA = Provider(
+    local=True,
+    address="http://localhost:11434",
+    start="ollama serve",
+    defaults=MappingProxyType({"num_ctx": 32_768}),
+)
 
 PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     {
@@ -50,11 +59,22 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
         "openrouter": Provider(("OPENROUTER_API_KEY",)),
         "together_ai": Provider(("TOGETHERAI_API_KEY", "TOGETHER_API_KEY")),
         "xai": Provider(("XAI_API_KEY",)),
-        "ollama": Provider(local=True, defaults=_OLLAMA),
-        "ollama_chat": Provider(local=True, defaults=_OLLAMA),
-        "lm_studio": Provider(local=True, openai_client=True, effort="allowed"),
-        "hosted_vllm": Provider(),
-        "llamafile": Provider(local=True, openai_client=True),
+        "ollama": _OLLAMA,
+        "ollama_chat": _OLLAMA,
+        "lm_studio": Provider(
+            local=True,
+            address="http://localhost:1234/v1",
+            start="lms server start",
+            openai_client=True,
+            effort="allowed",
+        ),
+        "hosted_vllm": Provider(start="vllm serve MODEL"),
+        "llamafile": Provider(
+            local=True,
+            address="http://127.0.0.1:8080/v1",
+            start="MODEL.llamafile --server",
+            openai_client=True,
+        ),
     }
 )
 
@@ -79,7 +99,7 @@ def find_key(model: str, *, api_base: str | None = None) -> str | None:
         The key; a placeholder for the user's own server without one; None where none is needed.
 
     Raises:
-        ChatError: naming the variable to set.
+        ChatSetupError: naming the variable to set.
     """
     provider = known(model)
     if variable := key_variable(model):
@@ -88,13 +108,22 @@ def find_key(model: str, *, api_base: str | None = None) -> str | None:
         return NO_KEY
     if provider.keys and api_base is None:
         variables = " or ".join(provider.keys)
-        raise ChatError(f"{model}: no key: set {variables} in the environment")
+        raise ChatSetupError(f"{model}: no key: set {variables} in the environment")
     return None
 
 
 def key_variable(model: str) -> str:
     """Environment variable that holds a key for this model; empty where none does."""
     return next((name for name in known(model).keys if os.environ.get(name, "").strip()), "")
+
+
+def server_address(model: str, api_base: str | None) -> str:
+    """Where a model's server is: as stated, as the environment says, or its provider's usual place.
+
+    Empty where only the client library knows.
+    """
+    variable = "OLLAMA" if known(model) is _OLLAMA else provider_of(model).upper()
+    return api_base or os.environ.get(f"{variable}_API_BASE", "") or known(model).address
 
 
 def first_mode(model: str) -> Mode:

@@ -99,13 +99,12 @@ class RetryingChat:
                     raise ChatError(
                         f"{error} The server asks to wait {asked:g} s; try again later."
                     ) from None
-                if attempt == self.attempts:
+                most = min(self.attempts, error.patience or self.attempts)
+                if attempt >= most:
                     raise ChatError(f"gave up after {attempt} attempts. {error}") from None
                 own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
                 delay = min(own, self.longest_delay) if asked is None else asked
-                _LOG.warning(
-                    "%s. Asking again in %.0f s (%d of %d).", error, delay, attempt + 1, self.attempts
-                )
+                _LOG.warning("%s. Asking again in %.0f s (%d of %d).", error, delay, attempt + 1, most)
                 (self.gate.pause if error.for_all else self.gate.wait)(delay)
         raise AssertionError("attempts is at least 1")
 

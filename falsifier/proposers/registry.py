@@ -69,6 +69,16 @@ ENGINES: Mapping[str, Engine] = MappingProxyType(
 DEFAULT_ENGINE = "surrogate"
 
 
+def check_engine(name: str) -> None:
+    """Refuse a name that is no engine's.
+
+    Raises:
+        SpecError: with the names there are.
+    """
+    if name not in ENGINES:
+        raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
+
+
 def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> Proposer:
     """Make the engine of this name for a problem.
 
@@ -82,8 +92,7 @@ def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> 
         SpecError: for an unknown name, an engine whose package is not installed, or a problem in which
             nothing may be varied.
     """
-    if name not in ENGINES:
-        raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
+    check_engine(name)
     if not problem.space.names:
         raise SpecError("nothing may be varied: give at least one input or parameter a range")
     proposer: Proposer = ENGINES[name].load()(problem, seed=seed, **options)

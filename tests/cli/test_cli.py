@@ -1,4 +1,5 @@
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -69,7 +70,19 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
         (["run", "gone.fmu"], "--stl"),
         (["resume", "nowhere"], "not a run directory"),
         (["info", "gone.fmu"], "there is no file gone.fmu"),
-        (["rnu"], "rnu"),
+        (["rn", "AT1"], "did you mean 'run'"),
+        (
+            ["run", "AT9"],
+            "CC5, CCx, NNb, NNx\n",
+        ),
+        (["run", "AT1", "--model", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
+        (["run", "AT1", "--model", "opnai/x", "--variant", "MP9"], "unknown prompt variant 'MP9'"),
+        (["run", "AT1", "--model", "opnai/x", "--fallback", "corner"], "did you mean 'corners'"),
+        (["run", "AT1", "--model", "opnai/x", "--fallback", "hybrid"], "asks no language model"),
+        (["run", "AT1", "--model", "gpt-5-mini"], "expected PROVIDER/MODEL"),
+        (["models", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
+        (["bench", "AT1", "--model", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
+        (["bench", "AT1", "--engine", "corner"], "did you mean 'corners'"),
     ],
 )
 def test_wrong_usage_ends_with_two_and_says_what_to_do(
@@ -80,6 +93,30 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
     assert message in done.err
     assert "Traceback" not in done.err
     assert done.out == ""
+
+
+def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path) -> None:
+    """A stand-in for litellm that cannot be imported is never asked for."""
+    (tmp_path / "litellm.py").write_text("raise ImportError('this is imported')")
+    path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    wrong = {"--variant": "MP9", "--fallback": "corner", "--engine": "uniform"}
+    for option, value in wrong.items():
+        done = falsifier("run", "AT1", "--model", "nobody/x", option, value, cwd=tmp_path, env=path)
+        assert (done.code, "imported" in done.err) == (2, False), done.err
+    done = falsifier("run", "AT1", "--model", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path)
+    assert (done.code, "OPENAI_API_KEY" in done.err) == (2, True), done.err
+    done = falsifier("run", "AT1", "--model", "nobody/x", cwd=tmp_path, env=path)
+    assert (done.code, "imported" in done.err) == (3, True), done.err
+
+
+def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path) -> None:
+    fmu, stl = str(bundled("fmus") / "AT.fmu"), "G[0,20] (speed <= 200)"
+    common = ("--engine", "corners", "--budget", "1", "--quiet", "--json")
+    done = falsifier("run", fmu, "--stl", stl, "--input", "throttle", *common, cwd=tmp_path)
+    assert done.json["best"]["signals"].keys() == {"throttle"}
+    assert done.json["best"]["signals"]["throttle"]["values"] == [100.0] * 5
+    manifest = json.loads((Path(tmp_path) / done.json["directory"] / "manifest.json").read_text())
+    assert [(i["name"], i["low"], i["high"]) for i in manifest["inputs"]] == [("throttle", 0.0, 100.0)]
 
 
 def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:

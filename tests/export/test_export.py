@@ -123,7 +123,7 @@ def test_a_model_exchange_solver_of_another_tool_gets_the_same_within_its_tolera
     np.testing.assert_allclose(result["y5"], trajectory["y5"], rtol=1e-3, atol=1e-2)
 
 
-def test_the_replay_script_needs_fmpy_only_and_prints_the_trajectory(tmp_path: Path) -> None:
+def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: Path) -> None:
     problem = load_problem("AT1")
     evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["held"]))
     assert evaluation.trajectory is not None
@@ -135,11 +135,19 @@ def test_the_replay_script_needs_fmpy_only_and_prints_the_trajectory(tmp_path: P
         check=True,
     )
     assert "falsifier" not in (tmp_path / "replay.py").read_text().split('"""')[2]
-    lines = done.stdout.splitlines()
+    lines = (tmp_path / "outputs.csv").read_text().splitlines()
     assert lines[0] == "time,speed,rpm,gear"
     rows = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
     np.testing.assert_allclose(rows[:, 1], evaluation.trajectory["speed"], rtol=1e-9, atol=1e-9)
-    assert "at the critical time: time = 20, speed = " in done.stderr
+    assert evaluation.verdict is not None
+    critical = evaluation.verdict.critical_time
+    header, *shown, where = done.stdout.splitlines()
+    assert header.split() == ["time", "speed"]  # the requirement speaks of nothing else
+    assert [float(line.split()[0]) for line in shown] == pytest.approx(
+        [critical + 0.01 * k for k in range(-3, 4)]
+    )
+    assert shown[3].endswith("<- critical time")
+    assert "all 5001 rows are in outputs.csv" in where
 
 
 def test_the_pytest_file_fails_while_the_counterexample_violates(tmp_path: Path) -> None:

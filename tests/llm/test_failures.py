@@ -1,6 +1,12 @@
+import socket
+
 import pytest
 
-from falsifier.llm.failures import classify, redact
+from falsifier.errors import ChatError
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.failures import TransientChatError, classify, redact
+from falsifier.llm.retry import Gate, RetryingChat
+from tests.llm.test_client import REQUEST
 
 
 @pytest.mark.parametrize(
@@ -51,3 +57,51 @@ def test_content_filter_and_long_prompts_say_what_to_do() -> None:
 
     assert "--anonymous" in told("content_policy_violation")
     assert "too long" in told("this model's maximum context length is 8192 tokens")
+
+
+def free_port() -> int:
+    """Port of this machine on which nothing listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.mark.parametrize("model", ["openai/m", "ollama_chat/m", "hosted_vllm/m", "lm_studio/m"])
+def test_where_nothing_listens_on_this_machine_little_patience_helps(model: str) -> None:
+    address = f"http://127.0.0.1:{free_port()}/v1"
+    naps: list[float] = []
+    chat = RetryingChat(LiteLLMChat(model, api_base=address), Gate(sleep=naps.append))
+    with pytest.raises(ChatError, match=f"nothing listens at {address}: start the ") as caught:
+        chat.complete(REQUEST)
+    assert len(naps) == 2
+    assert sum(naps) < 5
+    if model == "ollama_chat/m":
+        assert "'ollama serve'" in str(caught.value)
+
+
+def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> str:
+        told = classify(
+            ConnectionRefusedError(111, "Connection refused"),
+            model="ollama_chat/m",
+            api_base=None,
+            key_variables=(),
+            secrets=(),
+        )
+        return str(told)
+
+    assert "nothing listens at http://localhost:11434" in refused()
+    monkeypatch.setenv("OLLAMA_API_BASE", "http://127.0.0.1:4444")
+    assert "nothing listens at http://127.0.0.1:4444" in refused()
+
+
+def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
+    error = classify(
+        ConnectionRefusedError(111, "Connection refused"),
+        model="openai/m",
+        api_base="http://elsewhere.example/v1",
+        key_variables=(),
+        secrets=(),
+    )
+    assert isinstance(error, TransientChatError)
+    assert error.patience is None
