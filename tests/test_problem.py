@@ -7,7 +7,9 @@ import pytest
 from falsifier.adhoc import adhoc_problem, changes_from_options, starter_spec
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
-from falsifier.loading import bundled, load_problem, load_problems
+from falsifier.loading import bundled, input_range, load_problem, load_problems
+from falsifier.model import Variable
+from falsifier.spec import InputSection
 
 AT = bundled("fmus") / "AT.fmu"
 GOOD = """
@@ -125,6 +127,10 @@ def test_no_spec_is_needed(folder: Path) -> None:
     assert [d.name for d in problem.space.dimensions] == ["throttle"] * 4 + ["finalDrive"]
     assert problem.parameters == {"brake": 10}
     assert problem.experiment.stop_time == 20
+    named = adhoc_problem(
+        folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options(inputs=["brake"])
+    )
+    assert [(r.name, r.low, r.high) for r in named.space.inputs] == [("brake", 0, 325)]
     every = adhoc_problem(folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
     assert [r.name for r in every.space.inputs] == ["throttle", "brake"]
 
@@ -132,7 +138,8 @@ def test_no_spec_is_needed(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ("throttle", "expected NAME="),
+        ("throttle=", "expected NAME="),
+        ("=0:1", "expected NAME="),
         ("throttle=0:x", "'x' is not a number"),
         ("throttle=0:1:many", "not a number of control points"),
         ("throttle=0:1:3:cubic", "Known: pchip, linear, constant"),
@@ -142,6 +149,16 @@ def test_no_spec_is_needed(folder: Path) -> None:
 def test_options_that_cannot_be_read_are_named(option: str, message: str) -> None:
     with pytest.raises(SpecError, match=message):
         changes_from_options(inputs=[option])
+
+
+def test_an_input_by_its_name_alone_is_as_the_spec_says(folder: Path) -> None:
+    target, changes = spec(folder, GOOD), changes_from_options(inputs=["throttle"])
+    assert load_problem(target, changes=changes).space == load_problem(target).space
+
+
+def test_a_range_that_nobody_knows_must_be_given() -> None:
+    with pytest.raises(SpecError, match=r"say --input u=LOW:HIGH\[:POINTS\]"):
+        input_range(Variable("u"), InputSection(control_points=3), file="my.toml", key="inputs.u")
 
 
 def test_the_starter_spec_loads_as_it_is(folder: Path) -> None:

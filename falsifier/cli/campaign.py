@@ -37,7 +37,10 @@ jobs_option = click.option(
     "--jobs", type=int, default=1, show_default=True, help="Runs at a time on this machine."
 )
 executor_option = click.option(
-    "--executor", metavar="dask:tcp://HOST:PORT", help="Run on a Dask cluster instead."
+    "--executor",
+    metavar="dask:tcp://HOST:PORT",
+    help="Run on a Dask cluster instead. Workers that do not see DIR are stopped by --total-... between runs "
+    "only.",
 )
 table_option = click.option(
     "--table", "table", type=click.Choice(list(TABLES)), default="main", show_default=True
