@@ -243,7 +243,10 @@ class _Loop:
             )
         else:
             seconds = recorded.seconds
-            if [c.key for c in candidates] != [Candidate.from_json(c).key for c in recorded.candidates]:
+            # Journals of earlier versions have integers as they were before rounding.
+            space = target.problem.space
+            known = [space.admit(Candidate.from_json(c)) for c in recorded.candidates]
+            if [c.key for c in candidates] != [c.key for c in known]:
                 raise JournalError(
                     f"the proposer {target.proposer.name!r} does not repeat its candidate {self.count}: the "
                     "journal was written with other settings or another version"

@@ -15,6 +15,14 @@ Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
 
+# Smallest and largest number by type name: FMI 1 and 2 have 32-bit Integers.
+_TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
+    "Boolean": (0, 1),
+    "Integer": (-(2**31), 2**31 - 1),
+    **{f"Int{b}": (-(2 ** (b - 1)), 2 ** (b - 1) - 1) for b in (8, 16, 32, 64)},
+    **{f"UInt{b}": (0, 2**b - 1) for b in (8, 16, 32, 64)},
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Variable:
@@ -35,6 +43,7 @@ class Variable:
         is_state: whether it is a continuous state.
         literals: names of an enumeration's values with their numbers.
         description: what it means.
+        type: name of the type that holds its values, such as ``Int8``; empty where unknown.
     """
 
     name: str
@@ -51,6 +60,20 @@ class Variable:
     is_state: bool = False
     literals: Mapping[str, int] = field(default_factory=dict)
     description: str = ""
+    type: str = ""
+
+    @property
+    def type_limits(self) -> tuple[int, int] | None:
+        """Smallest and largest number that its type holds; None for reals."""
+        return _TYPE_LIMITS.get(self.type)
+
+    @property
+    def limits(self) -> tuple[float | None, float | None]:
+        """Declared min and max; where none is declared, those of Booleans and of an enumeration's items."""
+        numbers = (0, 1) if self.kind == "boolean" else tuple(self.literals.values())
+        low = min(numbers, default=None) if self.low is None else self.low
+        high = max(numbers, default=None) if self.high is None else self.high
+        return low, high
 
 
 @dataclass(frozen=True, slots=True)

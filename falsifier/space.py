@@ -7,13 +7,16 @@ between candidates and vectors.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from math import ceil, floor
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.signals import Interpolation, Signal, even_times
+
+ValueKind = Literal["real", "integer", "boolean", "enumeration"]
 
 # How far a value may leave its range, as a share of the range, before it is refused instead of clipped:
 # bounds that were printed with six digits come back rounded outward.
@@ -47,6 +50,8 @@ class InputRange:
         free: limits of a free parameterization, or None where only the fixed one is allowed.
         unit: the input's unit, empty where unknown.
         description: what it means, from the model.
+        kind: what its values are; all but reals are whole numbers, which are held between control points.
+        items: names and numbers of an enumeration.
     """
 
     name: str
@@ -58,6 +63,8 @@ class InputRange:
     free: Freedom | None = None
     unit: str = ""
     description: str = ""
+    kind: ValueKind = "real"
+    items: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +78,8 @@ class ParameterRange:
         nominal: its value when nothing is searched, where known.
         unit: its unit, empty where unknown.
         description: what it means, from the model.
+        kind: what its value is; all but reals are whole numbers.
+        items: names and numbers of an enumeration.
     """
 
     name: str
@@ -79,6 +88,8 @@ class ParameterRange:
     nominal: float | None = None
     unit: str = ""
     description: str = ""
+    kind: ValueKind = "real"
+    items: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +241,8 @@ class SearchSpace:
     def admit(self, candidate: Candidate) -> Candidate:
         """Return the candidate as it will be simulated.
 
-        Values within a rounding error of a bound are clipped to it; each input gets its hold.
+        Values within a rounding error of a bound are clipped to it; integers, Booleans and enumerations get
+        the nearest number that they can have; each input gets its hold.
 
         Raises:
             CandidateError: naming the input or parameter that is unknown, missing or outside its range, or
@@ -248,9 +260,7 @@ class SearchSpace:
         for p in self.parameters:
             if p.name not in candidate.parameters:
                 raise CandidateError(f"parameter {p.name!r} is missing")
-            parameters[p.name] = _into_range(
-                f"parameter {p.name!r}", candidate.parameters[p.name], p.low, p.high
-            )
+            parameters[p.name] = _into_range(f"parameter {p.name!r}", candidate.parameters[p.name], p)
         return replace(candidate, signals=signals, parameters=parameters)
 
     def _admit_signal(self, r: InputRange, signal: Signal) -> Signal:
@@ -261,9 +271,9 @@ class SearchSpace:
         if not is_fixed:
             _check_freedom(r, signal, self.stop_time)
         times, values = fixed if is_fixed else signal.times, signal.values
-        if min(values) < r.low or max(values) > r.high:
+        if r.kind != "real" or min(values) < r.low or max(values) > r.high:
             values = tuple(
-                _into_range(f"input {r.name!r} at t = {t:g} s", v, r.low, r.high)
+                _into_range(f"input {r.name!r} at t = {t:g} s", v, r)
                 for t, v in zip(times, values, strict=True)
             )
         admitted = times, values, r.hold
@@ -278,6 +288,11 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
         raise CandidateError(
             f"input {r.name!r}: expected {r.control_points} evenly spaced control points with "
             f"{r.interpolation} interpolation, got {count} with {signal.interpolation}"
+        )
+    if r.kind != "real" and signal.interpolation != "constant" and count > 1:
+        raise CandidateError(
+            f"input {r.name!r}: values of kind {r.kind} cannot be interpolated with "
+            f'{signal.interpolation}: use "constant"'
         )
     if count > r.free.max_control_points:
         raise CandidateError(
@@ -303,8 +318,19 @@ def _are_close(times: Sequence[float], others: Sequence[float], tolerance: float
     )
 
 
-def _into_range(what: str, value: float, low: float, high: float) -> float:
+def nearest_value(ranged: InputRange | ParameterRange, value: float) -> float:
+    """Nearest number that an input or parameter can have; the value itself where it is a real."""
+    if ranged.kind == "real":
+        return value
+    if ranged.items:
+        numbers = [n for _, n in ranged.items if ranged.low <= n <= ranged.high]
+        return float(min(numbers, key=lambda n: abs(n - value)))
+    return float(min(max(round(value), ceil(ranged.low)), floor(ranged.high)))
+
+
+def _into_range(what: str, value: float, ranged: InputRange | ParameterRange) -> float:
+    low, high = ranged.low, ranged.high
     tolerance = _ROUNDING_SHARE * (high - low)
     if not low - tolerance <= value <= high + tolerance:
         raise CandidateError(f"{what}: {value:g} is outside its range [{low:g}, {high:g}]")
-    return min(max(float(value), low), high)
+    return nearest_value(ranged, min(max(float(value), low), high))

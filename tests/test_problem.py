@@ -6,10 +6,13 @@ import pytest
 
 from falsifier.adhoc import adhoc_problem, changes_from_options, starter_spec
 from falsifier.errors import SpecError
+from falsifier.evaluation import evaluate
 from falsifier.fmu import read_info
 from falsifier.loading import bundled, input_range, load_problem, load_problems
 from falsifier.model import Variable
+from falsifier.problem import Problem
 from falsifier.spec import InputSection
+from tests.fmu.fixtures import path as fmu_path
 
 AT = bundled("fmus") / "AT.fmu"
 GOOD = """
@@ -166,3 +169,56 @@ def test_the_starter_spec_loads_as_it_is(folder: Path) -> None:
     problem = load_problem(spec(folder, text))
     assert problem.name == "R1"
     assert {r.name for r in problem.space.inputs} == {"throttle", "brake"}
+
+
+ECHO = """
+[model]
+fmu = "{fmu}"
+stop_time = 1.0
+output_interval = 0.1
+[inputs]
+{inputs}
+[requirements.R]
+formula = "G (out_Int8 <= 1000)"
+"""
+
+
+def echo(tmp_path: Path, inputs: str) -> Problem:
+    path = tmp_path / "echo.toml"
+    path.write_text(ECHO.format(fmu=fmu_path("Echo_3").as_posix(), inputs=inputs))
+    return load_problem(str(path))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ("in_Int8 = {range = [-200, 100], control_points = 1}",
+         r"echo.toml: inputs.in_Int8.range: \[-200, 100\] leaves .* type Int8 of 'in_Int8', \[-128, 127\]"),
+        ("in_UInt8 = {value = 256}", r"inputs.in_UInt8.value: 256 leaves .* UInt8 .* \[0, 255\]"),
+        ("in_Boolean = {range = [0, 2], control_points = 1}", r"in_Boolean.range: .* type Boolean"),
+        ("in_Enumeration = {range = [0, 3], control_points = 1}",
+         r"leaves the items .* 1 = first, 2 = second, 3 = third"),
+        ("in_Int8 = {value = 2.5}", r"in_Int8.value: 2.5: expected a whole number"),
+        ("in_Int8 = {range = [0.2, 0.8], control_points = 1}", r"holds no whole number: widen it"),
+    ],
+)  # fmt: skip
+def test_numbers_that_a_type_cannot_hold_are_refused_when_loaded(
+    tmp_path: Path, inputs: str, message: str
+) -> None:
+    with pytest.raises(SpecError, match=message):
+        echo(tmp_path, inputs)
+
+
+def test_whole_numbers_are_proposed_shown_and_simulated(tmp_path: Path) -> None:
+    problem = echo(
+        tmp_path,
+        "in_Int8 = {range = [-3, 3], control_points = 2}\nin_Boolean = {control_points = 2}\n"
+        "in_Enumeration = {control_points = 2}",
+    )
+    assert problem.space.bounds.tolist() == [[-3, 3]] * 2 + [[0, 1]] * 2 + [[1, 3]] * 2
+    evaluation = evaluate(problem, problem.space.decode([-2.6, 2.4, 0.4, 0.6, 1.2, 2.9]))
+    assert [s.values for s in evaluation.candidate.signals.values()] == [(-3, 2), (0, 1), (1, 3)]
+    assert evaluation.trajectory is not None
+    for name in ("Int8", "Boolean", "Enumeration"):
+        inside = evaluation.trajectory[f"out_{name}"][1:-1]
+        assert set(inside.tolist()) == set(evaluation.trajectory[f"in_{name}"][1:-1].tolist())

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -76,3 +78,33 @@ def test_equal_simulations_have_equal_keys() -> None:
     b = SPACE.decode(SPACE.bounds[:, 0], origin="b")
     assert a.key == b.key
     assert a.key != SPACE.decode(SPACE.bounds[:, 1]).key
+
+
+GEAR = InputRange("gear", 1.0, 7.0, 3, "constant", kind="enumeration", items=(("a", 1), ("b", 3), ("c", 7)))
+COUNT = ParameterRange("count", 0.5, 3.5, kind="integer")
+
+
+@given(st.floats(1, 7), st.floats(0.5, 3.5))
+def test_whole_numbers_are_admitted_whole(gear: float, count: float) -> None:
+    space = SearchSpace((GEAR,), (COUNT,), 10.0)
+    candidate = space.decode([gear, 1.0, 7.0, count])
+    assert candidate.signals["gear"].values[0] in (1.0, 3.0, 7.0)
+    assert candidate.parameters["count"] in (1.0, 2.0, 3.0)
+    assert space.admit(candidate) == candidate
+    assert space.decode(space.encode(candidate)) == candidate
+
+
+def test_the_nearest_item_is_taken() -> None:
+    space = SearchSpace((GEAR,), (COUNT,), 10.0)
+    assert space.decode([1.9, 2.1, 5.2, 2.6]).signals["gear"].values == (1.0, 3.0, 7.0)
+    assert space.decode([1.9, 2.1, 5.2, 2.6]).parameters["count"] == 3.0
+
+
+def test_whole_numbers_are_not_interpolated_freely() -> None:
+    space = SearchSpace((replace(GEAR, free=Freedom(9, 0.1)),), (), 10.0)
+    held = space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.2, 6.9), "constant")}))
+    assert held.signals["gear"].values == (1.0, 7.0)
+    with pytest.raises(
+        CandidateError, match='cannot be interpolated with linear: use "constant"'
+    ):
+        space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.0, 7.0), "linear")}))

@@ -255,6 +255,7 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
                 is_state=position in states,
                 literals=_literals(definition),
                 description=element.get("description", ""),
+                type=code,
             ),
             Slot(
                 reference=int(element.attrib["valueReference"]),
@@ -312,6 +313,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
             is_state=reference in states,
             literals=_literals(definition),
             description=element.get("description", ""),
+            type=code,
         )
         names = [(variable.name, variable.description)]
         names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]

@@ -65,10 +65,12 @@ class Disguise:
             space=replace(
                 real.space,
                 inputs=tuple(
-                    replace(r, name=names[r.name], unit="", description="") for r in real.space.inputs
+                    replace(r, name=names[r.name], unit="", description="", items=_neutral(r.items))
+                    for r in real.space.inputs
                 ),
                 parameters=tuple(
-                    replace(p, name=names[p.name], unit="", description="") for p in real.space.parameters
+                    replace(p, name=names[p.name], unit="", description="", items=_neutral(p.items))
+                    for p in real.space.parameters
                 ),
             ),
             experiment=replace(real.experiment, outputs=tuple(names[n] for n in real.experiment.outputs)),
@@ -127,3 +129,7 @@ def _renamed(node: Any, names: Mapping[str, str]) -> Any:
     if is_dataclass(node) and not isinstance(node, type):
         return type(node)(*(_renamed(getattr(node, f.name), names) for f in fields(node)))
     return node
+
+
+def _neutral(items: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
+    return tuple((f"item {k}", number) for k, (_, number) in enumerate(items, start=1))

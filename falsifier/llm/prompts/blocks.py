@@ -63,6 +63,7 @@ class InputLine(_Block):
     unit: str = ""
     description: str = ""
     kind: str = "real"
+    items: tuple[str, ...] = Field(default=(), description="Numbers and names of an enumeration.")
     low: str
     high: str
     control_points: int
@@ -79,6 +80,8 @@ class ParameterLine(_Block):
     name: str
     unit: str = ""
     description: str = ""
+    kind: str = "real"
+    items: tuple[str, ...] = Field(default=(), description="Numbers and names of an enumeration.")
     low: str
     high: str
     nominal: str = ""

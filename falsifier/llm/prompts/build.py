@@ -26,7 +26,7 @@ from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View, told_unit
 from falsifier.signals import even_times
-from falsifier.space import Candidate, InputRange, ParameterRange
+from falsifier.space import Candidate, InputRange, ParameterRange, nearest_value
 from falsifier.stl import in_words
 
 # Control-point times that are told one by one; of more only the distance.
@@ -131,7 +131,8 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
         name=r.name,
         unit=told_unit(r.unit),
         description=r.description,
-        kind=view.kind(r.name),
+        kind=r.kind,
+        items=_items(r),
         low=low,
         high=high,
         control_points=r.control_points,
@@ -147,8 +148,19 @@ def _parameter(p: ParameterRange) -> ParameterLine:
     low, high = bounds(p.low, p.high)
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
-        name=p.name, unit=told_unit(p.unit), description=p.description, low=low, high=high, nominal=nominal
+        name=p.name,
+        unit=told_unit(p.unit),
+        description=p.description,
+        kind=p.kind,
+        items=_items(p),
+        low=low,
+        high=high,
+        nominal=nominal,
     )
+
+
+def _items(ranged: InputRange | ParameterRange) -> tuple[str, ...]:
+    return tuple(f"{n} = {name}" for name, n in ranged.items if ranged.low <= n <= ranged.high)
 
 
 def _history(
@@ -238,9 +250,10 @@ _FREE_NOTES = (
 
 
 def _example(r: InputRange, *, free: bool) -> dict[str, object]:
-    values = [_middle(r.low, r.high)] * min(r.control_points, _MOST_TIMES)
+    middle = nearest_value(r, _middle(r.low, r.high))
+    values = [middle] * min(r.control_points, _MOST_TIMES)
     if not free:
-        return {"name": r.name, "values": [_middle(r.low, r.high)] * r.control_points}
+        return {"name": r.name, "values": [middle] * r.control_points}
     return {"name": r.name, "interpolation": r.interpolation, "times": [], "values": values}
 
 

@@ -99,11 +99,10 @@ def _inputs(block: InputsBlock) -> str:
 
 
 def _input(line: InputLine) -> str:
-    whole = "" if line.kind == "real" else f" {line.kind} values"
     one = line.control_points == 1
     parts = [
         f"- input signal {line.name}{_bracketed(line.unit)}{_described(line.description)}",
-        f"{whole} from {line.low} to {line.high}".strip(),
+        _values(line),
         "one value for the whole time"
         if one
         else f"{line.control_points} control points at t = {', '.join(line.times)} s",
@@ -115,10 +114,19 @@ def _input(line: InputLine) -> str:
     text = "; ".join(parts)
     if line.max_control_points is None:
         return text
+    what = "number, times and interpolation (pchip, linear or constant)"
     return (
-        f"{text}. Instead you may choose number, times and interpolation (pchip, linear or constant) of the "
+        f"{text}. Instead you may choose {what if line.kind == 'real' else 'number and times'} of the "
         f"control points yourself: at most {line.max_control_points}, at least {line.min_interval:g} s apart"
     )
+
+
+def _values(line: InputLine | ParameterLine) -> str:
+    if line.items:
+        return f"one of the numbers {', '.join(line.items)}"
+    if line.kind == "boolean":
+        return "Boolean, 0 (false) or 1 (true)"
+    return f"{'' if line.kind == 'real' else 'whole numbers '}from {line.low} to {line.high}"
 
 
 _INTERPOLATION = {
@@ -132,7 +140,7 @@ def _parameter(line: ParameterLine) -> str:
     nominal = f", usually {line.nominal}" if line.nominal else ""
     described = _described(line.description)
     return (
-        f"- number {line.name}{_bracketed(line.unit)}{described}; from {line.low} to {line.high}{nominal}; "
+        f"- number {line.name}{_bracketed(line.unit)}{described}; {_values(line)}{nominal}; "
         "one value for the whole simulation"
     )
 

@@ -89,7 +89,8 @@ class Surrogate:
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """See Proposer.tell."""
         for evaluation in evaluations:
-            pending = self._pending.pop(evaluation.candidate.key, None)
+            told = self.problem.space.admit(evaluation.candidate)
+            pending = self._pending.pop(told.key, None)
             sample = self.history.add(evaluation, pending.arm if pending else "")
             if pending is not None:
                 self._settle(pending, sample)

@@ -133,7 +133,7 @@ def region_layouts(space: SearchSpace, grid: Grid) -> tuple[Layout, ...]:
         for r in space.inputs:
             if r.free is None:
                 codings.append(_fixed(r, space.stop_time))
-            elif held:
+            elif held or r.kind != "real":
                 codings.append(_held(horizon, count, r.free, fine=False))
             else:
                 codings.append(_smooth(horizon, count, r.free))

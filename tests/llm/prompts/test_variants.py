@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from falsifier.errors import SpecError
 from falsifier.evaluation import Evaluation, evaluate
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
 from falsifier.loading import load_problem
-from falsifier.model import Variable
 from falsifier.problem import Problem, Requirement
 from falsifier.signals import Signal
 from falsifier.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
@@ -240,11 +240,18 @@ class TestMP5:
         assert 'u: constant pieces, 100 evenly spaced values ["0 x 99", 1]' in changing
 
     def test_whole_numbers_are_asked_for(self) -> None:
-        problem = lag_problem()
-        info = replace(problem.info, variables=(Variable("u", kind="integer", causality="input"),))
-        view = replace(View.of(problem), info=info)
-        text = render(build_prompt(view, variant_named("MP5"), []))[0].content
-        assert "integer values from -1 to 1" in text
+        def asked(**changes: Any) -> str:
+            problem = lag_problem()
+            (u,) = problem.space.inputs
+            space = replace(problem.space, inputs=(replace(u, interpolation="constant", **changes),))
+            view = View.of(replace(problem, space=space))
+            return render(build_prompt(view, variant_named("MP5"), []))[0].content
+
+        assert "; whole numbers from -1 to 1; " in asked(kind="integer")
+        assert "; Boolean, 0 (false) or 1 (true); " in asked(kind="boolean", low=0.0, high=1.0)
+        gears = asked(kind="enumeration", low=1.0, high=2.0, items=(("low", 1), ("top", 2), ("rear", 3)))
+        assert "; one of the numbers 1 = low, 2 = top; " in gears
+        assert '"values": [1.0, 1.0, 1.0, 1.0]' in gears
 
     def test_several_candidates_and_pending_ones(self) -> None:
         problem = lag_problem()
