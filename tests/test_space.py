@@ -104,7 +104,5 @@ def test_whole_numbers_are_not_interpolated_freely() -> None:
     space = SearchSpace((replace(GEAR, free=Freedom(9, 0.1)),), (), 10.0)
     held = space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.2, 6.9), "constant")}))
     assert held.signals["gear"].values == (1.0, 7.0)
-    with pytest.raises(
-        CandidateError, match='cannot be interpolated with linear: use "constant"'
-    ):
+    with pytest.raises(CandidateError, match='cannot be interpolated with linear: use "constant"'):
         space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.0, 7.0), "linear")}))

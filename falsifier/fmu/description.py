@@ -33,6 +33,10 @@ _TYPES_3: Mapping[str, tuple[Kind, str]] = {
     "Enumeration": ("enumeration", "Int64"),
     "String": ("string", "String"),
 }
+_INTERFACE_TAGS: Mapping[str, Interface] = {
+    "CoSimulation": "co-simulation",
+    "ModelExchange": "model-exchange",
+}
 _CAUSALITIES: Mapping[str, Causality] = {
     "input": "input",
     "output": "output",
@@ -79,6 +83,7 @@ class Description:
         clocks: names of the clocks that a simulator would have to tick.
         event_mode: whether a co-simulation FMU can be driven in event mode (FMI 3).
         needs_tool: names of interfaces that need the exporting tool to be installed.
+        saves_state: names of interfaces whose state can be saved and restored.
     """
 
     info: ModelInfo
@@ -91,6 +96,7 @@ class Description:
     clocks: tuple[str, ...] = ()
     event_mode: bool = False
     needs_tool: tuple[Interface, ...] = ()
+    saves_state: tuple[Interface, ...] = ()
 
     @property
     def major(self) -> int:
@@ -201,6 +207,7 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         clocks=tuple(c.attrib["name"] for c in clocks if c.get("causality") == "input"),
         event_mode=co_simulation is not None and _flag(co_simulation.get("hasEventMode")),
         needs_tool=needs_tool,
+        saves_state=_saving(root),
     )
 
 
@@ -218,14 +225,22 @@ def _interfaces(root: Element, major: int) -> tuple[dict[Interface, str], tuple[
         return {interface: root.attrib["modelIdentifier"]}, (interface,) if tool else ()
     found: dict[Interface, str] = {}
     needs_tool: list[Interface] = []
-    names: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
-    for tag, interface in names.items():
+    for tag, interface in _INTERFACE_TAGS.items():
         element = root.find(tag)
         if element is not None:
             found[interface] = element.attrib["modelIdentifier"]
             if _flag(element.get("needsExecutionTool")):
                 needs_tool.append(interface)
     return found, tuple(needs_tool)
+
+
+def _saving(root: Element) -> tuple[Interface, ...]:
+    attributes = ("canGetAndSetFMUstate", "canGetAndSetFMUState")
+    return tuple(
+        interface
+        for tag, interface in _INTERFACE_TAGS.items()
+        if (element := root.find(tag)) is not None and any(_flag(element.get(name)) for name in attributes)
+    )
 
 
 def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]:

@@ -55,7 +55,8 @@ class LocalFmu:
             log = tuple(self._log)
             if self._reuse is None:
                 # A new process is not to be had here: a new instance comes nearest.
-                self._reuse = "reset" if self._session.find_reuse() == "reset" else "instance"
+                found = self._session.find_reuse()
+                self._reuse = "instance" if found == "process" else found
             return self._room.outputs.copy(), log
 
     def close(self) -> None:

@@ -295,7 +295,7 @@ class IsolatedFmu:
         """Take the outcome of the worker's test of repeated runs; dying of it says: do not repeat."""
         worker.awaits_test = False
         try:
-            reply = receive_reply(worker.sock, 3 * plan.time_limit + _GRACE_SECONDS)
+            reply = receive_reply(worker.sock, 5 * plan.time_limit + _GRACE_SECONDS)
         except (Closed, TimeoutError):
             self._reuse = "process"
             self._drop()

@@ -7,8 +7,9 @@ from typing import Literal
 from falsifier.fmu.description import Description
 from falsifier.model import Interface
 
-# How the next simulation starts: the same instance after a reset, a new instance, a new process.
-Reuse = Literal["reset", "instance", "process"]
+# How the next simulation starts: the same instance after a reset or from its saved state, a new instance, a new
+# process.
+Reuse = Literal["reset", "state", "instance", "process"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,11 @@ from falsifier.fmu.lifecycle import make_lifecycle
 from falsifier.fmu.order import Reuse
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.room import Room
+from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import Stepper
 from falsifier.model import Interface
 
-_CHEAPEST_FIRST: tuple[Reuse, ...] = ("reset", "instance")
+_CHEAPEST_FIRST: tuple[Reuse, ...] = ("reset", "state", "instance")
 
 
 class Session:
@@ -37,6 +38,7 @@ class Session:
         self._description = description
         self._library = Library(description, folder, interface, log)
         self._lifecycle = make_lifecycle(self._library)
+        self._saved = SavedState(self._library)
         self._state: Literal["new", "broken", "finished"] = "new"
         self.reuse: Reuse = "instance"
 
@@ -56,11 +58,12 @@ class Session:
             SimulationError: when there is no full trajectory.
         """
         deadline = time.perf_counter() + self._plan.time_limit
-        if self._state != "new":
-            if self._state == "finished" and self.reuse == "reset" and not self._lifecycle.reset():
-                self.reuse = "instance"
-            if self._state == "broken" or self.reuse != "reset":
-                self._library.renew()
+        if self._state != "new" and not self._is_brought_back():
+            self._saved.forget()
+            self._library.renew()
+            self._state = "new"
+        if self._state == "new" and self.reuse == "state" and not self._saved.take():
+            self.reuse = "instance"
         self._state = "broken"
         self._lifecycle.initialise(self._plan, self._stepper.set_parameters, self._stepper.set_first_inputs)
         self._stepper.advance(deadline)
@@ -78,16 +81,18 @@ class Session:
         trial = Room(room.parameters.copy(), room.inputs.copy(), np.zeros_like(room.outputs))
         self.prepare(plan, trial)
         found: Reuse = "process"
-        for reuse in _CHEAPEST_FIRST:
+        for reuse in self._possible():
             self.reuse = reuse
-            trial.outputs[:] = 0.0
             try:
+                if reuse == "state":
+                    self.run()  # takes the state that the next run starts from
+                trial.outputs[:] = 0.0
                 self.run()
             except FalsifierError:
                 continue
-            if np.array_equal(trial.outputs, expected, equal_nan=True):
-                # An instance that refused its reset was replaced.
-                found = self.reuse
+            # An instance that refused its reset or its state was replaced: that is another way to begin.
+            if self.reuse == reuse and np.array_equal(trial.outputs, expected, equal_nan=True):
+                found = reuse
                 break
         self.prepare(plan, room)
         self.reuse = found
@@ -95,7 +100,25 @@ class Session:
 
     def close(self) -> None:
         """Free the instance and unload the library."""
+        self._saved.forget()
         self._library.close()
+
+    def _is_brought_back(self) -> bool:
+        """Whether the instance of a finished simulation was brought back to its beginning."""
+        if self._state != "finished":
+            return False
+        if self.reuse == "reset" and self._lifecycle.reset():
+            return True
+        if self.reuse == "state" and self._saved.restore():
+            return True
+        if self.reuse == "reset" or (self.reuse == "state" and self._saved.is_taken):
+            self.reuse = "instance"
+        return False
+
+    def _possible(self) -> tuple[Reuse, ...]:
+        """Ways to begin again that the FMU says it has, the cheapest first."""
+        saves = self._library.interface in self._description.saves_state
+        return tuple(reuse for reuse in _CHEAPEST_FIRST if saves or reuse != "state")
 
     def _make_stepper(self, plan: Plan, room: Room) -> Stepper:
         if self._library.interface == "co-simulation":

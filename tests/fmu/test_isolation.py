@@ -114,6 +114,9 @@ def test_a_nursery_that_dies_is_replaced(misdeeds: FmuModel) -> None:
         ("Lag_2", "reset"),
         ("NoReset_2", "instance"),
         ("LyingReset_2", "instance"),
+        ("SavedState_2", "state"),
+        ("SavedState_3", "state"),
+        ("LyingState_2", "instance"),
         ("KeepsStatic_2", "process"),
     ],
 )
