@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from itertools import islice
+from math import ceil, floor
 from pathlib import Path
 
 from falsifier.errors import SpecError, did_you_mean, rejected
@@ -121,7 +122,9 @@ def default_interval(info: ModelInfo, stop_time: float) -> float:
 def starter_spec(fmu: Path, info: ModelInfo) -> str:
     """Text of a spec file for an FMU: it loads as it is, and says in comments what to fill in."""
     inputs = [v for v in info.inputs if v.kind != "string"]
-    tunable = [v for v in info.parameters if v.settable and v.kind == "real"]
+    tunable = sorted(
+        (v for v in info.parameters if v.settable and v.kind != "string"), key=lambda v: v.kind != "real"
+    )
     sections = [_model_section(fmu, info), *(_input_section(v) for v in inputs)]
     if tunable and not inputs:
         sections.append(_searched_parameter(tunable[0]))
@@ -144,29 +147,45 @@ def _model_section(fmu: Path, info: ModelInfo) -> str:
 def _input_section(v: Variable) -> str:
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
     comment = f"# {meaning}\n" if meaning else ""
-    low, high = (0.0, 1.0) if v.low is None or v.high is None else (v.low, v.high)
-    unknown = v.kind != "boolean" and (v.low is None or v.high is None)
+    comment += f"# {_items(v)}\n" if v.literals else ""
+    least, most = v.limits
+    low, high = (0.0, 1.0) if least is None or most is None else (least, most)
+    if low == high:
+        return f"{comment}[inputs.{_toml_key(v.name)}]\nvalue = {low!r}"
+    unknown = least is None or most is None
     doubt = "  # the FMU gives no min and max: put the real range here" if unknown else ""
     interpolation = "pchip" if v.kind == "real" else "constant"
     return (
-        f"{comment}[inputs.{_toml_key(v.name)}]\nrange = [{low!r}, {high!r}]{doubt}\n"
+        f"{comment}[inputs.{_toml_key(v.name)}]\nrange = {_range(v, low, high)}{doubt}\n"
         f'control_points = {_DEFAULT_POINTS}\ninterpolation = "{interpolation}"'
     )
 
 
 def _searched_parameter(v: Variable) -> str:
-    start = v.start if isinstance(v.start, float) else 0.0
+    start = v.start if isinstance(v.start, int | float) else 0.0
     reach = max(abs(start), 1.0) / 2
-    low = start - reach if v.low is None else v.low
-    high = start + reach if v.high is None else v.high
-    return f"[parameters.{_toml_key(v.name)}]  # put the real range here\nrange = [{low!r}, {high!r}]"
+    least, most = v.limits
+    low = start - reach if least is None else least
+    high = start + reach if most is None else most
+    return f"[parameters.{_toml_key(v.name)}]  # put the real range here\nrange = {_range(v, low, high)}"
+
+
+def _range(v: Variable, low: float, high: float) -> str:
+    """A range in TOML; of whole numbers where the variable has no others."""
+    if v.kind == "real":
+        return f"[{float(low)!r}, {float(high)!r}]"
+    return f"[{floor(low)}, {ceil(high)}]"
+
+
+def _items(v: Variable) -> str:
+    return ", ".join(f"{number} = {name}" for name, number in v.literals.items())
 
 
 def _parameter_hints(parameters: Iterable[Variable]) -> str:
     hints = ["# Parameters may be searched, or fixed with value = NUMBER:"]
     for v in islice(parameters, _SHOWN_PARAMETERS):
-        known = v.low is not None and v.high is not None
-        limits = f"[{v.low!r}, {v.high!r}]" if known else "[LOW, HIGH]"
+        low, high = v.limits
+        limits = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
         hints.append(
             f"# parameters.{_toml_key(v.name)}.range = {limits}  # starts at {v.start} {v.unit}".rstrip()
         )

@@ -91,6 +91,7 @@ class ModelInfo:
         step_size: of its default experiment in s, where given.
         tolerance: relative tolerance of its default experiment, where given.
         variables: all scalar variables.
+        clocks: names of the clocks that a simulator would have to tick (FMI 3).
     """
 
     name: str
@@ -103,6 +104,7 @@ class ModelInfo:
     step_size: float | None = None
     tolerance: float | None = None
     variables: tuple[Variable, ...] = ()
+    clocks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Variable:
         for variable in self.variables:

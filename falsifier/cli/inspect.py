@@ -16,6 +16,7 @@ from falsifier.loading import bundled, load_problems
 from falsifier.model import Experiment, ModelInfo, Variable
 from falsifier.problem import Problem
 from falsifier.signals import Signal
+from falsifier.spec import read_spec
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -42,10 +43,10 @@ _PIPED_WIDTH = 160
 )
 @json_option
 def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
-    """Show what an FMU says of itself: interfaces, inputs, outputs, parameters with units and ranges."""
+    """Show what an FMU, or that of a spec file, says of itself: interfaces, variables, units and ranges."""
     from falsifier.fmu import read_info
 
-    source = _existing_fmu(fmu)
+    source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
     found = read_info(source)
     if as_json:
         click.echo(json.dumps(asdict(found), indent=2))
@@ -191,6 +192,12 @@ def _describe(console: "Console", found: ModelInfo, *, everything: bool) -> None
     console.print(
         f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces) or _NO_INTERFACE}"
     )
+    if found.clocks:
+        console.print(
+            f"cannot be simulated: its clocks {', '.join(found.clocks)} would have to be ticked from "
+            "outside, which is not supported; export the model without input clocks",
+            markup=False,
+        )
     if found.description:
         console.print(found.description, markup=False)
     console.print(

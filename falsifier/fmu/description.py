@@ -80,7 +80,6 @@ class Description:
         arrays: start values of all elements by value reference, for arrays only.
         states: number of continuous states (FMI 1 and 2; FMI 3 tells it at run time).
         indicators: number of event indicators (FMI 1 and 2).
-        clocks: names of the clocks that a simulator would have to tick.
         event_mode: whether a co-simulation FMU can be driven in event mode (FMI 3).
         needs_tool: names of interfaces that need the exporting tool to be installed.
         saves_state: names of interfaces whose state can be saved and restored.
@@ -93,7 +92,6 @@ class Description:
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     states: int = 0
     indicators: int = 0
-    clocks: tuple[str, ...] = ()
     event_mode: bool = False
     needs_tool: tuple[Interface, ...] = ()
     saves_state: tuple[Interface, ...] = ()
@@ -195,6 +193,7 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         step_size=_number(experiment.get("stepSize")),
         tolerance=_number(experiment.get("tolerance")),
         variables=tuple(variables),
+        clocks=tuple(c.attrib["name"] for c in clocks if c.get("causality") == "input"),
     )
     return Description(
         info=info,
@@ -204,7 +203,6 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         arrays=arrays,
         states=_number_of_states(root, major),
         indicators=int(root.get("numberOfEventIndicators", "0")),
-        clocks=tuple(c.attrib["name"] for c in clocks if c.get("causality") == "input"),
         event_mode=co_simulation is not None and _flag(co_simulation.get("hasEventMode")),
         needs_tool=needs_tool,
         saves_state=_saving(root),

@@ -7,8 +7,8 @@ from typing import Literal
 from falsifier.fmu.description import Description
 from falsifier.model import Interface
 
-# How the next simulation starts: the same instance after a reset or from its saved state, a new instance, a new
-# process.
+# How the next simulation starts: the same instance after a reset or from its saved state, a new instance,
+# a new process.
 Reuse = Literal["reset", "state", "instance", "process"]
 
 

@@ -145,9 +145,9 @@ def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
 def _check_interface(model: FmuModel) -> None:
     description = describe(model.path, model.sha256)
     info = description.info
-    if description.clocks:
+    if info.clocks:
         raise ModelError(
-            f"{model.path}: its clocks {', '.join(map(repr, description.clocks))} would have to be ticked "
+            f"{model.path}: its clocks {', '.join(map(repr, info.clocks))} would have to be ticked "
             "from outside, which is not supported; export the model without input clocks"
         )
     if model.interface in info.interfaces:

@@ -114,7 +114,7 @@ class _Worker:
         return Reply(more=self._reuse is None, leaving=self._reuse is not None and self._is_spent())
 
     def find_reuse(self) -> Reply:
-        """Repeat the simulation from a reset, a saved state, a new instance; the first equal outcome decides."""
+        """Repeat the simulation in each way to begin again; the first equal outcome decides."""
         assert self._session is not None, "run comes before find_reuse"
         self._reuse = self._session.find_reuse()
         return Reply(text=self._reuse, leaving=self._is_spent())

@@ -144,6 +144,22 @@ def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
     assert {v["name"] for v in described["variables"]} >= {"throttle", "brake", "speed", "rpm", "gear"}
 
 
+def test_info_says_what_cannot_be_simulated(tmp_path: Path) -> None:
+    fixtures = ROOT / "tests" / "fixtures" / "fmus"
+    clocked = falsifier("info", str(fixtures / "Clocked_3.fmu"), cwd=tmp_path)
+    assert "cannot be simulated: its clocks tick would have to be ticked from outside" in clocked.out
+    scheduled = falsifier("info", str(fixtures / "Scheduled_3.fmu"), cwd=tmp_path)
+    assert "scheduled execution is not supported" in scheduled.out
+
+
+def test_info_takes_a_spec_for_its_fmu(tmp_path: Path) -> None:
+    spec = bundled("specs") / "AT.toml"
+    assert (
+        falsifier("info", str(spec), cwd=tmp_path).out
+        == falsifier("info", str(bundled("fmus") / "AT.fmu"), cwd=tmp_path).out
+    )
+
+
 def test_init_writes_a_spec_that_runs(tmp_path: Path) -> None:
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
     assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0
