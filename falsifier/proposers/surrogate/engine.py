@@ -75,7 +75,7 @@ class Surrogate:
             needs_several=coarse_formula(formula, self.grid.step).root.needs_several,
         )
         self._walk = CornerWalk(len(self.layout.groups))
-        self._region_layouts = region_layouts(space, self.grid)
+        self._region_layouts = region_layouts(space, self.grid, self.settings.region_pieces)
         self._regions = 0
         self._region: TrustRegion | None = None
         self._asked = self._planned = self._simple = 0

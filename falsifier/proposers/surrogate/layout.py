@@ -122,23 +122,27 @@ def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
     )
 
 
-def region_layouts(space: SearchSpace, grid: Grid) -> tuple[Layout, ...]:
-    """Layouts of few coordinates for search without a model, coarse first, to be taken in turn."""
+def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tuple[Layout, ...]:
+    """Layouts of few coordinates for search without a model, to be taken in turn.
+
+    Args:
+        space: what is searched.
+        grid: its horizon is what free inputs are divided over.
+        pieces: numbers of held pieces of the free inputs, one for each layout.
+    """
     if all(r.free is None for r in space.inputs):
         return (Layout(space, tuple(_fixed(r, space.stop_time) for r in space.inputs)),)
     horizon = grid.step * grid.cells
-    layouts = []
-    for count, held in ((5, True), (5, False), (8, True)):
-        codings = []
-        for r in space.inputs:
-            if r.free is None:
-                codings.append(_fixed(r, space.stop_time))
-            elif held or r.kind != "real":
-                codings.append(_held(horizon, count, r.free, fine=False))
-            else:
-                codings.append(_smooth(horizon, count, r.free))
-        layouts.append(Layout(space, tuple(codings)))
-    return tuple(layouts)
+    return tuple(
+        Layout(
+            space,
+            tuple(
+                _fixed(r, space.stop_time) if r.free is None else _held(horizon, count, r.free, fine=False)
+                for r in space.inputs
+            ),
+        )
+        for count in pieces
+    )
 
 
 def _fixed(r: InputRange, stop_time: float) -> Coding:
@@ -149,11 +153,6 @@ def _fixed(r: InputRange, stop_time: float) -> Coding:
 def _held(horizon: float, count: int, free: Freedom, *, fine: bool) -> Coding:
     count = max(1, min(count, free.max_control_points, int(horizon / free.min_interval + 1e-6)))
     return Coding(even_times(count, stop_time=horizon, interpolation="constant"), "constant", fine)
-
-
-def _smooth(horizon: float, count: int, free: Freedom) -> Coding:
-    count = max(1, min(count, free.max_control_points, int(horizon / free.min_interval + 1e-6) + 1))
-    return Coding(even_times(count, stop_time=horizon, interpolation="pchip"), "pchip", fine=False)
 
 
 def _read(coding: Coding, values: Array, at: Array) -> Array:

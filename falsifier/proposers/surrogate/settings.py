@@ -44,6 +44,8 @@ class Settings:
         trusted_error: recent prediction error in scaled units below which the model is trusted.
         trusted_share: probability of a trusted model that no other arm outranks.
         least_share: probability below which no arm falls.
+        region_pieces: held pieces of a free input, region by region: most starts are coarse, for those end
+            soon, and what needs more switches has its turn too.
         region_start: points before the trust region fits its first process.
         region_points: points that its process keeps at most (cubic cost).
         region_candidates: points among which it chooses.
@@ -84,6 +86,7 @@ class Settings:
     trusted_error: float = 0.5
     trusted_share: float = 0.8
     least_share: float = 0.1
+    region_pieces: tuple[int, ...] = (5, 5, 5, 8)
     region_start: int = 16
     region_points: int = 150
     region_candidates: int = 1500
