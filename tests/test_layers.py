@@ -10,7 +10,7 @@ import falsifier
 PACKAGE = Path(falsifier.__file__).parent
 LAYERS = [
     ("values", ["errors", "signals", "space", "trajectory"]),
-    ("meaning", ["model", "stl", "fmu", "spec", "loading", "problem", "adhoc"]),
+    ("meaning", ["model", "stl", "fmu", "spec", "ranges", "loading", "problem", "adhoc"]),
     ("evaluate", ["evaluation", "execution"]),
     ("search", ["llm", "proposers"]),
     (

@@ -8,9 +8,10 @@ from falsifier.adhoc import adhoc_problem, changes_from_options, starter_spec
 from falsifier.errors import SpecError
 from falsifier.evaluation import evaluate
 from falsifier.fmu import read_info
-from falsifier.loading import bundled, input_range, load_problem, load_problems
+from falsifier.loading import bundled, load_problem, load_problems
 from falsifier.model import Variable
 from falsifier.problem import Problem
+from falsifier.ranges import input_range
 from falsifier.spec import InputSection
 from tests.fmu.fixtures import path as fmu_path
 
