@@ -47,7 +47,10 @@ class InputSection(_Strict):
         None, description="[low, high]; default: the FMU's min and max."
     )
     control_points: int | None = Field(None, ge=1, description="Number of evenly spaced control points.")
-    interpolation: Interpolation | None = Field(None, description="pchip (default), linear or constant.")
+    interpolation: Interpolation | None = Field(
+        None,
+        description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
+    )
     hold: Seconds | None = Field(None, description="Sample-and-hold period in s.")
     free: FreeSection | None = Field(
         None, description="Proposers may choose the control points within limits."

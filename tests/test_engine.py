@@ -1,5 +1,6 @@
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,7 @@ from falsifier.journal import (
 from falsifier.problem import Problem
 from falsifier.proposers import make_proposer
 from falsifier.result import Result
-from falsifier.space import Candidate
+from falsifier.space import Candidate, ValueKind
 from tests.problems import broken, lag_problem, never
 
 
@@ -209,3 +210,29 @@ def test_a_refuted_violation_does_not_count(monkeypatch: pytest.MonkeyPatch) -> 
     assert result.status == "not falsified"
     assert result.counterexample is None
     assert [c.reason for c in result.refuted] == ["did not happen again"]
+
+
+def whole(problem: Problem, kind: ValueKind) -> Problem:
+    """Three candidates in all, where the kind is integer."""
+    (u,) = problem.space.inputs
+    inputs = (replace(u, control_points=1, interpolation="constant", kind=kind),)
+    return replace(problem, space=replace(problem.space, inputs=inputs))
+
+
+@pytest.mark.parametrize(
+    "engine", ["surrogate", "corners", "uniform", "sobol", "annealing", "cma", "bayesian"]
+)
+def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
+    problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
+    result = run(problem, engine=engine, budget=20)
+    assert result.spent.simulations == 20
+    assert {e.candidate.signals["u"].values for e in result.evaluations} <= {(-1.0,), (0.0,), (1.0,)}
+
+
+@pytest.mark.parametrize("engine", ["surrogate", "annealing", "cma"])
+def test_a_journal_with_numbers_from_before_rounding_is_continued(tmp_path: Path, engine: str) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    before = run(whole(problem, "real"), tmp_path, engine=engine, budget=8)
+    after = run(whole(problem, "integer"), tmp_path, engine=engine, budget=12)
+    assert [e.robustness for e in after.evaluations[:8]] == [e.robustness for e in before.evaluations]
+    assert all(e.candidate.signals["u"].values[0].is_integer() for e in after.evaluations[8:])

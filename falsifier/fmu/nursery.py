@@ -30,6 +30,7 @@ START, REAP = 1, 2
 
 # Share of the machine's memory that one worker may take; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
+_COMPILING = "compiling the model-exchange solver, once per installation: about half a minute"
 _LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
 
 
@@ -113,6 +114,8 @@ def _load_solver() -> None:
     """Compile the solver before the first fork that needs it: not within a simulation's time limit."""
     from falsifier.fmu import model_exchange
 
+    if not model_exchange.is_compiled():
+        print(_COMPILING, file=sys.stderr, flush=True)
     model_exchange.warm_up()
 
 

@@ -9,12 +9,15 @@ to every array that it touches, which here costs more than the rest of the loop.
 bounded number of steps, so that its caller can look at the clock.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from falsifier.stl.compiled import compiled as keep_compiled
 
 # Why a loop stopped: `report[WHERE]`.
 DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
@@ -126,9 +129,9 @@ _load_u4, _store_u4 = _typed(types.uint32, ir.IntType(32))
 _load_i8, _store_i8 = _typed(types.int64, ir.IntType(64))
 _load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
+compiled: Any = keep_compiled
 # For what is called in every step: a call passes every address by itself.
-_inlined = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+_inlined: Any = partial(keep_compiled, forceinline=True)
 
 
 @_inlined
