@@ -163,6 +163,13 @@ def _update_3(_typing, f, instance, again, end, nominals, states, defined, time)
 
 
 @compiled
+def copy(target, source):  # type: ignore[no-untyped-def]
+    """Copy a vector: assigning a slice would have numba compile the formatting of its error message."""
+    for i in range(source.shape[0]):
+        target[i] = source[i]
+
+
+@compiled
 def derive(m, s, time, x, derivatives):  # type: ignore[no-untyped-def]
     """Derivatives at a time within the current pieces of the inputs; returns the FMI status."""
     f, n = m.functions, x.shape[0]

@@ -21,6 +21,7 @@ from falsifier.fmu.continuous import (
     TIME,
     VERSION,
     complete_step,
+    copy,
     derive,
     enter_pieces,
     get_indicators,
@@ -120,9 +121,9 @@ def _step_towards(m, s, target):  # type: ignore[no-untyped-def]
             return status, where, False
     end = s.clock[TIME] + h
     s.clock[TIME] = target if target - end <= rounding(target) else end
-    s.x[:] = s.new_x
-    s.stages[0] = s.stages[5 if s.counts[IMPLICIT] else 6]
-    s.z[:] = s.new_z
+    copy(s.x, s.new_x)
+    copy(s.stages[0], s.stages[5 if s.counts[IMPLICIT] else 6])
+    copy(s.z, s.new_z)
     if s.counts[STIFF_HITS] >= _STIFF_STEPS and not s.counts[IMPLICIT]:
         s.counts[IMPLICIT], s.counts[JACOBIAN_KNOWN] = 1, 0
     status, asks, ends = complete_step(m, s)
@@ -258,9 +259,9 @@ def _locate(m, s, h):  # type: ignore[no-untyped-def]
             changed = changed or (s.z[i] > 0.0) != (z[i] > 0.0)
         if changed:
             high = theta
-            z_high[:] = z
+            copy(z_high, z)
         else:
             low = theta
-            z_low[:] = z
+            copy(z_low, z)
         trial += 1
     return 0, high

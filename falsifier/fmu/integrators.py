@@ -7,7 +7,7 @@ Implicit: ARK4(3)6L[2]SA-ESDIRK of Kennedy and Carpenter, Appl. Numer. Math. 44 
 
 import numpy as np
 
-from falsifier.fmu.continuous import JACOBIAN_KNOWN, TIME, derive
+from falsifier.fmu.continuous import JACOBIAN_KNOWN, TIME, copy, derive
 from falsifier.fmu.stepping import compiled
 
 _C = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
@@ -189,7 +189,7 @@ def _find_jacobian(m, s):  # type: ignore[no-untyped-def]
     """Forward differences at the start of the step; returns the FMI status."""
     time, n = s.clock[TIME], s.x.shape[0]
     base, moved, at = s.work[1], s.work[2], s.work[3]
-    at[:] = s.x
+    copy(at, s.x)
     status = derive(m, s, time, at, base)
     if status > 1:
         return status
