@@ -85,7 +85,8 @@ class Session:
             self.reuse = reuse
             try:
                 if reuse == "state":
-                    self.run()  # takes the state that the next run starts from
+                    self.run()  # takes the state that the next runs start from
+                    self.run()  # from then on the state must serve again and again
                 trial.outputs[:] = 0.0
                 self.run()
             except FalsifierError:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -16,9 +16,10 @@ import pytest
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel, worker
 from falsifier.fmu.isolation import REGISTRY
+from falsifier.fmu.library import Library
 from tests.command import listen_to_interrupts
 from tests.fmu import fixtures
-from tests.fmu.fixtures import isolated, run
+from tests.fmu.fixtures import isolated, local, run
 
 NOTHING, CRASH, HANG, EXIT, ALLOCATE, NAN, DISCARD, END, ABORT, ERROR, TALK, PRINT = range(12)
 
@@ -117,6 +118,7 @@ def test_a_nursery_that_dies_is_replaced(misdeeds: FmuModel) -> None:
         ("SavedState_2", "state"),
         ("SavedState_3", "state"),
         ("LyingState_2", "instance"),
+        ("SpentState_3", "instance"),
         ("KeepsStatic_2", "process"),
     ],
 )
@@ -138,6 +140,39 @@ def test_workers_are_replaced_before_they_have_made_too_many_instances() -> None
         pids |= {fmu._worker.pid} if fmu._worker else set()
     assert len(pids) == 2
     model.close()
+
+
+@pytest.mark.parametrize("name", ["SavedState_2", "SavedState_3"])
+def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -> None:
+    model = isolated(name)
+    run(model, ("y",), stop=0.2)
+    run(model, ("y",), stop=0.2)  # takes note of the self-test
+    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.sha256]
+    assert fmu._worker is not None
+    pid = fmu._worker.pid
+    for _ in range(5 * worker._MOST_INSTANCES):
+        assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
+    assert fmu._worker is not None and fmu._worker.pid == pid
+    model.close()
+
+
+def test_a_saved_state_is_taken_once_and_freed_before_its_instance(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = []
+    look_up = Library.function
+
+    def function(library: Library, name: str, *types: object) -> Callable[..., int]:
+        called.append(name)
+        return look_up(library, name, *types)
+
+    monkeypatch.setattr(Library, "function", function)
+    model = local("SavedState_3")
+    for _ in range(3):
+        run(model, ("y",))
+    model.close()
+    kept = [name for name in called if "FMUState" in name or name == "FreeInstance"]
+    tested, used = ["SetFMUState"] * 2, ["SetFMUState"] * 2
+    # The first instance goes after its reset was found to be none.
+    assert kept == ["FreeInstance", "GetFMUState", *tested, *used, "FreeFMUState", "FreeInstance"]
 
 
 def test_models_travel_between_processes_and_are_equal_by_content(tmp_path: Path) -> None:
