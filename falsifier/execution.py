@@ -1,5 +1,6 @@
 """Where work happens: here, or on any ``concurrent.futures`` executor."""
 
+import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 # How long in s to wait for a cluster's scheduler.
 _CONNECT_TIMEOUT = 20
+# Logger of everything that simulates FMUs.
+_SIMULATING = "falsifier.fmu"
 # In the form of python -W: warnings that begin with this word.
 _TRACKER_FILTER = "ignore:resource_tracker"
 
@@ -108,7 +111,10 @@ def _process_pool(jobs: int) -> "ProcessPoolExecutor":
     from multiprocessing import get_context
 
     _start_silent_tracker()
-    return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_prepare_worker)
+    level = logging.getLogger(_SIMULATING).level
+    return ProcessPoolExecutor(
+        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level,)
+    )
 
 
 def _start_silent_tracker() -> None:
@@ -128,13 +134,18 @@ def _start_silent_tracker() -> None:
         sys.warnoptions.remove(_TRACKER_FILTER)
 
 
-def _prepare_worker() -> None:
-    """End with the parent, however it ends, and leave Ctrl-C to it: it lets workers finish in order."""
+def _prepare_worker(log_level: int) -> None:
+    """End with the parent, however it ends, and leave Ctrl-C to it: it lets workers finish in order.
+
+    Args:
+        log_level: of what simulates, as in the parent.
+    """
     import os
     import signal
     from multiprocessing import parent_process
     from threading import Thread
 
+    logging.getLogger(_SIMULATING).setLevel(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is None:

@@ -1,5 +1,6 @@
 """Options that bear the same names in every command."""
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -181,4 +182,16 @@ def json_option(command: F) -> F:
 
 def quiet_option(command: F) -> F:
     """Add --quiet."""
-    return click.option("--quiet", is_flag=True, help="No progress.")(command)
+    return click.option(
+        "--quiet",
+        is_flag=True,
+        callback=lambda _context, _option, quiet: _silence(quiet=quiet),
+        help="No progress.",
+    )(command)
+
+
+def _silence(*, quiet: bool) -> bool:
+    """Have simulating processes keep to themselves that they compile."""
+    if quiet:
+        logging.getLogger("falsifier.fmu").setLevel(logging.ERROR)
+    return quiet

@@ -8,6 +8,7 @@ import atexit
 import contextlib
 import fcntl
 import json
+import logging
 import mmap
 import os
 import pickle
@@ -42,6 +43,8 @@ from falsifier.fmu.order import Order, Reuse
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.room import Room
 from falsifier.fmu.worker import PREPARE, RUN
+
+_LOG = logging.getLogger(__name__)
 
 # The worker watches the clock itself; this much later it is taken to hang and is killed.
 _GRACE_SECONDS = 0.1
@@ -112,6 +115,9 @@ class Nursery:
                     self._ready = True
                 send_request(self._sock, kind, payload, descriptors)
                 reply = receive_reply(self._sock, _STARTING_SECONDS)
+                while reply.more:
+                    _LOG.warning(reply.text)
+                    reply = receive_reply(self._sock, _STARTING_SECONDS)
             except (Closed, TimeoutError) as error:
                 raise ModelError(
                     "the process that FMU workers are started from has ended; see the messages above"

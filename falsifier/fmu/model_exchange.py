@@ -1,8 +1,6 @@
 """Model exchange: the FMU is a differential equation and is solved here."""
 
 import ctypes
-import sys
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +36,6 @@ _NAMES = {
         "EnterContinuousTimeMode",
     ),
 }  # fmt: skip
-
-
-def is_compiled() -> bool:
-    """Whether numba keeps the solver's machine code: newer than the source, for this version of Python."""
-    source = Path(exchange.__file__)
-    tag = f"py{sys.version_info.major}{sys.version_info.minor}"
-    kept = Path(exchange.advance.stats.cache_path).glob(f"exchange.advance-*.{tag}*.nbi")
-    return any(index.stat().st_mtime >= source.stat().st_mtime for index in kept)
 
 
 def warm_up() -> None:

@@ -16,7 +16,6 @@ import socket
 import sys
 import tempfile
 import traceback
-from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
@@ -30,7 +29,7 @@ START, REAP = 1, 2
 
 # Share of the machine's memory that one worker may take; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
-_COMPILING = "compiling the model-exchange solver, once per installation: about half a minute"
+_COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
 _LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
 
 
@@ -51,6 +50,7 @@ class _Nursery:
     def __init__(self, sock: socket.socket, root: Path) -> None:
         self._sock, self._root = sock, root
         self._scratch: dict[int, Path] = {}
+        self._has_solver = False
 
     def serve(self) -> None:
         while True:
@@ -76,7 +76,7 @@ class _Nursery:
         try:
             folder = self._extracted(order)
             if order.interface == "model-exchange":
-                _load_solver()
+                self._load_solver()
             scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
             pid = os.fork()
             if not pid:
@@ -90,6 +90,17 @@ class _Nursery:
             os.close(log)
         self._scratch[pid] = scratch
         return Reply(text=str(pid))
+
+    def _load_solver(self) -> None:
+        """Compile the solver before the first fork that needs it: not within a simulation's time limit."""
+        if self._has_solver:
+            return
+        from falsifier.fmu import model_exchange
+        from falsifier.fmu.compiling import on_long_compilation
+
+        with on_long_compilation(lambda: send_reply(self._sock, Reply(text=_COMPILING, more=True))):
+            model_exchange.warm_up()
+        self._has_solver = True
 
     def _reap(self, pid: int) -> Reply:
         _, status = os.waitpid(pid, 0)
@@ -107,16 +118,6 @@ class _Nursery:
             archive.extract(order.path, partial)
             partial.rename(folder)
         return folder
-
-
-@cache
-def _load_solver() -> None:
-    """Compile the solver before the first fork that needs it: not within a simulation's time limit."""
-    from falsifier.fmu import model_exchange
-
-    if not model_exchange.is_compiled():
-        print(_COMPILING, file=sys.stderr, flush=True)
-    model_exchange.warm_up()
 
 
 def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoReturn:

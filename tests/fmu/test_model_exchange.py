@@ -1,8 +1,5 @@
 """Model exchange of the test FMUs against closed forms, scipy and co-simulation."""
 
-import time
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +8,6 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from falsifier.errors import SimulationError
-from falsifier.fmu import model_exchange
 from falsifier.fmu.integrators import _A, _C, _E, _GAMMA, _IA, _IB, _IC, _IE
 from falsifier.signals import Signal
 from tests.fmu.fixtures import local, ramp, run
@@ -181,12 +177,3 @@ def test_a_model_that_leaves_its_domain_fails_with_the_time() -> None:
     """Van der Pol's equation run with negative damping of the far field blows up in finite time."""
     with pytest.raises(SimulationError, match=r"the step returned .* at t = "):
         run(local("VanDerPol_2", ME), ("x",), stop=50.0, parameters={"mu": -1.0, "x": 5.0})
-
-
-def test_the_solver_is_known_to_be_compiled_until_its_source_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    model_exchange.warm_up()
-    assert model_exchange.is_compiled()
-    newer = SimpleNamespace(st_mtime=time.time() + 3600)
-    stat = Path.stat
-    monkeypatch.setattr(Path, "stat", lambda p: newer if p.name == "exchange.py" else stat(p))
-    assert not model_exchange.is_compiled()
