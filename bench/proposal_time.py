@@ -1,0 +1,52 @@
+"""How long does an engine think about a proposal, and does that grow with the history?
+
+    python bench/proposal_time.py                      # default engine, AT51, fixed parameterization
+    python bench/proposal_time.py --engine bayesian --requirement CC4
+
+Processor time of asking and telling, in a search that goes on after a violation. Committed result:
+bench/proposal_time.md.
+"""
+
+import argparse
+import os
+import time
+from itertools import pairwise
+
+# The engines' matrices are small: threads of the linear algebra cost more than they bring.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from falsifier.evaluation import evaluate
+from falsifier.loading import load_problem
+from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer
+
+EDGES = (0, 50, 60, 100, 200, 300, 400, 500)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--engine", choices=sorted(set(ENGINES) - {"hybrid"}), default=DEFAULT_ENGINE)
+    parser.add_argument("--requirement", default="AT51")
+    parser.add_argument("--seed", type=int, default=100)
+    options = parser.parse_args()
+    problem = load_problem(options.requirement)
+    proposer = make_proposer(options.engine, problem, seed=options.seed)
+    seconds = []
+    for _ in range(EDGES[-1]):
+        started = time.process_time()
+        (candidate,) = proposer.ask(1)
+        asking = time.process_time() - started
+        evaluation = evaluate(problem, candidate)
+        started = time.process_time()
+        proposer.tell([evaluation])
+        seconds.append(asking + time.process_time() - started)
+    print(f"`{options.engine}` on {options.requirement}, seed {options.seed}.\n")
+    print("| earlier simulations | mean s | most s |\n|---|---|---|")
+    for first, last in pairwise(EDGES):
+        part = seconds[first:last]
+        print(f"| {first} to {last - 1} | {sum(part) / len(part):.3f} | {max(part):.3f} |")
+
+
+if __name__ == "__main__":
+    main()
