@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from falsifier.budget import Budget
 from falsifier.errors import SpecError
+from falsifier.proposers import DEFAULT_ENGINE
 from falsifier.request import ModelRequest, ProblemRequest, RunRequest
 
 _HASH_DIGITS = 10
@@ -46,7 +47,7 @@ class Method:
     def label(self) -> str:
         """Name for people, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
         model = " ".join(p for p in (self.model.rpartition("/")[2], self.effort, self.variant) if p)
-        name = " + ".join(p for p in (self.engine, model) if p) or "default engine"
+        name = " + ".join(p for p in (self.engine, model) if p) or DEFAULT_ENGINE
         apart = {
             self.parameterization: self.parameterization != "fixed",
             self.profile: bool(self.profile),
@@ -128,7 +129,7 @@ def method_of(request: RunRequest) -> Method:
     """Method of a run."""
     problem, model = request.problem, request.model or ModelRequest(name="")
     return Method(
-        engine=request.engine or "",
+        engine=request.engine or ("" if request.model else DEFAULT_ENGINE),
         model=model.name,
         effort=model.effort or "",
         variant=model.variant or "",
