@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -185,13 +186,15 @@ def quiet_option(command: F) -> F:
     return click.option(
         "--quiet",
         is_flag=True,
-        callback=lambda _context, _option, quiet: _silence(quiet=quiet),
+        callback=lambda context, _option, quiet: _silence(context, quiet=quiet),
         help="No progress.",
     )(command)
 
 
-def _silence(*, quiet: bool) -> bool:
-    """Have simulating processes keep to themselves that they compile."""
+def _silence(context: click.Context, *, quiet: bool) -> bool:
+    """Have simulating processes keep to themselves that they compile, as long as the command runs."""
     if quiet:
-        logging.getLogger("falsifier.fmu").setLevel(logging.ERROR)
+        logger = logging.getLogger("falsifier.fmu")
+        context.call_on_close(partial(logger.setLevel, logger.level))
+        logger.setLevel(logging.ERROR)
     return quiet
