@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from falsifier.check import Checked
-    from falsifier.problem import Problem
+    from falsifier.counterexamples.regression import Checked
+    from falsifier.problem.problem import Problem
 
 _DEFAULT_BUDGET = 100
 _DEFAULT_DATABASE = "counterexamples"
@@ -71,7 +71,7 @@ class SpecFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         """Yield one item a requirement."""
         from falsifier.errors import SpecError
-        from falsifier.spec import read_spec
+        from falsifier.problem.spec import read_spec
 
         try:
             spec = read_spec(self.path)
@@ -123,9 +123,9 @@ def falsifier_check(request: pytest.FixtureRequest) -> Callable[..., "Checked"]:
 def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) -> "Checked":
     """Check a problem and fail where it is violated."""
     __tracebackhide__ = True
-    from falsifier.check import check
-    from falsifier.counterexamples import Database
-    from falsifier.request import ProblemRequest
+    from falsifier.counterexamples.regression import check
+    from falsifier.counterexamples.store import Database
+    from falsifier.search.request import ProblemRequest
 
     config = item.config
     marker = item.get_closest_marker("falsifier")
@@ -162,9 +162,9 @@ def _setting(config: pytest.Config, name: str) -> Any:
 
 def _message(item: pytest.Item, checked: "Checked") -> str:
     """Counterexample, its picture and the command that runs it again."""
-    from falsifier.display import candidate_lines
-    from falsifier.explain import explain
-    from falsifier.plotting import plot_evaluation, save_figure
+    from falsifier.counterexamples.explain import explain
+    from falsifier.views.plotting import plot_evaluation, save_figure
+    from falsifier.views.text import candidate_lines
 
     problem, found = checked.problem, checked.counterexample
     assert found is not None
@@ -189,7 +189,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
 
 def _command(item: pytest.Item, checked: "Checked") -> str:
     """Command that runs the counterexample again; of a problem made in Python, the test itself."""
-    from falsifier.counterexamples import load
+    from falsifier.counterexamples.store import load
 
     assert checked.file is not None
     loadable = load(checked.file).problem is not None

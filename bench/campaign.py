@@ -13,25 +13,25 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from falsifier.analysis import load, load_run
-from falsifier.budget import Budget
-from falsifier.campaign import CampaignRequest, Method, cross, suite
-from falsifier.campaign.directory import CampaignRecord, run_directory, write_campaign
-from falsifier.engine import falsify, search
-from falsifier.evaluation import Evaluation, evaluate
-from falsifier.journal import (
+from falsifier.campaigns import CampaignRequest, Method, cross, suite
+from falsifier.campaigns.analysis import load, load_run
+from falsifier.campaigns.directory import CampaignRecord, run_directory, write_campaign
+from falsifier.core.space import Candidate
+from falsifier.engines import make_proposer
+from falsifier.engines.protocol import Proposer
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.search.budget import Budget
+from falsifier.search.journal import (
     EndedRecord,
     EvaluatedRecord,
     VerdictRecord,
     open_journal,
     write_manifest,
 )
-from falsifier.manifest import environment, manifest
-from falsifier.proposers import make_proposer
-from falsifier.proposers.protocol import Proposer
-from falsifier.report import html_report
-from falsifier.request import ProblemRequest, RunRequest
-from falsifier.space import Candidate
+from falsifier.search.loop import falsify, search
+from falsifier.search.manifest import environment, manifest
+from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.views.report import html_report
 
 SIMULATIONS = 1000
 LONG_JOURNAL = 10_000

@@ -10,12 +10,12 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from falsifier.budget import Budget
-from falsifier.engine import search
-from falsifier.evaluation import monitor_for
-from falsifier.journal import open_journal
-from falsifier.loading import load_problem
-from falsifier.proposers import make_proposer
+from falsifier.engines import make_proposer
+from falsifier.evaluation.evaluate import monitor_for
+from falsifier.problem.loading import load_problem
+from falsifier.search.budget import Budget
+from falsifier.search.journal import open_journal
+from falsifier.search.loop import search
 
 COUNT = 1000
 ROUNDS = 3

@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from falsifier.evaluation import evaluate, monitor_for
-from falsifier.loading import load_problem
-from falsifier.problem import Problem
-from falsifier.space import ParameterRange
+from falsifier.core.space import ParameterRange
+from falsifier.evaluation.evaluate import evaluate, monitor_for
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 
 ROOT = Path(__file__).resolve().parents[1]
 

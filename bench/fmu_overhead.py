@@ -21,13 +21,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.model import Experiment
+from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel, archive
 from falsifier.fmu.build import compiler
 from falsifier.fmu.description import read_description
 from falsifier.fmu.isolation import REGISTRY
-from falsifier.model import Experiment
-from falsifier.signals import Signal
 
 HERE = Path(__file__).parent
 FMUS = HERE.parent / "tests" / "fixtures" / "fmus"

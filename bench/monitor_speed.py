@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Monitor, parse
-from falsifier.trajectory import Trajectory
 
 LENGTHS = (501, 5001, 50_001)
 FORMULAS = {

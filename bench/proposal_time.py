@@ -16,9 +16,9 @@ from itertools import pairwise
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier.evaluation import evaluate
-from falsifier.loading import load_problem
-from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer
+from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_proposer
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.loading import load_problem
 
 EDGES = (0, 50, 60, 100, 200, 300, 400, 500)
 

@@ -26,11 +26,11 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier.evaluation import evaluate
-from falsifier.loading import load_problem
-from falsifier.problem import Problem
-from falsifier.proposers import DEFAULT_ENGINE, ENGINES, make_proposer
-from falsifier.space import Candidate
+from falsifier.core.space import Candidate
+from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_proposer
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEMS = {

@@ -7,6 +7,21 @@ Load a problem, choose who proposes, run::
     result = falsify(load_problem("AT1"), engine="corners", budget=100)
 
 Everything heavy (numba, fmpy, litellm, matplotlib) is imported when it is first needed.
+
+The house has twelve rooms. Each imports from itself and from those above it, never from one below::
+
+    core/             signals, search spaces, candidates, trajectories, models
+    stl/              formulas, robustness and critical time
+    fmu/              what FMUs say of themselves, and how they are stepped
+    problem/          what is simulated, what must hold, what may be varied
+    evaluation/       one candidate in, one evaluation out
+    llm/              chat with language models
+    engines/          who suggests the next candidates
+    search/           one run: the loop, its budget, its record
+    counterexamples/  stored, shrunk, explained, exported
+    campaigns/        requirements x methods x seeds
+    views/            what people see
+    cli/              the command line
 """
 
 from importlib import import_module
@@ -15,19 +30,19 @@ from typing import Any
 __version__ = "0.1.0"
 
 _EXPORTS = {
-    "Budget": "falsifier.budget",
-    "Candidate": "falsifier.space",
-    "Evaluation": "falsifier.evaluation",
+    "Budget": "falsifier.search.budget",
+    "Candidate": "falsifier.core.space",
+    "Evaluation": "falsifier.evaluation.evaluate",
     "FalsifierError": "falsifier.errors",
-    "FunctionModel": "falsifier.model",
-    "Problem": "falsifier.problem",
-    "Result": "falsifier.result",
-    "SearchSpace": "falsifier.space",
-    "Signal": "falsifier.signals",
-    "Trajectory": "falsifier.trajectory",
-    "evaluate": "falsifier.evaluation",
-    "falsify": "falsifier.engine",
-    "load_problem": "falsifier.loading",
+    "FunctionModel": "falsifier.core.model",
+    "Problem": "falsifier.problem.problem",
+    "Result": "falsifier.search.result",
+    "SearchSpace": "falsifier.core.space",
+    "Signal": "falsifier.core.signals",
+    "Trajectory": "falsifier.core.trajectory",
+    "evaluate": "falsifier.evaluation.evaluate",
+    "falsify": "falsifier.search.loop",
+    "load_problem": "falsifier.problem.loading",
 }
 
 __all__ = [*_EXPORTS, "__version__"]

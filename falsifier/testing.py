@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.evaluation import Evaluation
-from falsifier.model import Experiment, FunctionModel, ModelInfo, Variable
-from falsifier.problem import Problem, Requirement
-from falsifier.proposers.protocol import Proposer
-from falsifier.signals import Signal
-from falsifier.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.signals import Signal
+from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.engines.protocol import Proposer
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem, Requirement
 from falsifier.stl import Verdict, parse
 
 Judge = Callable[[Candidate], Evaluation]

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from falsifier.campaign import run_campaign
-from tests.campaigns import request, work_in_threads
+from falsifier.campaigns import run_campaign
+from tests.campaigns.support import request, work_in_threads
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does
 

@@ -7,9 +7,9 @@ from time import sleep
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.model import Experiment, FunctionModel, ModelInfo, Variable
-from falsifier.problem import Problem, Requirement
-from falsifier.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.problem.problem import Problem, Requirement
 from falsifier.stl import parse
 
 Array = NDArray[np.float64]

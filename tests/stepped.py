@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError
-from falsifier.model import Experiment, ModelInfo
-from falsifier.problem import Problem
-from falsifier.signals import Signal
-from falsifier.trajectory import Trajectory
+from falsifier.problem.problem import Problem
 from tests.problems import INFO, lag_problem
 
 

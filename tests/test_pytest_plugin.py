@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.loading import bundled
+from falsifier.problem.loading import bundled
 from tests.command import ROOT
 
 SPEC = """

@@ -32,8 +32,8 @@ _COMMANDS = {
     "build": ("falsifier.cli.inspect", "Compile an FMU's C sources for this platform."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
     "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
-    "prompt": ("falsifier.cli.model", "Print what would be sent to a language model; send nothing."),
-    "models": ("falsifier.cli.model", "Check a language model: its name, its key and one small round trip."),
+    "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model; send nothing."),
+    "models": ("falsifier.cli.llm", "Check a language model: its name, its key and one small round trip."),
 }
 
 

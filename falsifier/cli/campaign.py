@@ -9,10 +9,7 @@ from typing import Any, get_args
 
 import click
 
-from falsifier.analysis import load, read_published
-from falsifier.analysis.tables import TABLES, statistics_json
-from falsifier.budget import Budget
-from falsifier.campaign import (
+from falsifier.campaigns import (
     CampaignRequest,
     Follower,
     Method,
@@ -22,13 +19,16 @@ from falsifier.campaign import (
     run_campaign,
     suite,
 )
-from falsifier.campaign import resume_campaign as _resume
-from falsifier.campaign.suites import SUITES
+from falsifier.campaigns import resume_campaign as _resume
+from falsifier.campaigns.analysis import load, read_published
+from falsifier.campaigns.analysis.tables import TABLES, statistics_json
+from falsifier.campaigns.suites import SUITES
 from falsifier.cli.options import asking, asking_options, json_option, quiet_option
-from falsifier.journal import write_whole
-from falsifier.loading import bundled, find_spec, load_problems
-from falsifier.request import Effort, ModelRequest, ProblemRequest
-from falsifier.scoreboard import campaign_display, overall_line
+from falsifier.problem.loading import bundled, find_spec, load_problems
+from falsifier.search.budget import Budget
+from falsifier.search.journal import write_whole
+from falsifier.search.request import Effort, ModelRequest, ProblemRequest
+from falsifier.views.campaign_text import campaign_display, overall_line
 
 # Time in s between two looks of falsifier watch.
 _WATCH_PERIOD = 0.5

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import click
 
 from falsifier.cli.options import json_option
-from falsifier.confirm import Confirmation, confirm, other_interface
-from falsifier.counterexamples import (
+from falsifier.core.space import Candidate
+from falsifier.counterexamples.store import (
     Database,
     Replayed,
     StoredCounterexample,
@@ -21,14 +21,14 @@ from falsifier.counterexamples import (
     problem_of,
     to_store,
 )
-from falsifier.counterexamples import (
+from falsifier.counterexamples.store import (
     replay as replay_stored,
 )
-from falsifier.display import candidate_lines, signal_text, warn
 from falsifier.errors import CandidateError, SpecError
-from falsifier.evaluation import Evaluation, evaluate
-from falsifier.problem import Problem
-from falsifier.space import Candidate
+from falsifier.evaluation.confirm import Confirmation, confirm, other_interface
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+from falsifier.views.text import candidate_lines, signal_text, warn
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -73,8 +73,8 @@ def shrink(
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.export import write_counterexample
-    from falsifier.shrink import shrink as shrink_violation
+    from falsifier.counterexamples.export import write_counterexample
+    from falsifier.counterexamples.shrink import shrink as shrink_violation
 
     stored = load(run)
     file = out or _beside(run, "shrunk.json")
@@ -117,8 +117,8 @@ def explain(*, run: Path, model: str | None, effort: str | None, api_base: str |
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.explain import explain as explain_violation
-    from falsifier.explain import narrate
+    from falsifier.counterexamples.explain import explain as explain_violation
+    from falsifier.counterexamples.explain import narrate
 
     if model is None and (effort is not None or api_base is not None):
         raise click.UsageError("--effort and --api-base need --model NAME")
@@ -155,7 +155,7 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.export import export_counterexample
+    from falsifier.counterexamples.export import export_counterexample
 
     stored = load(run)
     directory = out or _beside(run, "export")
@@ -186,8 +186,8 @@ def robustness_map(
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.neighbourhood import sample_neighbourhood
-    from falsifier.plotting import plot_neighbourhood, save_figure
+    from falsifier.counterexamples.robustness_map import sample_neighbourhood
+    from falsifier.views.plotting import plot_neighbourhood, save_figure
 
     stored = load(run)
     picture = out or _beside(run, "robustness-map.png")

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.adhoc import default_interface, default_interval, starter_spec
 from falsifier.cli.options import json_option
+from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
-from falsifier.loading import bundled, load_problems
-from falsifier.model import Experiment, ModelInfo, Variable
-from falsifier.problem import Problem
-from falsifier.signals import Signal
-from falsifier.spec import read_spec
+from falsifier.problem.loading import bundled, load_problems
+from falsifier.problem.options import default_interface, default_interval, starter_spec
+from falsifier.problem.problem import Problem
+from falsifier.problem.spec import read_spec
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -114,10 +114,10 @@ def schema(*, what: str) -> None:
 
 
 def _schema(what: str) -> dict[str, Any]:
-    from falsifier.campaign.directory import CampaignRecord
-    from falsifier.journal import RECORDS
-    from falsifier.manifest import Manifest
-    from falsifier.spec import Spec
+    from falsifier.campaigns.directory import CampaignRecord
+    from falsifier.problem.spec import Spec
+    from falsifier.search.journal import RECORDS
+    from falsifier.search.manifest import Manifest
 
     models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
     return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
@@ -126,7 +126,7 @@ def _schema(what: str) -> dict[str, Any]:
 def _print_convergence(fmu: Path, found: ModelInfo) -> None:
     """Say how far halving the step moves the outputs, with every bounded input going up and down once."""
     from falsifier.fmu import FmuModel
-    from falsifier.fmu.check import step_convergence
+    from falsifier.fmu.step_check import step_convergence
 
     interface = default_interface(found)
     if interface is None:

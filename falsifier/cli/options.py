@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from falsifier.request import ModelRequest, ProblemRequest
+from falsifier.search.request import ModelRequest, ProblemRequest
 
 # Options of litellm that would carry a key.
 _SECRET_OPTIONS = ("api_key", "headers", "extra_headers", "extra_body")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from falsifier.archcomp import BUDGET, Finding, export, read_rows
-from falsifier.archcomp import validate as check_rows
+from falsifier.campaigns.archcomp import BUDGET, Finding, export, read_rows
+from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.cli.options import json_option
-from falsifier.report import html_report, junit_report, markdown_report
+from falsifier.views.report import html_report, junit_report, markdown_report
 
 
 @click.command()

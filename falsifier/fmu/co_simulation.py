@@ -4,12 +4,12 @@ import time
 
 import numpy as np
 
+from falsifier.core.model import Variable
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.room import Room
 from falsifier.fmu.stepper import Stepper
-from falsifier.model import Variable
 
 # Steps before the first look at the clock; looks become rarer while they come in quick succession.
 _FIRST_CHUNK, _CHUNK_GROWTH, _QUICK_SECONDS = 1000, 16, 0.01

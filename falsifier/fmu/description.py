@@ -13,9 +13,9 @@ from typing import cast
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from falsifier.core.model import Causality, Interface, Kind, ModelInfo, Variable
 from falsifier.errors import ModelError, did_you_mean
 from falsifier.fmu import archive
-from falsifier.model import Causality, Interface, Kind, ModelInfo, Variable
 
 # Element name -> (kind, type code). A type code is how the FMU's get and set functions pass the value.
 _TYPES_1_2: Mapping[str, tuple[Kind, str]] = {

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import archive
-from falsifier.fmu.order import Order, Reuse
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.room import Room
 from falsifier.fmu.session import Session
+from falsifier.fmu.worker_order import Order, Reuse
 
 
 class LocalFmu:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from falsifier.errors import FailureStatus, ModelError, SimulationError
 from falsifier.fmu import nursery
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
     QUICK_SECONDS,
     Closed,
@@ -39,10 +40,9 @@ from falsifier.fmu.channel import (
     watch,
 )
 from falsifier.fmu.environment import worker_environment
-from falsifier.fmu.order import Order, Reuse
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.room import Room
 from falsifier.fmu.worker import PREPARE, RUN
+from falsifier.fmu.worker_order import Order, Reuse
 
 _LOG = logging.getLogger(__name__)
 

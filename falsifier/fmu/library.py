@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.model import Interface
 from falsifier.errors import ModelError
 from falsifier.fmu import archive
 from falsifier.fmu.description import Description
-from falsifier.model import Interface
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
 _TYPES: Mapping[int, tuple[str, ...]] = {

@@ -5,16 +5,16 @@ import ctypes
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.model import Variable
 from falsifier.errors import ModelError
-from falsifier.fmu import continuous, exchange
+from falsifier.fmu import continuous, solver
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.continuous import Memory, Model, make_memory
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.room import Room
 from falsifier.fmu.stepper import Stepper
-from falsifier.model import Variable
 
 _STEPS_PER_CLOCK_LOOK = 2000
 _DEFAULT_TOLERANCE = 1e-6
@@ -48,7 +48,7 @@ def warm_up() -> None:
     for function in (continuous.settle, continuous.refresh):
         function.compile((typeof(model), typeof(memory)))
     # A run that has no column left to record calls nothing.
-    exchange.advance(model, memory, np.zeros((0, 0)), 1)
+    solver.advance(model, memory, np.zeros((0, 0)), 1)
 
 
 class ModelExchange(Stepper):
@@ -73,9 +73,9 @@ class ModelExchange(Stepper):
         memory.counts[continuous.COLUMN] = 1
         memory.clock[continuous.NEXT_STEP] = model.max_step
         while True:
-            status, where = exchange.advance(model, memory, self._room.outputs, _STEPS_PER_CLOCK_LOOK)
+            status, where = solver.advance(model, memory, self._room.outputs, _STEPS_PER_CLOCK_LOOK)
             reached = float(memory.clock[continuous.TIME])
-            if where == exchange.PAUSED:
+            if where == solver.PAUSED:
                 self._watch_clock(deadline, reached)
                 continue
             self._check(status, where, reached)

@@ -22,8 +22,8 @@ from typing import NoReturn
 from falsifier.errors import FalsifierError, ModelError
 from falsifier.fmu import archive, worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
-from falsifier.fmu.order import Order
 from falsifier.fmu.stepper import warm_up
+from falsifier.fmu.worker_order import Order
 
 START, REAP = 1, 2
 

@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu.description import Description
-from falsifier.model import Experiment
 
 # How far a ratio of two steps may lie from a whole number and still mean it.
 _RATIO_ROUNDING = 1e-6

@@ -6,17 +6,17 @@ from typing import Literal
 
 import numpy as np
 
+from falsifier.core.model import Interface
 from falsifier.errors import FalsifierError
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.co_simulation import CoSimulation
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library, LogSink
 from falsifier.fmu.lifecycle import make_lifecycle
-from falsifier.fmu.order import Reuse
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.room import Room
 from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import Stepper
-from falsifier.model import Interface
+from falsifier.fmu.worker_order import Reuse
 
 _CHEAPEST_FIRST: tuple[Reuse, ...] = ("reset", "state", "instance")
 

@@ -9,16 +9,16 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.model import Experiment, Interface, ModelInfo, check_finite
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError
 from falsifier.fmu import archive, in_process
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description, describe
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
-from falsifier.fmu.order import Order
 from falsifier.fmu.plan import Plan, make_plan
-from falsifier.fmu.room import Room
-from falsifier.model import Experiment, Interface, ModelInfo, check_finite
-from falsifier.signals import Signal
-from falsifier.trajectory import Trajectory
+from falsifier.fmu.worker_order import Order
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class FmuModel:
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
     ) -> Trajectory:
-        """Simulate once; see falsifier.model.Model.simulate.
+        """Simulate once; see falsifier.core.model.Model.simulate.
 
         Inputs are set at each communication point to the signal's value there. Integer, Boolean and
         enumeration inputs get the nearest number.

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.model import Variable
 from falsifier.errors import SimulationError
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library, load_binding, status_name
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
-from falsifier.fmu.room import Room
-from falsifier.model import Variable
 
 
 class Stepper(ABC):

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from falsifier.core.model import Interface
 from falsifier.errors import FalsifierError, SimulationError
+from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
     QUICK_SECONDS,
     Closed,
@@ -26,11 +28,9 @@ from falsifier.fmu.channel import (
     watch,
 )
 from falsifier.fmu.description import Description
-from falsifier.fmu.order import Reuse
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.room import Room
 from falsifier.fmu.session import Session
-from falsifier.model import Interface
+from falsifier.fmu.worker_order import Reuse
 
 PREPARE, RUN = 1, 2
 

@@ -6,7 +6,7 @@ from time import perf_counter
 from typing import Any
 
 from falsifier.llm.failures import classify, redact
-from falsifier.llm.library import dropped_parameters, load_litellm
+from falsifier.llm.litellm_import import dropped_parameters, load_litellm
 from falsifier.llm.messages import ChatReply, ChatRequest
 from falsifier.llm.modes import MODES, Mode
 from falsifier.llm.providers import find_key, known

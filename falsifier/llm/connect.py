@@ -8,7 +8,7 @@ from typing import Any
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.ladder import LadderChat
-from falsifier.llm.library import check_name, listed_price
+from falsifier.llm.litellm_import import check_name, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Usage
 from falsifier.llm.modes import Mode
 from falsifier.llm.providers import find_key, first_mode, key_variable

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
-from falsifier.evaluation import Evaluation
+from falsifier.core.model import ModelInfo
+from falsifier.core.space import Candidate
+from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.view import View
-from falsifier.model import ModelInfo
-from falsifier.problem import Requirement
-from falsifier.space import Candidate
+from falsifier.problem.problem import Requirement
 from falsifier.stl import Verdict
 from falsifier.stl.expression import Name
-from falsifier.trajectory import Trajectory
 
 T = TypeVar("T")
 

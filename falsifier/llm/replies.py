@@ -12,10 +12,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
+from falsifier.core.space import Candidate, SearchSpace
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.signals import INTERPOLATIONS, Interpolation, Signal
-from falsifier.space import Candidate, SearchSpace
 
 _POINT = re.compile(r"<point>(.*?)</point>", re.DOTALL | re.IGNORECASE)
 _THOUGHT = re.compile(r"<think>.*?</think>", re.DOTALL | re.IGNORECASE)

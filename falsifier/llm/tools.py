@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from falsifier.core.space import Candidate
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import Tool, ToolCall
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.what_if import NAME, answer, predicted, what_if_tool
 from falsifier.llm.replies import ReplyForm
-from falsifier.space import Candidate
 from falsifier.stl import Verdict
 
 # Candidates of one call that are predicted; an answer about more would cost tokens and be skimmed.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.stl.expression import Expression, Number
 from falsifier.stl.formula import (
     Always,
@@ -21,7 +22,6 @@ from falsifier.stl.formula import (
 )
 from falsifier.stl.program import Part
 from falsifier.stl.witness import trace
-from falsifier.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

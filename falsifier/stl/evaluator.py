@@ -6,9 +6,9 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError, did_you_mean
 from falsifier.stl.program import Program
-from falsifier.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.diagnosis import Diagnosis, diagnose
@@ -16,7 +17,6 @@ from falsifier.stl.formula import Formula
 from falsifier.stl.program import Program
 from falsifier.stl.verdict import Verdict
 from falsifier.stl.witness import trace
-from falsifier.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError
 from falsifier.stl.compiler import window_samples
 from falsifier.stl.expression import Expression, Number, number_text
@@ -38,7 +39,6 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.trajectory import Trajectory
 
 
 def robustness(formula: Formula, trajectory: Trajectory) -> float:

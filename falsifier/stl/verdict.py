@@ -26,6 +26,6 @@ class Verdict:
         return self.robustness < 0
 
     def _repr_html_(self) -> str:
-        from falsifier.notebook import verdict_html
+        from falsifier.views.notebook import verdict_html
 
         return verdict_html(self)

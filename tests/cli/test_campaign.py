@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from falsifier.campaign.directory import locked
+from falsifier.campaigns.directory import locked
 from falsifier.cli import cli
 from falsifier.errors import SpecError
-from tests.campaigns import work_in_threads
+from tests.campaigns.support import work_in_threads
 from tests.command import falsifier
 
 HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"

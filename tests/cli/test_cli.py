@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.journal import read_journal
-from falsifier.loading import bundled
+from falsifier.problem.loading import bundled
+from falsifier.search.journal import read_journal
 from tests.command import ROOT, falsifier, listen_to_interrupts
 
 

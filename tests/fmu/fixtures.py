@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from falsifier.core.model import Experiment, Interface
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
-from falsifier.model import Experiment, Interface
-from falsifier.signals import Signal
-from falsifier.trajectory import Trajectory
 
 FOLDER = Path(__file__).parents[1] / "fixtures" / "fmus"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from falsifier.execution import local_executor
+from falsifier.evaluation.workers import local_executor
 from falsifier.fmu import isolation
 from falsifier.fmu.compiling import on_long_compilation
 from falsifier.fmu.nursery import REAP

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu.integrators import _A, _C, _E, _GAMMA, _IA, _IB, _IC, _IE
-from falsifier.signals import Signal
 from tests.fmu.fixtures import local, ramp, run
 
 ME: Final = "model-exchange"

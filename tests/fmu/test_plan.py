@@ -1,9 +1,9 @@
 import pytest
 
+from falsifier.core.model import Experiment
 from falsifier.errors import FalsifierError, ModelError, SpecError
 from falsifier.fmu.description import read_description
 from falsifier.fmu.plan import make_plan
-from falsifier.model import Experiment
 from tests.fmu import fixtures
 
 LAG = read_description(fixtures.path("Lag_2"))

@@ -300,7 +300,7 @@ class TestFailures:
 
 def test_importing_the_layer_does_not_import_litellm() -> None:
     code = (
-        "import sys, falsifier.proposers.llm, falsifier.llm.connect; "
+        "import sys, falsifier.engines.llm, falsifier.llm.connect; "
         "print('litellm' in sys.modules, 'openai' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

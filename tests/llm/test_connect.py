@@ -7,7 +7,7 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.connect import check_model, connect, preflight
-from falsifier.llm.library import listed_price
+from falsifier.llm.litellm_import import listed_price
 from falsifier.llm.providers import first_mode
 from falsifier.llm.retry import RetryingChat
 from falsifier.llm.usage import Price

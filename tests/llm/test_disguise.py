@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pytest
 
-from falsifier.evaluation import Evaluation, evaluate
+from falsifier.core.signals import Signal
+from falsifier.core.space import Candidate
+from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.disguise import Disguise, renamed
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
-from falsifier.loading import load_problem
-from falsifier.signals import Signal
-from falsifier.space import Candidate
+from falsifier.problem.loading import load_problem
 from falsifier.stl import parse
 
 REAL = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT1"

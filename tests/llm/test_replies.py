@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from falsifier.core.signals import Signal
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.replies import ReplyForm
-from falsifier.signals import Signal
-from falsifier.space import Freedom, InputRange, ParameterRange, SearchSpace
 
 FREE = Freedom(max_control_points=200, min_interval=0.1)
 SPACE = SearchSpace(

@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
+from falsifier.core.space import Candidate
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.failures import ToolsUnsupportedError
 from falsifier.llm.ladder import LadderChat
-from falsifier.llm.library import may_take_tools
+from falsifier.llm.litellm_import import may_take_tools
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, Tool, ToolCall
 from falsifier.llm.prompts import VARIANTS
 from falsifier.llm.replies import ReplyForm
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
-from falsifier.space import Candidate
 from falsifier.stl import Verdict
 from tests.llm.server import Step, serving
 from tests.problems import lag_problem

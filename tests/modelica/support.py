@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from falsifier.core.model import Experiment
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.model import Experiment
 
 Floats = npt.NDArray[np.float64]
 Inputs = Callable[[float], Mapping[str, float]]

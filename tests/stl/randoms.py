@@ -4,6 +4,7 @@ import random
 
 import numpy as np
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
 from falsifier.stl.formula import (
     Always,
@@ -20,7 +21,6 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.trajectory import Trajectory
 
 STEP = 0.5
 SIGNALS = ("x", "y", "der(b)")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Diagnosis, Monitor, parse
-from falsifier.trajectory import Trajectory
 from tests.stl.randoms import STEP, random_case
 
 

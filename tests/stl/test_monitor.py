@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl import Monitor, Verdict, parse
-from falsifier.trajectory import Trajectory
 from tests.stl.direct import Direct
 from tests.stl.randoms import STEP, random_case, random_trajectory
 

@@ -3,9 +3,9 @@ import random
 import numpy as np
 import pytest
 
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl import Monitor, parse, reference
-from falsifier.trajectory import Trajectory
 from tests.stl.randoms import STEP, random_case, random_formula, random_trajectory
 
 

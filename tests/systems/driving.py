@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.model import Experiment
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
-from falsifier.model import Experiment
-from falsifier.signals import Signal
 from falsifier.stl import Monitor, parse
-from falsifier.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]
 Array = NDArray[np.float64]

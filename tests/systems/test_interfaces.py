@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from falsifier.fmu import FmuModel
-from falsifier.loading import load_problems
+from falsifier.problem.loading import load_problems
 from tests.systems.driving import ROOT, Array
 
 # Largest differences against the size of each output, and until when: NN is chaotic.

@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from falsifier.signals import Signal
+from falsifier.core.signals import Signal
 from tests.systems.driving import Driver, golden, robustness
 from tests.systems.independent import nn
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from falsifier.signals import Signal
+from falsifier.core.signals import Signal
 from tests.systems.driving import Array, Driver, golden, robustness
 from tests.systems.independent import pm
 

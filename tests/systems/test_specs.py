@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.loading import load_problem, load_problems
+from falsifier.problem.loading import load_problem, load_problems
 from tests.systems.driving import ROOT
 
 # Requirements and coordinates of the default parameterization, then of instance 2 where there is one.

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from falsifier.signals import Interpolation
+from falsifier.core.signals import Interpolation
 
 
 class _Block(BaseModel):

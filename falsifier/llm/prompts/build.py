@@ -3,7 +3,9 @@
 import json
 from collections.abc import Sequence
 
-from falsifier.evaluation import Evaluation
+from falsifier.core.signals import even_times
+from falsifier.core.space import Candidate, InputRange, ParameterRange, nearest_value
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
@@ -25,8 +27,6 @@ from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, s
 from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View, told_unit
-from falsifier.signals import even_times
-from falsifier.space import Candidate, InputRange, ParameterRange, nearest_value
 from falsifier.stl import in_words
 
 # Control-point times that are told one by one; of more only the distance.

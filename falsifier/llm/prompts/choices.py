@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from falsifier.core.signals import Signal, even_times
+from falsifier.core.space import Candidate, InputRange
 from falsifier.llm.prompts.numbers import number, runs
 from falsifier.llm.prompts.view import View
-from falsifier.signals import Signal, even_times
-from falsifier.space import Candidate, InputRange
 
 
 def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:

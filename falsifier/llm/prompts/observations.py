@@ -7,7 +7,8 @@ from math import ceil, floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.evaluation import Evaluation
+from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import (
     change_list,
     column_decimals,
@@ -22,7 +23,6 @@ from falsifier.llm.prompts.numbers import decimals_for, number, plain, signed
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
 from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
-from falsifier.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator
 
-from falsifier.evaluation import Evaluation
+from falsifier.core.signals import even_times
+from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import column_decimals
 from falsifier.llm.prompts.numbers import decimals_for, number
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
-from falsifier.signals import even_times
-from falsifier.trajectory import Trajectory
 
 
 def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Iterator[str]:

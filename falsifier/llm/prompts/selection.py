@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.evaluation import Evaluation
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.view import View
 
 RECENT = 10

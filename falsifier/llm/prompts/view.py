@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from falsifier.model import Experiment, ModelInfo
-from falsifier.problem import Problem, Requirement
-from falsifier.space import SearchSpace
+from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.space import SearchSpace
+from falsifier.problem.problem import Problem, Requirement
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 import pytest
 
 from falsifier.errors import ChatError
-from falsifier.evaluation import evaluate
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.prompts import Prompt, View, build_prompt, trimmed, variant_named
 from falsifier.llm.prompts.trim import size
 from tests.problems import lag_problem

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from falsifier.core.signals import Signal
+from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.evaluation import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
-from falsifier.loading import load_problem
-from falsifier.problem import Problem, Requirement
-from falsifier.signals import Signal
-from falsifier.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem, Requirement
 from falsifier.stl import Verdict, parse
-from falsifier.trajectory import Trajectory
 from tests.problems import lag_problem
 
 FIRST = (100, 100, 100, 0, 0, 0, 0, 0, 0, 0)

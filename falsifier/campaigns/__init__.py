@@ -1,0 +1,32 @@
+"""Many runs: requirements x methods x seeds, resumable, on this machine or on a cluster.
+
+::
+
+    request = CampaignRequest(runs=cross(problems, methods, seeds=range(10), budget=Budget(1500)))
+    run_campaign(request, Path("runs/nightly"), jobs=4)
+
+A campaign is a directory with one run directory for each run. What is finished is read from those
+directories and from nowhere else, so a campaign that was killed goes on where they end.
+"""
+
+from falsifier.campaigns.directory import is_worked_on
+from falsifier.campaigns.plan import CampaignRequest, Method, cross, method_of, run_name
+from falsifier.campaigns.progress import Follower, Progress, RunProgress
+from falsifier.campaigns.runner import Outcome, resume_campaign, run_campaign
+from falsifier.campaigns.suites import suite
+
+__all__ = [
+    "CampaignRequest",
+    "Follower",
+    "Method",
+    "Outcome",
+    "Progress",
+    "RunProgress",
+    "cross",
+    "is_worked_on",
+    "method_of",
+    "resume_campaign",
+    "run_campaign",
+    "run_name",
+    "suite",
+]

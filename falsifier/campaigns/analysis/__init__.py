@@ -1,0 +1,33 @@
+"""Numbers of runs and campaigns, read from their directories.
+
+::
+
+    from falsifier.campaigns.analysis import load, frame, summarize
+
+    runs = load(Path("runs/nightly"))
+    frame(runs).groupby(["requirement", "method"]).simulations.mean()
+"""
+
+from falsifier.campaigns.analysis.published import Published, Score, read_published
+from falsifier.campaigns.analysis.runs import Run, columns, frame, histories, load, load_run
+from falsifier.campaigns.analysis.statistics import Statistics, group, statistics
+from falsifier.campaigns.analysis.tables import Table, ablation_table, main_table, models_table
+
+__all__ = [
+    "Published",
+    "Run",
+    "Score",
+    "Statistics",
+    "Table",
+    "ablation_table",
+    "columns",
+    "frame",
+    "group",
+    "histories",
+    "load",
+    "load_run",
+    "main_table",
+    "models_table",
+    "read_published",
+    "statistics",
+]

@@ -1,0 +1,211 @@
+"""Runs as values, and as tidy columns.
+
+A search for several requirements together is a run for each of them.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from falsifier.campaigns.directory import run_directories
+from falsifier.campaigns.plan import Method, method_of
+from falsifier.counterexamples.store import file_name
+from falsifier.errors import JournalError
+from falsifier.search.budget import Spent
+from falsifier.search.journal import read_manifest
+from falsifier.search.manifest import Manifest
+from falsifier.search.shared import shared_tally
+from falsifier.search.tally import RunStatus, read_tally
+from falsifier.stl.verdict import Verdict
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One run as its directory tells it.
+
+    Attributes:
+        directory: where it lies.
+        manifest: how it came to be.
+        method: how it searched.
+        status: how it ended, or ``running``.
+        reason: why it ended.
+        robustness: of each evaluation in order, shape (n,); NaN where the simulation gave none.
+        best: index of the smallest robustness, or None.
+        verdict: of the counterexample; without one, of the best evaluation; or None.
+        counterexample: index of the confirmed violation, or None.
+        unconfirmed: violations that were not confirmed, by index, with what was said of them.
+        trajectories: names of kept trajectory files by evaluation.
+        spent: what it used.
+    """
+
+    directory: Path
+    manifest: Manifest
+    method: Method
+    status: RunStatus
+    reason: str
+    robustness: NDArray[np.float64]
+    best: int | None
+    verdict: Verdict | None
+    counterexample: int | None
+    unconfirmed: dict[int, str]
+    trajectories: dict[int, str]
+    spent: Spent
+
+    @property
+    def requirement(self) -> str:
+        """Name of the requirement."""
+        return self.manifest.requirement["name"]
+
+    @property
+    def counterexample_file(self) -> Path:
+        """File of the counterexample, for ``falsifier replay``; it is written when it is first asked for."""
+        return self.directory / file_name(self.requirement if self.manifest.shared else "")
+
+    @property
+    def seed(self) -> int:
+        """Seed of the engine."""
+        return self.manifest.request.seed
+
+    @property
+    def falsified(self) -> bool:
+        """Whether it found a confirmed counterexample."""
+        return self.status == "falsified"
+
+    @property
+    def finished(self) -> bool:
+        """Whether it ended with a result: falsified, or its budget used up."""
+        return self.status in ("falsified", "not falsified")
+
+    @property
+    def simulations(self) -> int:
+        """Number of simulations."""
+        return self.spent.simulations
+
+    @property
+    def best_so_far(self) -> NDArray[np.float64]:
+        """Smallest robustness up to each evaluation, shape (n,); NaN before the first verdict."""
+        return np.fmin.accumulate(self.robustness)
+
+
+def load(directory: Path) -> list[Run]:
+    """Load all runs of a campaign, of a run directory, or of a folder of run directories.
+
+    Raises:
+        JournalError: when the directory is none of these, or a file in it cannot be understood.
+    """
+    described = ((path, _manifest(path)) for path in run_directories(directory))
+    return [_run(path, manifest.of(name)) for path, manifest in described for name in manifest.names]
+
+
+def load_run(directory: Path, requirement: str | None = None) -> Run:
+    """Load one run directory; trajectories are left on disk.
+
+    Args:
+        directory: of the run.
+        requirement: which one, where several were falsified together.
+
+    Raises:
+        JournalError: when a file in it cannot be understood, or a requirement must be named.
+    """
+    manifest = _manifest(directory)
+    if requirement is None and manifest.shared:
+        names = ", ".join(manifest.names)
+        raise JournalError(f"{directory}: several requirements were falsified together, name one of {names}")
+    return _run(directory, manifest.of(requirement or manifest.names[0]))
+
+
+def _manifest(directory: Path) -> Manifest:
+    try:
+        return Manifest.model_validate(read_manifest(directory))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise JournalError(f"{directory}/manifest.json: {first['loc']}: {first['msg']}") from None
+
+
+def _run(directory: Path, manifest: Manifest) -> Run:
+    tally = shared_tally(directory, manifest.requirement) if manifest.shared else read_tally(directory)
+    return Run(
+        directory,
+        manifest,
+        method_of(manifest.request),
+        tally.status,
+        tally.reason,
+        tally.robustness,
+        tally.best,
+        Verdict(**tally.verdict) if tally.verdict else None,
+        tally.counterexample,
+        tally.unconfirmed,
+        tally.trajectories,
+        tally.spent,
+    )
+
+
+def columns(runs: Iterable[Run]) -> dict[str, list[Any]]:
+    """One row a run, as plain columns of equal length."""
+    return _columns([_row(run) for run in runs])
+
+
+def histories(runs: Iterable[Run]) -> dict[str, list[Any]]:
+    """One row an evaluation: which run, its number from 1, its robustness and the smallest so far."""
+    rows = []
+    for run in runs:
+        for i, (value, best) in enumerate(zip(run.robustness, run.best_so_far, strict=True), start=1):
+            rows.append(
+                {
+                    "requirement": run.requirement,
+                    "method": run.method.label,
+                    "seed": run.seed,
+                    "simulation": i,
+                    "robustness": float(value),
+                    "best": float(best),
+                }
+            )
+    return _columns(rows)
+
+
+def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
+    """One row a run, as a pandas table.
+
+    Raises:
+        ImportError: when pandas is not installed; columns() needs nothing.
+    """
+    import pandas
+
+    return pandas.DataFrame(columns(runs))
+
+
+def _row(run: Run) -> dict[str, Any]:
+    return {
+        "requirement": run.requirement,
+        "method": run.method.label,
+        "engine": run.method.engine,
+        "model": run.method.model,
+        "effort": run.method.effort,
+        "variant": run.method.variant,
+        "parameterization": run.method.parameterization,
+        "profile": run.method.profile,
+        "seed": run.seed,
+        "status": run.status,
+        "falsified": run.falsified,
+        "simulations": run.simulations,
+        "robustness": run.verdict.robustness if run.verdict else None,
+        "critical_time": run.verdict.critical_time if run.verdict else None,
+        "simulation_seconds": run.spent.simulation_seconds,
+        "proposal_seconds": run.spent.proposal_seconds,
+        "seconds": run.spent.seconds,
+        "tokens": run.spent.tokens,
+        "cost": run.spent.cost,
+        "directory": str(run.directory),
+    }
+
+
+def _columns(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}

@@ -1,0 +1,107 @@
+"""Statistics of the competition's protocol: over the falsified runs of one method on one requirement."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import sqrt
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.campaigns.analysis.runs import Run
+from falsifier.campaigns.plan import Method
+from falsifier.campaigns.progress import total
+
+_CONFIDENCE = 0.95
+_RESAMPLES = 2000
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """What a table says of several runs.
+
+    Attributes:
+        runs: finished runs; failed and unfinished ones are in no other number here but unfinished.
+        falsified: of them, those with a confirmed counterexample.
+        unfinished: runs that failed, were interrupted or still go on.
+        mean: mean number of simulations over the falsified runs, None where there is none.
+        median: median of the same.
+        deviation: sample standard deviation of the same, None below two.
+        rate_interval: 95 % Wilson interval of the share of falsified runs, None without finished runs.
+        mean_interval: 95 % percentile bootstrap interval of the mean, None below two falsified runs.
+        best: smallest robustness of any run.
+        simulation_seconds: mean time in the simulator a run.
+        seconds: mean wall-clock time a run.
+        tokens: mean tokens a run.
+        cost: mean US dollars a run; None where unknown.
+    """
+
+    runs: int
+    falsified: int
+    unfinished: int
+    mean: float | None
+    median: float | None
+    deviation: float | None
+    rate_interval: Interval | None
+    mean_interval: Interval | None
+    best: float | None
+    simulation_seconds: float
+    seconds: float
+    tokens: float
+    cost: float | None
+
+
+def statistics(runs: Iterable[Run]) -> Statistics:
+    """Statistics of runs of one method on one requirement."""
+    runs = list(runs)
+    finished = [run for run in runs if run.finished]
+    counts = np.array([run.simulations for run in finished if run.falsified], dtype=np.float64)
+    spent = total(run.spent for run in finished)
+    share = 1 / max(len(finished), 1)
+    return Statistics(
+        runs=len(finished),
+        falsified=len(counts),
+        unfinished=len(runs) - len(finished),
+        mean=float(counts.mean()) if counts.size else None,
+        median=float(np.median(counts)) if counts.size else None,
+        deviation=float(counts.std(ddof=1)) if counts.size > 1 else None,
+        rate_interval=wilson(len(counts), len(finished)) if finished else None,
+        mean_interval=bootstrap(counts) if counts.size > 1 else None,
+        best=min((run.verdict.robustness for run in runs if run.verdict), default=None),
+        simulation_seconds=spent.simulation_seconds * share,
+        seconds=spent.seconds * share,
+        tokens=spent.tokens * share,
+        cost=None if spent.cost is None else spent.cost * share,
+    )
+
+
+def group(runs: Iterable[Run]) -> dict[tuple[str, Method], list[Run]]:
+    """Runs by requirement and method, in order of first appearance."""
+    groups: dict[tuple[str, Method], list[Run]] = {}
+    for run in runs:
+        groups.setdefault((run.requirement, run.method), []).append(run)
+    return groups
+
+
+def wilson(successes: int, trials: int, confidence: float = _CONFIDENCE) -> Interval:
+    """Score interval of a share (E. B. Wilson, 1927); it stays within [0, 1] and is not empty at 0 or 1.
+
+    >>> low, high = wilson(10, 10)
+    >>> round(low, 4), high
+    (0.7225, 1.0)
+    """
+    z = NormalDist().inv_cdf(0.5 + confidence / 2)
+    p = successes / trials
+    centre = (p + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = z / (1 + z * z / trials) * sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials))
+    low = 0.0 if successes == 0 else max(0.0, centre - half)
+    return low, 1.0 if successes == trials else min(1.0, centre + half)
+
+
+def bootstrap(values: NDArray[np.float64], confidence: float = _CONFIDENCE) -> Interval:
+    """Percentile bootstrap interval of the mean; the same values give the same interval."""
+    draws = np.random.default_rng(0).choice(values, size=(_RESAMPLES, len(values)))
+    tail = 50 * (1 - confidence)
+    low, high = np.percentile(draws.mean(axis=1), [tail, 100 - tail])
+    return float(low), float(high)

@@ -1,0 +1,243 @@
+"""The protocol's tables, as values that any face can print."""
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from io import StringIO
+from typing import Any
+
+from falsifier.campaigns.analysis.published import COLUMNS, Published, Score, rank
+from falsifier.campaigns.analysis.runs import Run
+from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
+from falsifier.campaigns.plan import Method
+
+NONE = "–"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of texts.
+
+    Attributes:
+        title: what it shows.
+        header: names of the columns.
+        rows: cells.
+        notes: what a reader must know to read it right.
+    """
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def only(self, *names: str) -> "Table":
+        """Return the same table with these columns alone, in this order.
+
+        Raises:
+            ValueError: for a name that is no column.
+        """
+        picked = [self.header.index(name) for name in names]
+        return replace(self, header=names, rows=tuple(tuple(row[i] for i in picked) for row in self.rows))
+
+    def markdown(self) -> str:
+        """As a Markdown table with its title and notes."""
+        lines = [self.header, tuple("---" for _ in self.header), *self.rows]
+        body = "\n".join(
+            f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines
+        )
+        notes = "".join(f"\n\n{note}" for note in self.notes)
+        return f"**{self.title}**\n\n{body}{notes}\n"
+
+    def _repr_markdown_(self) -> str:
+        return self.markdown()
+
+    def csv(self) -> str:
+        """As comma-separated values."""
+        buffer = StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(self.header)
+        writer.writerows(self.rows)
+        return buffer.getvalue()
+
+    def text(self) -> str:
+        """As plain text with aligned columns."""
+        rows = [self.header, *self.rows]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(self.header))]
+        lines = [
+            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
+        ]
+        lines.insert(1, "  ".join("-" * w for w in widths))
+        return "\n".join([self.title, "", *lines, *(["", *self.notes] if self.notes else [])])
+
+
+def main_table(runs: Iterable[Run], published: Published) -> Table:
+    """One row for each requirement and method, beside the published numbers.
+
+    Published numbers hold for the specs' own (fixed) parameterization of instance 1 and stand beside no
+    other.
+    """
+    rows, notes = [], set[str]()
+    names = dict(COLUMNS)
+    for (requirement, method), members in group(runs).items():
+        found = statistics(members)
+        others = published.scores(requirement) if comparable(method) else {}
+        place = rank(score(found), others.values()) if others else None
+        rows.append(
+            (
+                requirement,
+                method.label,
+                _rate(found),
+                *_numbers(found),
+                _place(place),
+                *(_cell(others.get(name)) for name in names),
+            )
+        )
+        notes |= {_unfinished_note()} if found.unfinished else set()
+        notes |= set(_sources(published)) if others else set()
+    header = ("requirement", "method", "FR", *_NUMBERS, "rank", *names.values())
+    return Table("Falsification", header, tuple(rows), (_LEGEND, *sorted(notes)))
+
+
+def ablation_table(runs: Iterable[Run], published: Published) -> Table:
+    """Prompt variants side by side, each with the published column of its name."""
+    ours = _by_column(runs, lambda m: f"{m.variant} ({_without(m, variant='')})" if m.variant else "")
+    theirs = {f"{name} published": scores for name, scores in published.ablation.items()}
+    return _side_by_side("Prompt variants: FR / S", ours, theirs)
+
+
+def models_table(runs: Iterable[Run], published: Published) -> Table:
+    """Language models side by side, with the published columns."""
+    ours = _by_column(runs, lambda m: m.label if m.model else "")
+    theirs = {f"{name} published": scores for name, scores in published.models.items()}
+    return _side_by_side("Language models: FR / S", ours, theirs)
+
+
+TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
+    "main": main_table,
+    "ablation": ablation_table,
+    "models": models_table,
+}
+
+
+def statistics_json(runs: Iterable[Run]) -> str:
+    """All statistics for machines: a list of objects, one for each requirement and method."""
+    return json.dumps([_json_row(key, members) for key, members in group(runs).items()], indent=2) + "\n"
+
+
+def comparable(method: Method) -> bool:
+    """Whether published numbers may stand beside this method's."""
+    return method.parameterization == "fixed" and not method.profile and not method.together
+
+
+def score(found: Statistics) -> Score:
+    """FR and S of statistics."""
+    return Score(found.falsified, found.runs, found.mean)
+
+
+_NUMBERS = (
+    "FR 95 %",
+    "mean S",
+    "mean 95 %",
+    "median S",
+    "std S",
+    "best robustness",
+    "sim. s",
+    "total s",
+    "tokens",
+    "cost $",
+)
+_LEGEND = (
+    "FR: falsified of finished runs. S: simulations over the falsified runs; std is the sample standard "
+    "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
+    "means a run. Rank: place among the published columns here, more falsified runs first, then the lower "
+    "mean S; equal ones share a rank. Published cells: FR / S."
+)
+
+
+def _unfinished_note() -> str:
+    return "+n: further runs that failed or have not ended; they are in no other number."
+
+
+def _numbers(s: Statistics) -> tuple[str, ...]:
+    return (
+        _interval(s.rate_interval, 2),
+        _number(s.mean, 1),
+        _interval(s.mean_interval, 1),
+        _number(s.median, 1),
+        _number(s.deviation, 1),
+        NONE if s.best is None else f"{s.best:.4g}",
+        _number(s.simulation_seconds, 2),
+        _number(s.seconds, 2),
+        _number(s.tokens, 0),
+        "unknown" if s.cost is None else _number(s.cost, 4),
+    )
+
+
+def _rate(s: Statistics) -> str:
+    return f"{s.falsified}/{s.runs}" + (f" +{s.unfinished}" if s.unfinished else "")
+
+
+def _number(value: float | None, decimals: int) -> str:
+    return NONE if value is None else f"{value:.{decimals}f}"
+
+
+def _interval(interval: Interval | None, decimals: int) -> str:
+    return NONE if interval is None else f"{interval[0]:.{decimals}f}..{interval[1]:.{decimals}f}"
+
+
+def _place(place: int | None) -> str:
+    return NONE if place is None else str(place)
+
+
+def _cell(cell: Score | None) -> str:
+    if cell is None:
+        return ""
+    tool = f"{cell.tool} " if cell.tool else ""
+    return f"{tool}{cell.falsified} / {_number(cell.mean, 1)}"
+
+
+def _sources(published: Published) -> tuple[str, ...]:
+    return tuple(f"{COLUMNS[name]}: {source}." for name, source in published.sources.items() if source)
+
+
+def _by_column(runs: Iterable[Run], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
+    """Scores by requirement, by column; methods without a name are left out."""
+    found: dict[str, dict[str, Score]] = {}
+    for (requirement, method), members in group(runs).items():
+        if name(method):
+            found.setdefault(name(method), {})[requirement] = score(statistics(members))
+    return found
+
+
+def _without(method: Method, *, variant: str) -> str:
+    return replace(method, variant=variant).label
+
+
+def _side_by_side(
+    title: str, ours: Mapping[str, Mapping[str, Score]], theirs: Mapping[str, Mapping[str, Score]]
+) -> Table:
+    requirements = list(dict.fromkeys(r for column in ours.values() for r in column))
+    every: dict[str, Mapping[str, Score]] = {**ours, **theirs}
+    rows: Sequence[tuple[str, ...]] = [
+        (requirement, *(_share_cell(column.get(requirement)) for column in every.values()))
+        for requirement in requirements
+    ]
+    return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))
+
+
+_LEGEND_SIDE = "FR / S: falsified of finished runs / mean simulations over the falsified runs."
+
+
+def _share_cell(cell: Score | None) -> str:
+    return NONE if cell is None else f"{cell.falsified}/{cell.runs} / {_number(cell.mean, 1)}"
+
+
+def _json_row(key: tuple[str, Method], members: list[Run]) -> dict[str, Any]:
+    requirement, method = key
+    return {
+        "requirement": requirement,
+        "label": method.label,
+        **asdict(method),
+        **asdict(statistics(members)),
+    }

@@ -1,0 +1,302 @@
+"""The competition's validation format: counterexamples as rows of a CSV file, and their re-simulation.
+
+Columns and rules are those of the ARCH-COMP falsification category, as its participants' exporters write
+them and FalStar's validator (``Validation.scala``) reads them: ``input`` is the matrix
+``[t0 u1 u2; t1 u1 u2; ...]``, ``parameters`` the vector ``[p1 p2 ...]``. An input that is given every second
+or less often is piecewise constant; a denser one is used as it is. A violation that does not happen again
+still counts where it misses by no more than the requirement's tolerance.
+"""
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.campaigns.analysis import Run, load
+from falsifier.campaigns.suites import bundled_target
+from falsifier.core.signals import Signal
+from falsifier.core.space import Candidate
+from falsifier.errors import FalsifierError, SpecError
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.problem.spec import ModelChanges
+from falsifier.search.tally import read_candidate
+
+Matrix = NDArray[np.float64]
+Finder = Callable[[str, str, float | None], Problem]
+
+COLUMNS = (
+    "system",
+    "property",
+    "instance",
+    "input",
+    "parameters",
+    "falsified",
+    "simulations",
+    "simulation time",
+    "total time",
+    "robustness",
+    "stop time",
+)
+BUDGET = 1500
+_PROFILES = {"1": None, "2": "instance2"}
+# Their names of our requirements: (system, property).
+_NAMES = {
+    "NN": ("NN", "(NN 0.005 0.03)"),
+    "NNb": ("NN", "(NN 0.005 0.04)"),
+    "NNx": ("NN", "NNx"),
+    "F16": ("F16", "F16a"),
+    "SC": ("SC", "SCa"),
+}
+# By how much a robustness may miss 0 in a re-simulation and the counterexample still counts.
+_TOLERANCES = (
+    (r"AT1", 1.2),
+    (r"AT2", 10.0),
+    (r"AT6.*", 1.0),
+    (r"NN.*", 0.1),
+    (r"CC.*", 1.0),
+    (r"SC", 0.05),
+)
+# Seconds: from this step on an input is piecewise constant; closer samples are used as they are.
+_COARSE = 1.0
+_DENSE_STEP = 0.05
+# Share of a range by which a printed value may leave it.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One run of a validation file.
+
+    Attributes:
+        number: of the row, from 1.
+        requirement: our name of the property.
+        instance: ``1`` or ``2``.
+        input: times in s in the first column, then one column an input, shape (n, 1 + inputs).
+        parameters: in the order of the problem.
+        falsified: what the tool says.
+        simulations: how many it took.
+        robustness: what the tool says, where it does.
+        stop_time: end of the simulation in s, where given.
+    """
+
+    number: int
+    requirement: str
+    instance: str
+    input: Matrix
+    parameters: tuple[float, ...]
+    falsified: bool
+    simulations: int
+    robustness: float | None
+    stop_time: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What became of one claimed counterexample.
+
+    Attributes:
+        row: the claim.
+        holds: whether it counts.
+        robustness: of the re-simulation, None where there was none.
+        reason: in words.
+    """
+
+    row: Row
+    holds: bool
+    robustness: float | None
+    reason: str
+
+
+def export(directory: Path) -> str:
+    """All runs of a campaign, or the one of a run directory, in the validation format.
+
+    Raises:
+        JournalError: when the directory is neither, or is damaged.
+    """
+    buffer = StringIO()
+    writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_exported(run) for run in load(directory) if run.finished)
+    return buffer.getvalue()
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Read a validation file; further columns are ignored.
+
+    Raises:
+        SpecError: naming the row and the column that cannot be understood.
+    """
+    csv.field_size_limit(10**9)  # a dense input is longer than the csv module's default allows
+    with path.open(newline="", encoding="utf-8") as file:
+        return [_row(number, cells, path) for number, cells in enumerate(csv.DictReader(file), start=1)]
+
+
+def validate(rows: Iterable[Row], *, budget: int = BUDGET, find: Finder | None = None) -> list[Finding]:
+    """Re-simulate all claimed counterexamples.
+
+    Args:
+        rows: of a file.
+        budget: more simulations than that make a claim invalid.
+        find: problem of a requirement, an instance and a stop time; None: the bundled ones.
+    """
+    return [_checked(row, budget, find or bundled_problem) for row in rows if row.falsified]
+
+
+def bundled_problem(requirement: str, instance: str, stop_time: float | None) -> Problem:
+    """Bundled problem of a row.
+
+    Raises:
+        SpecError: when there is none of that name, or the stop time is too short for the requirement.
+    """
+    changes = None if stop_time is None else ModelChanges(stop_time=stop_time)
+    return load_problem(bundled_target(requirement), profile=_PROFILES[instance], changes=changes)
+
+
+def tolerance(requirement: str) -> float:
+    """By how much a re-simulated robustness may be positive; 0 for AT5x, F16 and unknown requirements."""
+    return next((value for name, value in _TOLERANCES if re.fullmatch(name, requirement)), 0.0)
+
+
+def _exported(run: Run) -> dict[str, object]:
+    system, property_ = _NAMES.get(run.requirement, (run.manifest.model.rpartition(".")[2], run.requirement))
+    row: dict[str, object] = {
+        "system": system,
+        "property": property_,
+        "instance": next((i for i, p in _PROFILES.items() if p == (run.method.profile or None)), "1"),
+        "input": "[]",
+        "parameters": "[]",
+        "falsified": "yes" if run.falsified else "no",
+        "simulations": run.simulations,
+        "simulation time": f"{run.spent.simulation_seconds:.6g}",
+        "total time": f"{run.spent.seconds:.6g}",
+        "robustness": repr(run.verdict.robustness) if run.verdict else "",
+        "stop time": f"{run.manifest.stop_time:.10g}",
+    }
+    if run.counterexample is not None:
+        candidate = Candidate.from_json(read_candidate(run.directory, run.counterexample))
+        signals = {r.name: candidate.signals[r.name] for r in run.manifest.inputs}
+        row["input"] = _matrix_text(_sampled(signals, run.manifest.stop_time))
+        values = (candidate.parameters[p.name] for p in run.manifest.parameters)
+        row["parameters"] = f"[{' '.join(repr(v) for v in values)}]"
+    return row
+
+
+def _sampled(signals: Mapping[str, Signal], stop_time: float) -> Matrix:
+    """Control points of signals that are constant for a second and longer, else dense samples."""
+    if not signals:
+        return np.empty((0, 1))
+    times = np.unique([t for signal in signals.values() for t in signal.times])
+    coarse = all(s.interpolation == "constant" and s.hold is None for s in signals.values())
+    if not coarse or (len(times) > 1 and np.diff(times).min() < _COARSE):
+        holds = [s.hold for s in signals.values() if s.hold is not None]
+        step = min([_DENSE_STEP, *holds])
+        times = np.linspace(0.0, stop_time, round(stop_time / step) + 1)
+    return np.column_stack([times, *(signal.sample(times) for signal in signals.values())])
+
+
+def _matrix_text(matrix: Matrix) -> str:
+    return f"[{'; '.join(' '.join(f'{v:.12g}' for v in row) for row in matrix)}]"
+
+
+def _row(number: int, cells: Mapping[str, str], path: Path) -> Row:
+    def cell(name: str) -> str:
+        return (cells.get(name) or "").strip()
+
+    try:
+        instance = cell("instance") or "1"
+        if instance not in _PROFILES:
+            raise ValueError(f"instance {instance!r}: expected 1 or 2")
+        return Row(
+            number,
+            _our_name(cell("property")),
+            instance,
+            _matrix(cell("input")),
+            tuple(_matrix(cell("parameters")).ravel().tolist()),
+            cell("falsified").lower() in ("yes", "true", "1"),
+            int(float(cell("simulations"))),
+            float(cell("robustness")) if cell("robustness") else None,
+            float(cell("stop time")) if cell("stop time") else None,
+        )
+    except ValueError as error:
+        raise SpecError(f"row {number}: {error}", file=str(path)) from None
+
+
+def _our_name(property_: str) -> str:
+    known = {theirs.replace(" ", ""): ours for ours, (_, theirs) in _NAMES.items()}
+    return known.get(property_.replace(" ", ""), property_)
+
+
+def _matrix(text: str) -> Matrix:
+    """Matrix of MATLAB text; empty text is an empty matrix.
+
+    Raises:
+        ValueError: for anything that is not a number, and rows of unequal length.
+    """
+    rows = [re.split(r"[\s,]+", row.strip()) for row in text.strip("[] \t\n").split(";") if row.strip()]
+    numbers = [[float(v) for v in row] for row in rows]
+    return np.array(numbers, dtype=np.float64) if rows else np.empty((0, 0))
+
+
+def _checked(row: Row, budget: int, find: Finder) -> Finding:
+    if row.simulations > budget:
+        return Finding(
+            row, holds=False, robustness=None, reason=f"{row.simulations} simulations, over {budget}"
+        )
+    try:
+        problem = find(row.requirement, row.instance, row.stop_time)
+        candidate = _candidate(row, problem)
+    except (FalsifierError, ValueError) as error:
+        return Finding(row, holds=False, robustness=None, reason=str(error))
+    evaluation = evaluate(problem, candidate)
+    robustness = evaluation.robustness
+    if robustness is None:
+        return Finding(row, holds=False, robustness=None, reason=f"cannot be simulated: {evaluation.reason}")
+    if robustness < 0:
+        return Finding(row, holds=True, robustness=robustness, reason="violates again")
+    allowed = tolerance(row.requirement)
+    if robustness < allowed:
+        return Finding(row, holds=True, robustness=robustness, reason=f"within the tolerance of {allowed:g}")
+    return Finding(row, holds=False, robustness=robustness, reason="does not violate")
+
+
+def _candidate(row: Row, problem: Problem) -> Candidate:
+    """Candidate of a row, within the problem's ranges.
+
+    Raises:
+        ValueError: naming what has the wrong number or leaves its range.
+    """
+    inputs, parameters = problem.space.inputs, problem.space.parameters
+    columns = max(row.input.shape[1] - 1, 0) if len(row.input) else 0
+    if columns != len(inputs) or len(row.parameters) != len(parameters):
+        raise ValueError(
+            f"{columns} inputs and {len(row.parameters)} parameters; "
+            f"expected {len(inputs)} and {len(parameters)}"
+        )
+    signals = {}
+    for i, r in enumerate(inputs, start=1):
+        _check_range(f"input {r.name!r}", row.input[:, i], r.low, r.high)
+        signals[r.name] = _signal(row.input[:, 0], row.input[:, i], r.hold)
+    for p, value in zip(parameters, row.parameters, strict=True):
+        _check_range(f"parameter {p.name!r}", np.array([value]), p.low, p.high)
+    values = {p.name: v for p, v in zip(parameters, row.parameters, strict=True)}
+    return Candidate(signals, values, origin="validation")
+
+
+def _signal(times: Matrix, values: Matrix, hold: float | None) -> Signal:
+    coarse = len(times) == 1 or float(np.diff(times).min()) >= _COARSE
+    points = tuple(times.tolist()), tuple(values.tolist())
+    return Signal(*points, "constant") if coarse else Signal(*points, "linear", hold)
+
+
+def _check_range(what: str, values: Matrix, low: float, high: float) -> None:
+    margin = _ROUNDING * (high - low)
+    outside = (values < low - margin) | (values > high + margin)
+    if outside.any():
+        raise ValueError(f"{what}: {values[outside][0]:g} is outside its range [{low:g}, {high:g}]")

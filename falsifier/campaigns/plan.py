@@ -1,0 +1,162 @@
+"""What a campaign runs, as values: methods, requests and names."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from hashlib import sha256
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from falsifier.engines import DEFAULT_ENGINE
+from falsifier.errors import SpecError
+from falsifier.search.budget import Budget
+from falsifier.search.request import ModelRequest, ProblemRequest, RunRequest
+
+_HASH_DIGITS = 10
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Method:
+    """How runs search: what a table has one column or block of rows for.
+
+    Runs that differ in any of these are never counted together.
+
+    Attributes:
+        engine: name of the engine; empty when a language model leads the search.
+        model: name of the language model, or empty.
+        effort: its reasoning effort, or empty.
+        variant: its prompt variant, or empty.
+        parameterization: ``free`` or ``fixed``.
+        profile: of the specs, or empty.
+        anonymous: whether the model is told neutral names only.
+        fallback: engine that goes on when the model gives up, or empty.
+        together: whether several requirements took turns in one search.
+    """
+
+    engine: str = ""
+    model: str = ""
+    effort: str = ""
+    variant: str = ""
+    parameterization: str = "fixed"
+    profile: str = ""
+    anonymous: bool = False
+    fallback: str = ""
+    together: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name for people, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
+        model = " ".join(p for p in (self.model.rpartition("/")[2], self.effort, self.variant) if p)
+        name = " + ".join(p for p in (self.engine, model) if p) or DEFAULT_ENGINE
+        apart = {
+            self.parameterization: self.parameterization != "fixed",
+            self.profile: bool(self.profile),
+            "neutral names": self.anonymous,
+            f"then {self.fallback}": bool(self.fallback),
+            "shared search": self.together,
+        }
+        return ", ".join([name, *(text for text, said in apart.items() if said)])
+
+
+class CampaignRequest(BaseModel):
+    """What a campaign runs and may spend.
+
+    Attributes:
+        runs: every run.
+        limits: what all runs together may spend; None: no limit beside the runs' own.
+        calls: most runs with a language model at a time, on all workers together. A run asks one question
+            at a time, so this limits the provider's concurrent requests too.
+        suite: name of the suite that the runs come from, or None.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    runs: tuple[RunRequest, ...] = Field(min_length=1)
+    limits: Budget | None = None
+    calls: int = Field(default=8, ge=1)
+    suite: str | None = None
+
+    def named(self) -> dict[str, RunRequest]:
+        """Runs by the name of their directory, in order.
+
+        Raises:
+            SpecError: when one run is asked for twice.
+        """
+        runs = {run_name(request): request for request in self.runs}
+        if len(runs) < len(self.runs):
+            raise SpecError(
+                "this campaign asks for the same run twice: give each requirement and engine once"
+            )
+        return runs
+
+
+def cross(
+    problems: Iterable[ProblemRequest],
+    methods: Iterable[Method],
+    *,
+    seeds: Iterable[int],
+    budget: Budget,
+    asking: ModelRequest | None = None,
+) -> tuple[RunRequest, ...]:
+    """All runs of problems x methods x seeds, in this order.
+
+    Args:
+        problems: what is searched; the method decides their parameterization and profile.
+        methods: how.
+        seeds: of the engines.
+        budget: of each run.
+        asking: address, options, price and cache of language models; the method decides the rest.
+    """
+    seeds, methods = tuple(seeds), tuple(methods)
+    return tuple(
+        RunRequest(
+            problem=problem.model_copy(
+                update={"parameterization": method.parameterization, "profile": method.profile or None}
+            ),
+            engine=method.engine or None,
+            model=_model_request(method, asking),
+            seed=seed,
+            budget=budget,
+            keep="best",
+        )
+        for problem in problems
+        for method in methods
+        for seed in seeds
+    )
+
+
+def method_of(request: RunRequest) -> Method:
+    """Method of a run."""
+    problem, model = request.problem, request.model or ModelRequest(name="")
+    return Method(
+        engine=request.engine or ("" if request.model else DEFAULT_ENGINE),
+        model=model.name,
+        effort=model.effort or "",
+        variant=model.variant or "",
+        parameterization=problem.parameterization,
+        profile=problem.profile or "",
+        anonymous=model.anonymous,
+        fallback=model.fallback or "",
+        together=len(request.together) > 1,
+    )
+
+
+def run_name(request: RunRequest) -> str:
+    """Name of a run's directory: readable, and different for every difference in the request."""
+    requirement = re.split(r"[:/]", request.problem.target)[-1]
+    digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
+    readable = f"{requirement}-{method_of(request).label}-{request.seed}"
+    return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable).strip('-.')}-{digest}"
+
+
+def _model_request(method: Method, asking: ModelRequest | None) -> ModelRequest | None:
+    if not method.model:
+        return None
+    decided = {
+        "name": method.model,
+        "effort": method.effort or None,
+        "variant": method.variant or None,
+        "anonymous": method.anonymous,
+        "fallback": method.fallback or None,
+    }
+    return ModelRequest.model_validate((asking.model_dump() if asking else {}) | decided)

@@ -1,0 +1,158 @@
+"""How far a campaign is, read from its directory: the same for who runs it and for who watches it."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import reduce
+from pathlib import Path
+
+from falsifier.campaigns.directory import read_campaign, run_directory
+from falsifier.campaigns.plan import Method, method_of
+from falsifier.search.budget import Spent
+from falsifier.search.request import RunRequest
+from falsifier.search.tally import FINISHED, RunStatus, Tally
+
+
+@dataclass(frozen=True, slots=True)
+class RunProgress:
+    """How far one run is.
+
+    Attributes:
+        name: of its directory.
+        requirement: as asked for.
+        method: how it searches.
+        seed: of its engine.
+        status: ``waiting``, ``running`` or how it ended.
+        reason: why it ended.
+        best: smallest robustness so far, or None.
+        spent: what it has used so far.
+    """
+
+    name: str
+    requirement: str
+    method: Method
+    seed: int
+    status: RunStatus
+    reason: str
+    best: float | None
+    spent: Spent
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing is left to do for it; failed and interrupted runs are not finished."""
+        return self.status in FINISHED
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a campaign is.
+
+    Attributes:
+        runs: every run in the campaign's order.
+    """
+
+    runs: tuple[RunProgress, ...]
+
+    @property
+    def counts(self) -> Mapping[RunStatus, int]:
+        """Number of runs by status."""
+        return Counter(run.status for run in self.runs)
+
+    @property
+    def finished(self) -> int:
+        """Number of finished runs."""
+        return sum(run.finished for run in self.runs)
+
+    @property
+    def spent(self) -> Spent:
+        """What all runs together have used; the cost is None where any is unknown."""
+        return total(run.spent for run in self.runs)
+
+    def by_requirement(self) -> dict[str, "Progress"]:
+        """Progress of each requirement."""
+        groups: dict[str, list[RunProgress]] = {}
+        for run in self.runs:
+            groups.setdefault(run.requirement, []).append(run)
+        return {name: Progress(tuple(runs)) for name, runs in groups.items()}
+
+    @property
+    def best(self) -> float | None:
+        """Smallest robustness of any run."""
+        return min((run.best for run in self.runs if run.best is not None), default=None)
+
+
+@dataclass(slots=True)
+class _Followed:
+    """A run's journal and how much of it was read."""
+
+    name: str
+    request: RunRequest
+    path: Path
+    tally: Tally = field(default_factory=Tally)
+    offset: int = 0
+
+    def read(self) -> None:
+        if not self.path.exists():
+            return
+        size = self.path.stat().st_size
+        if size < self.offset:  # a torn line was dropped, or the directory was replaced: begin again
+            self.tally, self.offset = Tally(), 0
+        if size == self.offset:
+            return
+        with self.path.open("rb") as file:
+            file.seek(self.offset)
+            for line in file:
+                if not line.endswith(b"\n"):
+                    break
+                self.tally.feed(line, f"{self.path}: the line at byte {self.offset}")
+                self.offset += len(line)
+
+    def progress(self) -> RunProgress:
+        tally = self.tally
+        return RunProgress(
+            self.name,
+            self.request.problem.target.rpartition(":")[2],
+            method_of(self.request),
+            self.request.seed,
+            tally.status,
+            tally.reason,
+            tally.best_robustness,
+            tally.spent,
+        )
+
+
+class Follower:
+    """Reads what was written to a campaign's directory since the last look.
+
+    Raises:
+        JournalError: when the directory is not a campaign's.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        runs = read_campaign(directory).runs
+        self._runs = [_Followed(n, r, run_directory(directory, n) / "journal.jsonl") for n, r in runs.items()]
+
+    def look(self) -> Progress:
+        """How far the campaign is now."""
+        for run in self._runs:
+            run.read()
+        return Progress(tuple(run.progress() for run in self._runs))
+
+
+def total(spent: Iterable[Spent]) -> Spent:
+    """Sum of what several runs have used."""
+    return reduce(_plus, spent, Spent())
+
+
+def _plus(a: Spent, b: Spent) -> Spent:
+    return Spent(
+        a.simulations + b.simulations,
+        a.seconds + b.seconds,
+        a.simulation_seconds + b.simulation_seconds,
+        a.proposal_seconds + b.proposal_seconds,
+        a.calls + b.calls,
+        a.prompt_tokens + b.prompt_tokens,
+        a.completion_tokens + b.completion_tokens,
+        a.reasoning_tokens + b.reasoning_tokens,
+        None if a.cost is None or b.cost is None else a.cost + b.cost,
+    )

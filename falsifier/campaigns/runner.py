@@ -1,0 +1,246 @@
+"""Run a campaign, or go on with one."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from time import perf_counter
+
+from falsifier.campaigns.directory import (
+    STOP,
+    CampaignRecord,
+    campaign_mark,
+    is_campaign,
+    locked,
+    read_campaign,
+    run_directory,
+    write_campaign,
+)
+from falsifier.campaigns.plan import CampaignRequest
+from falsifier.campaigns.progress import Follower, Progress
+from falsifier.campaigns.schedule import Schedule
+from falsifier.campaigns.work import Done, Task, unpack
+from falsifier.counterexamples.found import keep_counterexample
+from falsifier.errors import JournalError, SpecError
+from falsifier.evaluation.workers import Workers, open_workers
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.search.journal import EndedRecord, open_journal, write_manifest
+from falsifier.search.manifest import check_unchanged, environment, file_hashes, manifest
+from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.search.tally import read_tally
+from falsifier.search.wiring import check_names
+
+Listener = Callable[[Progress], None]
+
+# A worker that died leaves its lock to the operating system, which takes a moment; seconds.
+_PATIENCE = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How work on a campaign ended.
+
+    Attributes:
+        progress: of all runs.
+        reason: why it stopped before all runs were finished; empty where it did not.
+    """
+
+    progress: Progress
+    reason: str
+
+
+def run_campaign(
+    request: CampaignRequest,
+    directory: Path,
+    *,
+    jobs: int = 1,
+    executor: str | None = None,
+    listeners: Iterable[Listener] = (),
+) -> Outcome:
+    """Start a campaign.
+
+    Args:
+        request: what to run and what it may spend.
+        directory: where everything is kept.
+        jobs: processes on this machine, one run each at a time.
+        executor: ``dask:tcp://HOST:PORT`` to use a cluster instead.
+        listeners: called several times a second with how far the campaign is.
+
+    Raises:
+        JournalError: when the directory is in use or holds a campaign already.
+        SpecError: when a problem, an engine or the executor is not what it should be.
+        ChatError: for an unknown provider or a missing key.
+        ModelError: when an FMU cannot be used, or the cluster not be reached.
+    """
+    _check(request.named().values(), local=executor is None)
+    with locked(directory):
+        if is_campaign(directory):
+            raise JournalError(
+                f"{directory} already holds a campaign: choose another --out, or continue it with "
+                f"'falsifier resume {directory}'"
+            )
+        problems = _load(request.named().values())
+        record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
+        write_campaign(directory, record)
+        with open_workers(jobs, executor) as workers:
+            return _work(directory, record, problems, workers, tuple(listeners))
+
+
+def resume_campaign(
+    directory: Path,
+    *,
+    jobs: int = 1,
+    executor: str | None = None,
+    limits: Budget | None = None,
+    listeners: Iterable[Listener] = (),
+) -> Outcome:
+    """Go on with a campaign: finished runs stay as they are, others continue where their journals end.
+
+    Args:
+        directory: of the campaign.
+        jobs: see run_campaign.
+        executor: see run_campaign.
+        limits: what all runs together may spend, instead of what was said when it was started.
+        listeners: see run_campaign.
+
+    Raises:
+        JournalError: when the directory is in use, holds no campaign, or an FMU or spec has changed since.
+        SpecError: see run_campaign.
+        ModelError: see run_campaign.
+    """
+    with locked(directory):
+        record = read_campaign(directory)
+        problems = _load(record.runs.values())
+        check_unchanged(directory, record.hashes, _hashes(problems))
+        if limits is not None:
+            record = record.model_copy(
+                update={"request": record.request.model_copy(update={"limits": limits})}
+            )
+        with open_workers(jobs, executor) as workers:
+            return _work(directory, record, problems, workers, tuple(listeners))
+
+
+def _work(
+    directory: Path,
+    record: CampaignRecord,
+    problems: Mapping[ProblemRequest, Problem],
+    workers: Workers,
+    listeners: tuple[Listener, ...],
+) -> Outcome:
+    stop = directory / STOP
+    stop.unlink(missing_ok=True)
+    watch = _Watch(directory, record.request.limits, listeners)
+    runs = watch.follower.look().runs
+    unfinished = [run.name for run in runs if not run.finished]
+    for run in runs:  # the file of a run that ended at the very moment of a kill is missing
+        if run.status == "falsified":
+            keep_counterexample(run_directory(directory, run.name))
+    mark = campaign_mark(directory)
+    tasks = []
+    for name in unfinished:
+        request = record.runs[name]
+        problem = problems[request.problem]
+        tasks.append(Task(name, request, problem, manifest(request, problem), directory.absolute(), mark))
+
+    def report(task: Task, done: Done) -> None:
+        place = run_directory(directory, task.name)
+        if done.packed is not None:
+            unpack(done.packed, place)
+        elif done.status == "failed":
+            _record_failure(place, task, done.reason)
+        keep_counterexample(place)
+
+    schedule = Schedule(tasks, workers, calls=record.request.calls)
+    try:
+        schedule.run(report, watch.tick)
+    except KeyboardInterrupt:
+        watch.stop("stopped by the user")
+        schedule.run(report, lambda: False)
+    progress = watch.follower.look()
+    for listener in listeners:
+        listener(progress)
+    stop.unlink(missing_ok=True)
+    if watch.error is not None:
+        raise watch.error
+    return Outcome(progress, watch.reason)
+
+
+class _Watch:
+    """Looks at a campaign while it runs, tells the listeners, and stops it at its limits."""
+
+    def __init__(self, directory: Path, limits: Budget | None, listeners: tuple[Listener, ...]) -> None:
+        self.follower = Follower(directory)
+        self.reason = ""
+        self.error: SpecError | None = None
+        self._stop = directory / STOP
+        self._limits = limits
+        self._listeners = listeners
+        self._started = perf_counter()
+
+    def tick(self) -> bool:
+        """Whether the campaign may go on."""
+        progress = self.follower.look()
+        for listener in self._listeners:
+            listener(progress)
+        if self._limits is not None and not self.reason:
+            spent = replace(progress.spent, seconds=perf_counter() - self._started)
+            try:
+                reached = self._limits.exceeded(spent)
+            except SpecError as error:
+                self.error, reached = error, str(error)
+            if reached is not None:
+                self.stop(reached)
+        return not self.reason
+
+    def stop(self, reason: str) -> None:
+        """Tell all runs to stop where they are."""
+        self.reason = reason
+        self._stop.write_text(f"{reason}\n", encoding="utf-8")
+
+
+def _check(requests: Iterable[RunRequest], *, local: bool) -> None:
+    """Refuse names that nobody knows and missing keys before anything is loaded or written.
+
+    Keys are looked for only where the runs are done on this machine: a cluster's workers have their own.
+    """
+    requests = tuple(requests)
+    for request in requests:
+        check_names(request)
+    if local:
+        from falsifier.llm.connect import preflight
+
+        for name, api_base in {(r.model.name, r.model.api_base) for r in requests if r.model is not None}:
+            preflight(name, api_base=api_base)
+
+
+def _load(requests: Iterable[RunRequest]) -> dict[ProblemRequest, Problem]:
+    """Load each problem once.
+
+    Raises:
+        SpecError: when two targets have a requirement of the same name, which no table could tell apart.
+    """
+    problems: dict[ProblemRequest, Problem] = {}
+    targets: dict[str, str] = {}
+    for request in dict.fromkeys(r.problem for r in requests):
+        problem = problems[request] = request.load()
+        other = targets.setdefault(problem.name, request.target)
+        if other != request.target:
+            raise SpecError(
+                f"{other} and {request.target} are both called {problem.name!r}: give one another name"
+            )
+    return problems
+
+
+def _hashes(problems: Mapping[ProblemRequest, Problem]) -> dict[str, str]:
+    return {path: digest for p in problems.values() for path, digest in file_hashes(p).items()}
+
+
+def _record_failure(directory: Path, task: Task, reason: str) -> None:
+    """Write into a run's journal how it failed, where its worker could not do so itself."""
+    tally = read_tally(directory)
+    if tally.status not in ("waiting", "running"):
+        return
+    with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
+        if not (directory / "manifest.json").exists():
+            write_manifest(directory, task.manifest.model_dump(mode="json"))
+        journal.write(EndedRecord(status="failed", reason=reason, spent=asdict(tally.spent)), at_once=True)

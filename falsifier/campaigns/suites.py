@@ -1,0 +1,40 @@
+"""Suites: well-known lists of requirements."""
+
+import tomllib
+
+from falsifier.errors import SpecError, did_you_mean
+from falsifier.problem.loading import bundled, find_spec
+from falsifier.problem.spec import read_spec
+from falsifier.search.request import ProblemRequest
+
+SUITES = ("arch-comp",)
+
+
+def suite(name: str, *, profile: str | None = None) -> tuple[ProblemRequest, ...]:
+    """Requirements of a suite.
+
+    Args:
+        name: ``arch-comp``: the requirements that ``published.toml`` has numbers of, in its order.
+        profile: leave out the requirements whose spec does not offer this profile.
+
+    Raises:
+        SpecError: for an unknown name.
+    """
+    if name not in SUITES:
+        raise SpecError(f"unknown suite {name!r}; {did_you_mean(name, SUITES)}")
+    published = tomllib.loads((bundled("specs") / "published.toml").read_text(encoding="utf-8"))
+    targets = [bundled_target(key) for key in published["best"] if key != "source"]
+    return tuple(ProblemRequest(target=t) for t in targets if profile is None or _offers(t, profile))
+
+
+def bundled_target(requirement: str) -> str:
+    """Target of a bundled requirement with its spec, like ``NN:NN``: ``NN`` alone would be the whole spec.
+
+    Raises:
+        SpecError: when there is none of that name.
+    """
+    return f"{find_spec(requirement)[0].stem}:{requirement}"
+
+
+def _offers(target: str, profile: str) -> bool:
+    return profile in read_spec(find_spec(target)[0]).profiles

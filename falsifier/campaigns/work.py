@@ -1,0 +1,184 @@
+"""One run as it is sent to a worker, and what the worker does with it.
+
+A worker may be a process on this machine or on another one. The problem travels as a value; its FMU is named
+by content hash, and its bytes follow only when the worker does not have them. A worker that sees the
+campaign's directory writes there; one that does not works in a folder of its own and sends the run back.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from shutil import rmtree
+from tempfile import gettempdir
+from threading import Lock
+from time import monotonic
+from typing import Any
+from zipfile import ZipFile
+
+from falsifier.campaigns.directory import STOP, campaign_mark, run_directory
+from falsifier.problem.problem import Problem
+from falsifier.search.events import Evaluated, Event
+from falsifier.search.manifest import Manifest
+from falsifier.search.request import RunRequest
+from falsifier.search.run import perform
+
+# A killed campaign's workers end within moments; whoever resumes it waits that long in s for their locks.
+_PATIENCE = 10.0
+# Shortest time in s between two looks for the stop file.
+_STOP_PERIOD = 0.2
+
+# A worker simulates one run at a time, also where its host gives it several threads: FMUs are per process.
+_ONE_AT_A_TIME = Lock()
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One run to do.
+
+    Attributes:
+        name: of the run.
+        request: what to run.
+        problem: loaded.
+        manifest: of the run.
+        campaign: directory of the campaign as its owner sees it.
+        mark: by which a worker recognises that directory.
+    """
+
+    name: str
+    request: RunRequest
+    problem: Problem
+    manifest: Manifest
+    campaign: Path
+    mark: str
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """The worker needs the file with this SHA-256 first."""
+
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The run has ended.
+
+    Attributes:
+        status: how.
+        reason: why, in words.
+        packed: the run directory as a ZIP archive, where the worker could not write it in place.
+    """
+
+    status: str
+    reason: str
+    packed: bytes | None = None
+
+
+def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
+    """Do one run, or go on with it where it was left.
+
+    Args:
+        task: what to do.
+        files: contents by SHA-256 that this worker said it misses.
+    """
+    with _ONE_AT_A_TIME:
+        problem = _with_local_fmu(task.problem, files)
+        if isinstance(problem, Missing):
+            return problem
+        in_place = campaign_mark(task.campaign) == task.mark
+        campaign = task.campaign if in_place else _store() / "runs" / task.mark
+        directory = run_directory(campaign, task.name)
+        (result,) = perform(
+            task.request,
+            [problem],
+            task.manifest,
+            directory,
+            listeners=[_StopWatch(campaign / STOP)],
+            resume=True,
+            patience=_PATIENCE,
+        )
+        if in_place:
+            return Done(result.status, result.reason)
+        packed = pack(directory)
+        rmtree(directory)
+        return Done(result.status, result.reason, packed)
+
+
+def fmu_file(problem: Problem) -> Path | None:
+    """The problem's FMU; None for a model that is no file."""
+    path: Path | None = getattr(problem.model, "path", None)
+    return path
+
+
+def pack(directory: Path) -> bytes:
+    """All files of a run directory as a ZIP archive."""
+    buffer = BytesIO()
+    with ZipFile(buffer, "w") as archive:
+        for path in sorted(directory.rglob("*")):
+            if path.is_file() and path.name != "lock":
+                archive.write(path, path.relative_to(directory))
+    return buffer.getvalue()
+
+
+def unpack(packed: bytes, directory: Path) -> None:
+    """Put a packed run directory in its place in one step, instead of what was there."""
+    partial = directory.with_name(f"{directory.name}.partial")
+    rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    with ZipFile(BytesIO(packed)) as archive:
+        archive.extractall(partial)
+    rmtree(directory, ignore_errors=True)
+    partial.rename(directory)
+
+
+class _StopWatch:
+    """Interrupts a run, which keeps everything it has, once the campaign's stop file is there."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._looked = monotonic()
+
+    def __call__(self, event: Event) -> None:
+        if isinstance(event, Evaluated) and monotonic() - self._looked > _STOP_PERIOD:
+            self._looked = monotonic()
+            if self._path.exists():
+                raise KeyboardInterrupt
+
+
+def _with_local_fmu(problem: Problem, files: Mapping[str, bytes]) -> Problem | Missing:
+    """Return the problem with its FMU as this worker has it."""
+    path = fmu_file(problem)
+    if path is None:
+        return problem
+    model: Any = problem.model
+    if path.is_file() and _digest(path, path.stat().st_mtime_ns) == model.sha256:
+        return problem
+    stored = _store() / "files" / model.sha256 / path.name
+    if model.sha256 in files:
+        _put(stored, files[model.sha256])
+    if not stored.is_file():
+        return Missing(model.sha256)
+    return replace(problem, model=replace(model, path=stored))
+
+
+@lru_cache(maxsize=256)
+def _digest(path: Path, changed: int) -> str:
+    """SHA-256 of a file that was last changed at this time."""
+    return sha256(path.read_bytes()).hexdigest()
+
+
+def _put(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    partial.write_bytes(content)
+    partial.replace(path)
+
+
+def _store() -> Path:
+    """Folder for what this worker was sent: FALSIFIER_STORE, or one of this user's for temporary files."""
+    fallback = Path(gettempdir()) / f"falsifier-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+    return Path(os.environ.get("FALSIFIER_STORE") or fallback)

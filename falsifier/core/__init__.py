@@ -1,0 +1,1 @@
+"""What everything else speaks of: signals, search spaces, candidates, trajectories and models."""

@@ -1,0 +1,336 @@
+"""Search spaces and candidates.
+
+A candidate is the same thing whoever proposed it: input signals and parameter values by name. Where every
+parameterization is fixed, the search space is also a named box, and ``decode``/``encode`` go back and forth
+between candidates and vectors.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, floor
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.signals import Interpolation, Signal, even_times
+from falsifier.errors import CandidateError, did_you_mean
+
+ValueKind = Literal["real", "integer", "boolean", "enumeration"]
+
+# How far a value may leave its range, as a share of the range, before it is refused instead of clipped:
+# bounds that were printed with six digits come back rounded outward.
+_ROUNDING_SHARE = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Freedom:
+    """Limits within which proposers may choose an input's control points and interpolation themselves.
+
+    Attributes:
+        max_control_points: most control points.
+        min_interval: shortest time in s between two control points.
+    """
+
+    max_control_points: int
+    min_interval: float
+
+
+@dataclass(frozen=True, slots=True)
+class InputRange:
+    """One searched input signal.
+
+    Attributes:
+        name: the input's name in the model.
+        low: lower bound in the input's unit.
+        high: upper bound.
+        control_points: number of evenly spaced control points of the fixed parameterization.
+        interpolation: between control points.
+        hold: sample-and-hold period in s, or None.
+        free: limits of a free parameterization, or None where only the fixed one is allowed.
+        unit: the input's unit, empty where unknown.
+        description: what it means, from the model.
+        kind: what its values are; all but reals are whole numbers, which are held between control points.
+        items: names and numbers of an enumeration.
+    """
+
+    name: str
+    low: float
+    high: float
+    control_points: int = 1
+    interpolation: Interpolation = "pchip"
+    hold: float | None = None
+    free: Freedom | None = None
+    unit: str = ""
+    description: str = ""
+    kind: ValueKind = "real"
+    items: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRange:
+    """One searched parameter or initial state: a plain number.
+
+    Attributes:
+        name: the parameter's name in the model.
+        low: lower bound in the parameter's unit.
+        high: upper bound.
+        nominal: its value when nothing is searched, where known.
+        unit: its unit, empty where unknown.
+        description: what it means, from the model.
+        kind: what its value is; all but reals are whole numbers.
+        items: names and numbers of an enumeration.
+    """
+
+    name: str
+    low: float
+    high: float
+    nominal: float | None = None
+    unit: str = ""
+    description: str = ""
+    kind: ValueKind = "real"
+    items: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """One coordinate of the vector form.
+
+    Attributes:
+        name: of the input or parameter.
+        time: of the control point in s; None for a parameter.
+        low: lower bound.
+        high: upper bound.
+        unit: unit of the value.
+    """
+
+    name: str
+    time: float | None
+    low: float
+    high: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One proposed simulation.
+
+    Attributes:
+        signals: input signals by name.
+        parameters: parameter values by name.
+        origin: who proposed it.
+        rationale: why, in the proposer's words.
+    """
+
+    signals: Mapping[str, Signal] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    origin: str = ""
+    rationale: str = ""
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What is simulated, without origin and rationale: equal keys are equal simulations."""
+        return (
+            tuple(sorted(self.signals.items(), key=lambda kv: kv[0])),
+            tuple(sorted(self.parameters.items())),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain form for journals and exports."""
+        return {
+            "signals": {
+                name: {
+                    "times": list(s.times),
+                    "values": list(s.values),
+                    "interpolation": s.interpolation,
+                    "hold": s.hold,
+                }
+                for name, s in self.signals.items()
+            },
+            "parameters": dict(self.parameters),
+            "origin": self.origin,
+            "rationale": self.rationale,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "Candidate":
+        """Candidate from its plain form."""
+        return cls(
+            {
+                name: Signal(tuple(s["times"]), tuple(s["values"]), s["interpolation"], s.get("hold"))
+                for name, s in data.get("signals", {}).items()
+            },
+            {name: float(v) for name, v in data.get("parameters", {}).items()},
+            data.get("origin", ""),
+            data.get("rationale", ""),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SearchSpace:
+    """Everything that may be varied.
+
+    Attributes:
+        inputs: searched input signals.
+        parameters: searched parameters.
+        stop_time: end of the simulation in s.
+    """
+
+    inputs: tuple[InputRange, ...]
+    parameters: tuple[ParameterRange, ...]
+    stop_time: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of inputs, then of parameters."""
+        return (*(r.name for r in self.inputs), *(p.name for p in self.parameters))
+
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """Coordinates of the vector form: control points input by input in time order, then parameters."""
+        points = (
+            Dimension(r.name, t, r.low, r.high, r.unit)
+            for r in self.inputs
+            for t in even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+        )
+        return (*points, *(Dimension(p.name, None, p.low, p.high, p.unit) for p in self.parameters))
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Bounds of the vector form, shape (d, 2)."""
+        return np.array([(d.low, d.high) for d in self.dimensions], dtype=np.float64).reshape(-1, 2)
+
+    def decode(
+        self, vector: Sequence[float] | NDArray[np.float64], *, origin: str = "", rationale: str = ""
+    ) -> Candidate:
+        """Candidate of a point of the box, shape (d,).
+
+        Raises:
+            CandidateError: when the vector has the wrong length or leaves the box by more than rounding.
+        """
+        values = [float(v) for v in vector]
+        expected = sum(r.control_points for r in self.inputs) + len(self.parameters)
+        if len(values) != expected:
+            raise CandidateError(f"expected {expected} numbers, got {len(values)}")
+        signals = {}
+        start = 0
+        for r in self.inputs:
+            signals[r.name] = Signal.evenly(
+                values[start : start + r.control_points],
+                stop_time=self.stop_time,
+                interpolation=r.interpolation,
+                hold=r.hold,
+            )
+            start += r.control_points
+        parameters = {p.name: v for p, v in zip(self.parameters, values[start:], strict=True)}
+        return self.admit(Candidate(signals, parameters, origin, rationale))
+
+    def encode(self, candidate: Candidate) -> NDArray[np.float64]:
+        """Vector form of a candidate, shape (d,); free signals are sampled at the fixed times."""
+        parts: list[float] = []
+        for r in self.inputs:
+            signal = candidate.signals[r.name]
+            times = even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+            if signal.times == times:
+                parts.extend(signal.values)
+            else:
+                parts.extend(float(v) for v in signal.held(None).sample(np.asarray(times)))
+        parts.extend(float(candidate.parameters[p.name]) for p in self.parameters)
+        return np.array(parts, dtype=np.float64)
+
+    def admit(self, candidate: Candidate) -> Candidate:
+        """Return the candidate as it will be simulated.
+
+        Values within a rounding error of a bound are clipped to it; integers, Booleans and enumerations get
+        the nearest number that they can have; each input gets its hold.
+
+        Raises:
+            CandidateError: naming the input or parameter that is unknown, missing or outside its range, or
+                whose control points the space does not allow.
+        """
+        for name in (*candidate.signals, *candidate.parameters):
+            if name not in self.names:
+                raise CandidateError(f"unknown input or parameter {name!r}; {did_you_mean(name, self.names)}")
+        signals = {}
+        for r in self.inputs:
+            if r.name not in candidate.signals:
+                raise CandidateError(f"input {r.name!r} is missing")
+            signals[r.name] = self._admit_signal(r, candidate.signals[r.name])
+        parameters = {}
+        for p in self.parameters:
+            if p.name not in candidate.parameters:
+                raise CandidateError(f"parameter {p.name!r} is missing")
+            parameters[p.name] = _into_range(f"parameter {p.name!r}", candidate.parameters[p.name], p)
+        return replace(candidate, signals=signals, parameters=parameters)
+
+    def _admit_signal(self, r: InputRange, signal: Signal) -> Signal:
+        fixed = even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+        is_fixed = signal.interpolation == r.interpolation and (
+            signal.times == fixed or _are_close(signal.times, fixed, 1e-9 * max(self.stop_time, 1.0))
+        )
+        if not is_fixed:
+            _check_freedom(r, signal, self.stop_time)
+        times, values = fixed if is_fixed else signal.times, signal.values
+        if r.kind != "real" or min(values) < r.low or max(values) > r.high:
+            values = tuple(
+                _into_range(f"input {r.name!r} at t = {t:g} s", v, r)
+                for t, v in zip(times, values, strict=True)
+            )
+        admitted = times, values, r.hold
+        if admitted == (signal.times, signal.values, signal.hold):
+            return signal
+        return Signal(times, values, signal.interpolation, r.hold)
+
+
+def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
+    count = len(signal.times)
+    if r.free is None:
+        raise CandidateError(
+            f"input {r.name!r}: expected {r.control_points} evenly spaced control points with "
+            f"{r.interpolation} interpolation, got {count} with {signal.interpolation}"
+        )
+    if r.kind != "real" and signal.interpolation != "constant" and count > 1:
+        raise CandidateError(
+            f"input {r.name!r}: values of kind {r.kind} cannot be interpolated with "
+            f'{signal.interpolation}: use "constant"'
+        )
+    if count > r.free.max_control_points:
+        raise CandidateError(
+            f"input {r.name!r}: {count} control points, at most {r.free.max_control_points} are allowed"
+        )
+    gaps = np.diff(signal.times)
+    if gaps.size and gaps.min() < r.free.min_interval * (1 - 1e-6):
+        k = int(gaps.argmin())
+        raise CandidateError(
+            f"input {r.name!r}: control points at {signal.times[k]:g} s and {signal.times[k + 1]:g} s are "
+            f"closer than {r.free.min_interval:g} s"
+        )
+    if signal.times[-1] > stop_time * (1 + 1e-9):
+        raise CandidateError(
+            f"input {r.name!r}: control point at {signal.times[-1]:g} s lies behind the stop time "
+            f"{stop_time:g} s"
+        )
+
+
+def _are_close(times: Sequence[float], others: Sequence[float], tolerance: float) -> bool:
+    return len(times) == len(others) and all(
+        abs(a - b) <= tolerance for a, b in zip(times, others, strict=True)
+    )
+
+
+def nearest_value(ranged: InputRange | ParameterRange, value: float) -> float:
+    """Nearest number that an input or parameter can have; the value itself where it is a real."""
+    if ranged.kind == "real":
+        return value
+    if ranged.items:
+        numbers = [n for _, n in ranged.items if ranged.low <= n <= ranged.high]
+        return float(min(numbers, key=lambda n: abs(n - value)))
+    return float(min(max(round(value), ceil(ranged.low)), floor(ranged.high)))
+
+
+def _into_range(what: str, value: float, ranged: InputRange | ParameterRange) -> float:
+    low, high = ranged.low, ranged.high
+    tolerance = _ROUNDING_SHARE * (high - low)
+    if not low - tolerance <= value <= high + tolerance:
+        raise CandidateError(f"{what}: {value:g} is outside its range [{low:g}, {high:g}]")
+    return nearest_value(ranged, min(max(float(value), low), high))

@@ -1,0 +1,94 @@
+"""Trajectories: sampled times and named columns, as simulated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.errors import MonitorError, did_you_mean
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Signals sampled on one time grid.
+
+    Attributes:
+        times: sample times in s, shape (n,), from 0 with a constant step.
+        columns: one array of shape (n,) per signal, by name; Booleans and integers as numbers.
+        units: unit by signal name, where known.
+        log: what the model said while it was simulated.
+    """
+
+    times: NDArray[np.float64]
+    columns: Mapping[str, NDArray[np.float64]]
+    units: Mapping[str, str] = field(default_factory=dict)
+    log: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, column in self.columns.items():
+            if column.shape != self.times.shape:
+                raise MonitorError(
+                    f"signal {name!r} has {column.shape[0] if column.ndim else 0} samples, "
+                    f"the time grid has {self.times.shape[0]}"
+                )
+
+    def __len__(self) -> int:
+        return int(self.times.shape[0])
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise MonitorError(
+                f"no signal {name!r} in the trajectory; {did_you_mean(name, self.columns)}"
+            ) from None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns in order."""
+        return tuple(self.columns)
+
+    @property
+    def step(self) -> float:
+        """Sampling step in s."""
+        return float(self.times[-1] - self.times[0]) / (len(self) - 1) if len(self) > 1 else 0.0
+
+    def index(self, time: float) -> int:
+        """Index of the sample nearest to this time in s."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+    def at(self, time: float) -> dict[str, float]:
+        """Values of all signals at the sample nearest to this time in s."""
+        k = self.index(time)
+        return {name: float(column[k]) for name, column in self.columns.items()}
+
+    def _repr_html_(self) -> str:
+        from falsifier.views.notebook import trajectory_html
+
+        return trajectory_html(self)
+
+    def with_columns(
+        self, columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str] | None = None
+    ) -> "Trajectory":
+        """Return this trajectory with further columns behind its own."""
+        return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})}, self.log)
+
+    def save(self, path: Path) -> None:
+        """Write the trajectory as a numpy archive."""
+        names = np.array(self.names)
+        units = np.array([self.units.get(n, "") for n in self.names])
+        stacked = (
+            np.stack([self.columns[n] for n in self.names]) if self.columns else np.empty((0, len(self)))
+        )
+        np.savez(path, times=self.times, names=names, units=units, columns=stacked)
+
+    @classmethod
+    def load(cls, path: Path) -> "Trajectory":
+        """Read a trajectory that save wrote."""
+        with np.load(path, allow_pickle=False) as archive:
+            names = [str(n) for n in archive["names"]]
+            columns = archive["columns"]
+            units = {n: str(u) for n, u in zip(names, archive["units"], strict=True) if str(u)}
+            return cls(archive["times"], {n: columns[i] for i, n in enumerate(names)}, units)

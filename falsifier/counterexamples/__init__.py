@@ -1,0 +1,1 @@
+"""What was found: stored, simplified, explained, looked around and exported."""

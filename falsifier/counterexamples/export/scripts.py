@@ -1,0 +1,150 @@
+"""Scripts that run a counterexample in other tools, as text."""
+
+import json
+from collections.abc import Mapping
+from os.path import relpath
+from pathlib import Path
+
+from falsifier.counterexamples.store import StoredCounterexample
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.fmu import FmuModel
+from falsifier.problem.problem import Problem
+
+# Rows that a replay prints before and behind the critical time.
+_SHOWN_ROWS = 3
+_FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
+
+_REPLAY = '''\
+"""Simulates a counterexample with FMPy alone; writes outputs.csv and prints what decided the verdict.
+
+    pip install fmpy
+    python replay.py [MODEL.fmu]
+
+{requirement}: {formula}
+Found robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {predicate}
+"""
+
+import json
+import sys
+from pathlib import Path
+
+from fmpy import simulate_fmu
+from fmpy.util import read_csv
+
+HERE = Path(__file__).resolve().parent
+FMU = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / {fmu}
+
+result = simulate_fmu(
+    str(FMU),
+    validate=False,
+    fmi_type="{fmi_type}",
+    start_time=0.0,
+    stop_time={stop_time!r},
+    output_interval={step!r},
+    relative_tolerance={tolerance!r},
+    record_events=False,
+    start_values=json.loads((HERE / "start_values.json").read_text()),
+    input={inputs},
+    output={outputs},
+)[::{every}]
+
+lines = [",".join(result.dtype.names)]
+lines += [",".join(repr(float(value)) for value in row) for row in result]
+(HERE / "outputs.csv").write_text("\\n".join(lines) + "\\n")
+
+shown = {shown}
+critical = int(abs(result["time"] - {critical_time!r}).argmin())
+print("".join(f"{{name:>14}}" for name in shown))
+for k in range(max(critical - {around}, 0), min(critical + {around} + 1, len(result))):
+    values = "".join(f"{{float(result[name][k]):14.6g}}" for name in shown)
+    print(values + ("  <- critical time" if k == critical else ""))
+print(f"all {{len(result)}} rows are in outputs.csv beside this script")
+'''
+
+_OPENMODELICA = """\
+// Simulates a counterexample in OpenModelica, from the Modelica model that the FMU was made of:
+//     omc replay.mos
+// Say first where the model is, and its full name where it is not the FMU's.
+//
+// {requirement}: {formula}
+loadFile("{file}");
+simulate({model}, startTime=0, stopTime={stop_time!r}, numberOfIntervals={intervals},
+  outputFormat="csv", simflags="{flags}");
+getErrorString();
+"""
+
+_PYTEST = '''\
+"""Fails while the counterexample beside this file violates {requirement}."""
+
+from pathlib import Path
+
+from falsifier.counterexamples.store import load, problem_of, replay
+
+FILE = Path(__file__).with_name("counterexample.json")
+
+
+def test_{name}_holds_where_it_was_violated() -> None:
+    stored = load(FILE)
+    replayed = replay(stored, problem_of(stored))
+    assert replayed.status != "violates", replayed.text
+'''
+
+
+def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> str | None:
+    """Python script that needs FMPy only; None where the model is no FMU."""
+    model, verdict, experiment = problem.model, evaluation.verdict, problem.experiment
+    if not isinstance(model, FmuModel) or verdict is None:
+        return None
+    is_co_simulation = model.interface == "co-simulation"
+    # FMPy's co-simulation exchanges values at every output interval, so a smaller step is recorded too.
+    step = (is_co_simulation and experiment.step_size) or experiment.output_interval
+    return _REPLAY.format(
+        requirement=problem.name,
+        formula=" ".join(str(problem.requirement.formula).split()),
+        robustness=verdict.robustness,
+        critical_time=verdict.critical_time,
+        predicate=verdict.predicate,
+        fmu=json.dumps(Path(relpath(model.path, directory.resolve())).as_posix()),
+        fmi_type=_FMPY_TYPES[model.interface],
+        stop_time=experiment.stop_time,
+        step=experiment.stop_time / round(experiment.stop_time / step),
+        tolerance=experiment.tolerance,
+        inputs='read_csv(HERE / "input.csv")' if _has_inputs(problem) else "None",
+        outputs=json.dumps(list(experiment.outputs)),
+        shown=json.dumps(
+            ["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]
+        ),
+        around=_SHOWN_ROWS,
+        every=round(experiment.output_interval / step),
+    )
+
+
+def openmodelica_script(problem: Problem, start: Mapping[str, float]) -> str | None:
+    """OpenModelica script; None where the model is no FMU."""
+    if not isinstance(problem.model, FmuModel):
+        return None
+    overrides = ",".join(f"{name}={value!r}" for name, value in start.items())
+    flags = ["-csvInput=input.csv"] if _has_inputs(problem) else []
+    flags += [f"-override={overrides}"] if overrides else []
+    name = problem.info.name
+    return _OPENMODELICA.format(
+        requirement=problem.name,
+        formula=" ".join(str(problem.requirement.formula).split()),
+        file=f"{name.split('.')[0]}/package.mo" if "." in name else f"{name}.mo",
+        model=name,
+        stop_time=problem.experiment.stop_time,
+        intervals=problem.experiment.samples - 1,
+        flags=" ".join(flags),
+    )
+
+
+def pytest_file(stored: StoredCounterexample) -> str | None:
+    """Test of the counterexample file beside it; None where its problem cannot be loaded from a file."""
+    if stored.problem is None:
+        return None
+    name = "".join(c if c.isalnum() else "_" for c in stored.requirement)
+    return _PYTEST.format(requirement=stored.requirement, name=name.lower())
+
+
+def _has_inputs(problem: Problem) -> bool:
+    return any(v.kind != "string" for v in problem.info.inputs)

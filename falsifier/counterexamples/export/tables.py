@@ -1,0 +1,69 @@
+"""Input tables and start values in the formats of other tools."""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from falsifier.counterexamples.export.inputs import InputTable
+
+_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+_MATLAB_NAME_LENGTH = 63
+
+
+def write_csv(table: InputTable, path: Path) -> Path:
+    """Write the inputs with a header of quoted names; numbers read back exactly."""
+    columns = {"time": table.times, **table.columns}
+    lines = [",".join(f'"{name}"' for name in columns)]
+    lines += [",".join(map(repr, row)) for row in np.stack(list(columns.values()), axis=1).tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def write_json(start: Mapping[str, float], path: Path) -> Path:
+    """Write the start values as one JSON object."""
+    path.write_text(json.dumps(dict(start), indent=2) + "\n", encoding="utf-8")
+    return path
+
+
+def write_ssv(start: Mapping[str, float], name: str, path: Path) -> Path:
+    """Write the start values as a parameter set of System Structure and Parameterization 1.0."""
+    ElementTree.register_namespace("ssv", _SSV)
+    root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": name})
+    parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
+    for key, value in start.items():
+        parameter = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", {"name": key})
+        ElementTree.SubElement(parameter, f"{{{_SSV}}}Real", {"value": repr(float(value))})
+    ElementTree.indent(root)
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    return path
+
+
+def write_mat(table: InputTable, start: Mapping[str, float], path: Path) -> Path:
+    """Write inputs and start values for MATLAB, named as MATLAB can name them.
+
+    Each input is a matrix with the columns time and value, as From Workspace and root inports read it; a time
+    that stands twice is a step. ``start_values`` is a structure; ``names`` lists the model's own names.
+    """
+    from scipy.io import savemat
+
+    inputs = {matlab_name(n): np.stack((table.times, column), axis=1) for n, column in table.columns.items()}
+    structure = {matlab_name(n): float(v) for n, v in start.items()}
+    names = np.array([[matlab_name(n), n] for n in (*table.columns, *start)], dtype=object)
+    savemat(
+        path, {**inputs, "start_values": structure or np.empty((0, 0)), "names": names}, long_field_names=True
+    )
+    return path
+
+
+def matlab_name(name: str) -> str:
+    """Nearest name that MATLAB accepts.
+
+    >>> matlab_name("car.x[1]")
+    'car_x_1_'
+    """
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)[:_MATLAB_NAME_LENGTH]
+    return plain if plain[0].isalpha() else f"x{plain}"[:_MATLAB_NAME_LENGTH]

@@ -1,0 +1,289 @@
+"""Shrinking: the simplest candidate near a counterexample that still violates.
+
+A pass proposes simpler candidates, purely and in a fixed order; each is simulated and the first that violates
+replaces the current one. When no pass finds anything any more, the candidate is a local minimum of the order
+in :mod:`falsifier.counterexamples.simplicity`. Nothing is random, so the same counterexample shrinks to the
+same one.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+from falsifier.core.signals import Interpolation, Signal
+from falsifier.core.space import Candidate, InputRange
+from falsifier.counterexamples.simplicity import rest_value, rounder, simplicity
+from falsifier.errors import CandidateError, SpecError
+from falsifier.evaluation.confirm import half_step
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+
+Pass = Callable[[Problem, Candidate], Iterator[Candidate]]
+Progress = Callable[[Evaluation, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Shrunk:
+    """What became of a counterexample.
+
+    Attributes:
+        original: the counterexample as it was.
+        evaluation: the simplest one that was found; the original where nothing simpler violates.
+        simulations: how many were spent.
+        minimal: whether no pass can make it simpler; False when the budget ended first.
+    """
+
+    original: Evaluation
+    evaluation: Evaluation
+    simulations: int
+    minimal: bool
+
+
+def shrink(
+    problem: Problem,
+    evaluation: Evaluation,
+    *,
+    budget: int = 500,
+    margin: float = 0.0,
+    progress: Progress = lambda evaluation, simulations: None,
+) -> Shrunk:
+    """Make a counterexample as simple as possible while it violates.
+
+    Where the original violates at half the communication step too, everything that it shrinks to does so.
+
+    Args:
+        problem: what it violates.
+        evaluation: the counterexample.
+        budget: most simulations.
+        margin: the robustness must stay at or below its negative.
+        progress: called with each simpler counterexample and the number of simulations so far.
+
+    Raises:
+        SpecError: when the evaluation does not violate by that margin.
+    """
+    hunt = _Hunt(problem, budget, margin)
+    start = hunt.violation(problem.space.admit(evaluation.candidate))
+    if start is None:
+        raise SpecError(f"nothing to shrink: {problem.name} is not violated by {margin:g} or more")
+    best, minimal = start, False
+    try:
+        hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
+        while not minimal:
+            minimal = True
+            for propose in PASSES:
+                while (simpler := hunt.first(propose, best)) is not None:
+                    best, minimal = simpler, False
+                    progress(best, hunt.simulations)
+    except _BudgetUsedUpError:
+        minimal = False
+    unchanged = best.candidate.key == start.candidate.key
+    return Shrunk(evaluation, evaluation if unchanged else best, hunt.simulations, minimal)
+
+
+class _BudgetUsedUpError(Exception):
+    """The next simulation would be one too many."""
+
+
+@dataclass(slots=True)
+class _Hunt:
+    """The simulations of one shrinking, counted and never repeated."""
+
+    problem: Problem
+    budget: int
+    margin: float
+    simulations: int = 0
+    demands_half_step: bool = False
+    _known: dict[object, Evaluation | None] = field(default_factory=dict)
+
+    def first(self, propose: Pass, best: Evaluation) -> Evaluation | None:
+        """First violation among the simpler candidates that a pass proposes."""
+        limit = simplicity(self.problem, best.candidate)
+        for proposal in propose(self.problem, best.candidate):
+            try:
+                candidate = self.problem.space.admit(proposal)
+            except CandidateError:  # outside the range or the parameterization of this problem
+                continue
+            if simplicity(self.problem, candidate) < limit and (found := self.violation(candidate)):
+                return replace(found, candidate=replace(candidate, origin="shrink", rationale=""))
+        return None
+
+    def violation(self, candidate: Candidate) -> Evaluation | None:
+        """Evaluation of a candidate if it violates as demanded."""
+        if candidate.key not in self._known:
+            found = self._simulate(self.problem, candidate)
+            violated = found.violated and found.robustness is not None and found.robustness <= -self.margin
+            if violated and self.demands_half_step:
+                violated = self.violates_at_half_step(candidate)
+            self._known[candidate.key] = found if violated else None
+        return self._known[candidate.key]
+
+    def violates_at_half_step(self, candidate: Candidate) -> bool:
+        return self._simulate(half_step(self.problem), candidate).violated
+
+    def _simulate(self, problem: Problem, candidate: Candidate) -> Evaluation:
+        if self.simulations >= self.budget:
+            raise _BudgetUsedUpError
+        self.simulations += 1
+        return evaluate(problem, candidate)
+
+
+def at_rest(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Everything at rest and nominal; then each signal and each parameter alone."""
+    rests = {name: rest for name in problem.space.names if (rest := rest_value(problem, name)) is not None}
+    everything = candidate
+    for name, rest in rests.items():
+        everything = _with_constant(problem, everything, name, rest)
+    yield everything
+    for name, rest in rests.items():
+        yield _with_constant(problem, candidate, name, rest)
+
+
+def constant(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each signal constant, at a bound or at one of its values."""
+    for r in problem.space.inputs:
+        values = candidate.signals[r.name].values
+        for value in dict.fromkeys((r.low, r.high, *sorted(values))):
+            yield _with_constant(problem, candidate, r.name, value)
+
+
+def fewer_control_points(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each free signal without some of its control points: large blocks first, then one by one."""
+    for r in _free(problem):
+        signal = candidate.signals[r.name]
+        size = len(signal.times) // 2
+        while size:
+            for start in range(len(signal.times) - size, 0, -1):
+                kept = [k for k in range(len(signal.times)) if not start <= k < start + size]
+                yield _with_points(candidate, r.name, kept)
+            size //= 2
+
+
+def fewer_changes(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each signal without one of its changes: what follows, what precedes or the neighbour is made equal."""
+    for r in problem.space.inputs:
+        values = candidate.signals[r.name].values
+        runs = stretches(values)
+        for (before, start), (_, end) in pairwise(runs):
+            left, right = values[before], values[start]
+            yield _with_values(candidate, r.name, (*values[:start], *(left,) * (len(values) - start)))
+            yield _with_values(candidate, r.name, ((right,) * start + values[start:]))
+            yield _with_values(candidate, r.name, (*values[:start], *(left,) * (end - start), *values[end:]))
+            yield _with_values(
+                candidate, r.name, (*values[:before], *(right,) * (start - before), *values[start:])
+            )
+
+
+def fewer_values(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each value of a signal replaced, wherever it occurs, by rest, a bound or another of its values."""
+    for r in problem.space.inputs:
+        values = candidate.signals[r.name].values
+        for old in sorted(set(values)):
+            for new in _simple_values(problem, r, values):
+                yield _with_values(candidate, r.name, tuple(new if v == old else v for v in values))
+
+
+def simple_stretches(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each stretch of equal values moved to rest, a bound or another value of the signal."""
+    for r in problem.space.inputs:
+        values = candidate.signals[r.name].values
+        for first, end in stretches(values):
+            for new in _simple_values(problem, r, values):
+                yield _with_values(
+                    candidate, r.name, (*values[:first], *(new,) * (end - first), *values[end:])
+                )
+
+
+def simpler_interpolation(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each free signal as steps, then as straight lines."""
+    ways: tuple[Interpolation, ...] = ("constant", "linear")
+    for r in _free(problem):
+        for interpolation in ways:
+            signal = replace(candidate.signals[r.name], interpolation=interpolation)
+            yield with_signal(candidate, r.name, signal)
+            kept = [first for first, _ in stretches(signal.values)]
+            yield _with_points(with_signal(candidate, r.name, signal), r.name, kept)
+
+
+def rounder_numbers(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each value, parameter and free time written with fewer digits; parameters at their bounds first."""
+    for p in problem.space.parameters:
+        value = candidate.parameters[p.name]
+        for new in (p.low, p.high, *rounder(value)):
+            yield replace(candidate, parameters={**candidate.parameters, p.name: new})
+    for r in problem.space.inputs:
+        values = candidate.signals[r.name].values
+        for old in sorted(set(values)):
+            for new in rounder(old):
+                yield _with_values(candidate, r.name, tuple(new if v == old else v for v in values))
+    for r in _free(problem):
+        signal = candidate.signals[r.name]
+        for k, time in enumerate(signal.times):
+            before = signal.times[k - 1] if k else -1.0
+            after = signal.times[k + 1] if k + 1 < len(signal.times) else problem.space.stop_time
+            for new in rounder(time):
+                if before < new < after:
+                    times = (*signal.times[:k], new, *signal.times[k + 1 :])
+                    yield with_signal(candidate, r.name, replace(signal, times=times))
+
+
+PASSES: tuple[Pass, ...] = (
+    at_rest,
+    constant,
+    fewer_control_points,
+    fewer_changes,
+    fewer_values,
+    simple_stretches,
+    simpler_interpolation,
+    rounder_numbers,
+)
+
+
+def constant_signal(problem: Problem, r: InputRange, value: float) -> Signal:
+    """Return the simplest signal of this value that the input's parameterization allows."""
+    if r.free is not None:
+        return Signal((0.0,), (value,), "constant", r.hold)
+    return Signal.evenly(
+        (value,) * r.control_points,
+        stop_time=problem.space.stop_time,
+        interpolation=r.interpolation,
+        hold=r.hold,
+    )
+
+
+def stretches(values: tuple[float, ...]) -> list[tuple[int, int]]:
+    """Return first index and end index of each stretch of equal values."""
+    starts = [0, *(k + 1 for k, (a, b) in enumerate(pairwise(values)) if a != b), len(values)]
+    return list(pairwise(starts))
+
+
+def with_signal(candidate: Candidate, name: str, signal: Signal) -> Candidate:
+    """Return the candidate with another signal for one input."""
+    return replace(candidate, signals={**candidate.signals, name: signal})
+
+
+def _simple_values(problem: Problem, r: InputRange, values: tuple[float, ...]) -> list[float]:
+    rest = rest_value(problem, r.name)
+    known = (r.low, r.high, *sorted(set(values)))
+    return list(dict.fromkeys(known if rest is None else (rest, *known)))
+
+
+def _free(problem: Problem) -> Iterator[InputRange]:
+    return (r for r in problem.space.inputs if r.free is not None)
+
+
+def _with_constant(problem: Problem, candidate: Candidate, name: str, value: float) -> Candidate:
+    """Return the candidate with an input constant at a value, or a parameter at it."""
+    for r in problem.space.inputs:
+        if r.name == name:
+            return with_signal(candidate, name, constant_signal(problem, r, value))
+    return replace(candidate, parameters={**candidate.parameters, name: value})
+
+
+def _with_values(candidate: Candidate, name: str, values: tuple[float, ...]) -> Candidate:
+    return with_signal(candidate, name, replace(candidate.signals[name], values=values))
+
+
+def _with_points(candidate: Candidate, name: str, kept: list[int]) -> Candidate:
+    signal = candidate.signals[name]
+    times, values = (tuple(part[k] for k in kept) for part in (signal.times, signal.values))
+    return with_signal(candidate, name, replace(signal, times=times, values=values))

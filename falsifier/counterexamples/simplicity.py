@@ -1,0 +1,111 @@
+"""The order of simplicity among candidates: which of two counterexamples says the same with less.
+
+The first of these that differs decides:
+
+1. fewer distinct values, signal by signal added up;
+2. fewer changes of value over time;
+3. fewer signals that are ever away from rest and parameters away from nominal;
+4. fewer control points, then ``constant`` before ``linear`` before ``pchip``;
+5. rounder numbers: rest and nominal before a bound of the range before numbers with fewer digits;
+6. nearer to rest and nominal, as a share of the range; at last the numbers themselves, so that the order is
+   total: two candidates with equal keys are equal simulations.
+"""
+
+from collections.abc import Iterator
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
+
+from falsifier.core.signals import Interpolation, Signal, even_times
+from falsifier.core.space import Candidate, InputRange, ParameterRange
+from falsifier.problem.problem import Problem
+
+Key = tuple[object, ...]
+
+_SIMPLEST_FIRST: tuple[Interpolation, ...] = ("constant", "linear", "pchip")
+
+
+def rest_value(problem: Problem, name: str) -> float | None:
+    """Value of an input at rest, or of a parameter when nothing is searched; None where it is unknown.
+
+    An input rests at the model's start value; where that is unknown or outside the range, at 0. A parameter's
+    nominal value is the model's.
+    """
+    ranged = _range(problem, name)
+    known = ranged.nominal if isinstance(ranged, ParameterRange) else _start(problem, name)
+    if known is not None and ranged.low <= known <= ranged.high:
+        return known
+    if isinstance(ranged, InputRange) and ranged.low <= 0.0 <= ranged.high:
+        return 0.0
+    return None
+
+
+def simplicity(problem: Problem, candidate: Candidate) -> Key:
+    """Sort key: the simpler of two candidates has the smaller one."""
+    signals = [(r, candidate.signals[r.name]) for r in problem.space.inputs]
+    parameters = [(p, candidate.parameters[p.name]) for p in problem.space.parameters]
+    numbers = [(r, v) for r, s in signals for v in sorted(set(s.values))] + parameters
+    rests = {name: rest_value(problem, name) for name in problem.space.names}
+    return (
+        sum(len(set(s.values)) for _, s in signals),
+        sum(s.switches for _, s in signals),
+        sum(any(v != rests[r.name] for v in s.values) for r, s in signals)
+        + sum(v != rests[p.name] for p, v in parameters),
+        sum(len(s.times) for _, s in signals),
+        sum(_SIMPLEST_FIRST.index(s.interpolation) for _, s in signals),
+        sum(_roughness(r, v, rests[r.name]) for r, v in numbers)
+        + sum(digits(t) for r, s in signals if not is_fixed(problem, r, s) for t in s.times),
+        sum(_distance(r, v, rests[r.name]) for r, v in numbers),
+        tuple((s.times, s.values) for _, s in signals),
+        tuple(v for _, v in parameters),
+    )
+
+
+def is_fixed(problem: Problem, r: InputRange, signal: Signal) -> bool:
+    """Whether a signal has the control points of the spec, rather than some of a proposer's choice."""
+    times = even_times(r.control_points, stop_time=problem.space.stop_time, interpolation=r.interpolation)
+    return signal.interpolation == r.interpolation and signal.times == times
+
+
+def digits(value: float) -> int:
+    """Number of significant decimal digits that a number is written with.
+
+    >>> digits(100.0), digits(0.05), digits(33.25)
+    (1, 1, 4)
+    """
+    return len(Decimal(repr(value)).normalize().as_tuple().digits) if value else 1
+
+
+def rounder(value: float) -> Iterator[float]:
+    """Yield numbers near this one with fewer digits, the roundest and nearest first.
+
+    >>> list(rounder(33.25))[:4]
+    [30.0, 40.0, 33.0, 34.0]
+    """
+    exact = Decimal(repr(value))
+    seen = {value}
+    for count in range(1, digits(value)):
+        last_place = Decimal((0, (1,), exact.adjusted() - count + 1))
+        for rounding in (ROUND_HALF_EVEN, ROUND_FLOOR, ROUND_CEILING):
+            new = float(exact.quantize(last_place, rounding=rounding))
+            if new not in seen:
+                seen.add(new)
+                yield new
+
+
+def _roughness(ranged: InputRange | ParameterRange, value: float, rest: float | None) -> int:
+    if value == rest:
+        return 0
+    return 1 if value in (ranged.low, ranged.high) else 1 + digits(value)
+
+
+def _distance(ranged: InputRange | ParameterRange, value: float, rest: float | None) -> float:
+    return 0.0 if rest is None else abs(value - rest) / (ranged.high - ranged.low)
+
+
+def _range(problem: Problem, name: str) -> InputRange | ParameterRange:
+    ranges: list[InputRange | ParameterRange] = [*problem.space.inputs, *problem.space.parameters]
+    return next(r for r in ranges if r.name == name)
+
+
+def _start(problem: Problem, name: str) -> float | None:
+    start = problem.info[name].start if name in problem.info else None
+    return float(start) if isinstance(start, int | float) else None

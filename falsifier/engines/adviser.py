@@ -1,0 +1,72 @@
+"""What the hybrid engine asks of a language model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from falsifier.core.space import Candidate
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.tools import WhatIf
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What one question brought.
+
+    Attributes:
+        candidates: at least one, as many as were asked for at most.
+        foresaw: whether the model asked for predictions, and got some, before it answered.
+    """
+
+    candidates: list[Candidate]
+    foresaw: bool = False
+
+
+class Adviser(Protocol):
+    """The language model's side."""
+
+    @property
+    def name(self) -> str:
+        """What its candidates bear as origin."""
+        ...
+
+    def describe(self, candidate: Candidate) -> str:
+        """A candidate in a few words and by the names that the model knows, for notes."""
+        ...
+
+    def propose(
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        *,
+        what_if: WhatIf | None = None,
+        dispensable: bool = False,
+    ) -> Advice:
+        """Return up to ``count`` candidates, at least one, after a single question.
+
+        Args:
+            count: how many are wanted.
+            notes: lines that the question carries beside problem and history.
+            what_if: leave to ask for predictions in between; a model that takes no tools goes without.
+            dispensable: the search goes on where no answer comes. That none came is put on record then, so
+                that a resumed run goes on in the same way.
+
+        Raises:
+            ChatError: when no valid answer can be had.
+        """
+        ...
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Learn from evaluations, whoever proposed their candidates."""
+        ...
+
+
+def in_few_words(candidate: Candidate) -> str:
+    """A candidate in a few words: pieces of long signals are left out."""
+    parts = []
+    for name, signal in candidate.signals.items():
+        pairs = [f"{v:.4g} from {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
+        more = f", ... {len(pairs)} points in all" if len(pairs) > 8 else ""
+        parts.append(f"{name} {signal.interpolation}: {', '.join(pairs[:8])}{more}")
+    parts += [f"{name} = {value:.6g}" for name, value in candidate.parameters.items()]
+    return "; ".join(parts)

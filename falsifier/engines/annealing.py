@@ -1,0 +1,94 @@
+"""Simulated annealing: scipy's dual annealing, turned inside out so that it can be asked and told.
+
+scipy calls the function that it minimises. Here that function runs in a thread of its own, hands each point
+over and waits until it is told the cost; the two threads take turns, so nothing depends on timing.
+"""
+
+import weakref
+from queue import SimpleQueue
+from threading import Thread
+
+import numpy as np
+from scipy.optimize import dual_annealing
+
+from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.problem.problem import Problem
+
+_NEVER = 10**9
+
+
+class Annealing(BoxProposer):
+    """Dual annealing without its local search, whose finite differences would cost d + 1 simulations each.
+
+    It goes one step at a time: further candidates asked for meanwhile are uniform random ones.
+    """
+
+    name = "annealing"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        self._walk = _Walk(self.box.dimension, seed)
+        self._awaited: Vector | None = None
+        self._worst = 0.0
+        weakref.finalize(self, self._walk.stop)
+
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        if self._awaited is not None:
+            return Proposal(rng.random(self.box.dimension), "uniform random while annealing waits")
+        self._awaited = self._walk.next_point()
+        return Proposal(self._awaited, "a step of simulated annealing")
+
+    def _learn(self, point: Vector, cost: float | None) -> None:
+        if cost is not None:
+            self._worst = max(self._worst, cost)
+        if self._awaited is not None and np.allclose(point, self._awaited, rtol=0, atol=1e-9):
+            self._awaited = None
+            self._walk.answer(self._worst if cost is None else cost)
+
+
+class _Walk:
+    """The annealing thread and the two queues between it and the engine."""
+
+    def __init__(self, dimension: int, seed: int) -> None:
+        self._points: SimpleQueue[Vector] = SimpleQueue()
+        self._costs: SimpleQueue[float | None] = SimpleQueue()
+        thread = Thread(target=self._run, args=(dimension, seed), name="annealing", daemon=True)
+        thread.start()
+
+    def next_point(self) -> Vector:
+        """Point whose cost the annealing waits for."""
+        return self._points.get()
+
+    def answer(self, cost: float) -> None:
+        """Let the annealing go on with this cost."""
+        self._costs.put(cost)
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._costs.put(None)
+
+    def _run(self, dimension: int, seed: int) -> None:
+        try:
+            while True:
+                dual_annealing(
+                    self._cost,
+                    [(0.0, 1.0)] * dimension,
+                    maxiter=_NEVER,
+                    maxfun=_NEVER,
+                    seed=seed,
+                    no_local_search=True,
+                )
+                seed += 1
+        except _Stopped:
+            return
+
+    def _cost(self, point: Vector) -> float:
+        self._points.put(np.array(point))
+        cost = self._costs.get()
+        if cost is None:
+            raise _Stopped
+        return cost
+
+
+class _Stopped(Exception):
+    """The engine is gone."""

@@ -1,0 +1,113 @@
+"""Bayesian optimisation: a Gaussian process of the robustness, and where it expects most improvement."""
+
+from abc import abstractmethod
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import log_ndtr, ndtr
+from scipy.stats import qmc
+
+from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.problem.problem import Problem
+
+# Cost of the process grows with the cube of its points: these are the best and the latest ones.
+_MOST_POINTS = 200
+_NOISE = 1e-4
+_STARTS = 3
+_SAMPLES = 512
+
+
+class ModelBased(BoxProposer):
+    """Sobol points first, then what a model of the costs so far makes most promising."""
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        d = self.box.dimension
+        self._sequence = qmc.Sobol(min(d, qmc.Sobol.MAXDIM), scramble=True, seed=np.random.default_rng(seed))
+        self._start = min(20, 2 * d + 2)
+        self._points: list[Vector] = []
+        self._costs: list[float] = []
+
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        if self._asked < self._start or len(self._costs) < 2:
+            point = rng.random(self.box.dimension)
+            point[: self._sequence.d] = self._sequence.random(1)[0]
+            return Proposal(point, "a Sobol point, before the Gaussian process knows enough")
+        points, costs = self._kept()
+        return self._most_promising(points, standardised(costs), rng)
+
+    @abstractmethod
+    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+        """Return the next point, given standardised costs, shape (n,), at points, shape (n, d)."""
+
+    def _learn(self, point: Vector, cost: float | None) -> None:
+        if cost is not None:
+            self._points.append(point)
+            self._costs.append(cost)
+
+    def _kept(self) -> tuple[Vector, Vector]:
+        points, costs = np.array(self._points), np.array(self._costs)
+        if len(costs) <= _MOST_POINTS:
+            return points, costs
+        order = np.argsort(costs, kind="stable")[: _MOST_POINTS // 2]
+        latest = np.arange(len(costs) - _MOST_POINTS // 2, len(costs))
+        keep = np.unique(np.concatenate([order, latest]))
+        return points[keep], costs[keep]
+
+
+class Bayesian(ModelBased):
+    """Maxima of the logarithm of the expected improvement of a Gaussian process."""
+
+    name = "bayesian"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
+
+    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+        process = fit_lengths(points, targets, self._lengths, rng, noise=_NOISE)
+        self._lengths = process.lengths
+        best, improvement = _most_promising(process, targets, rng)
+        return Proposal(best, f"log expected improvement {improvement:.3g} of the scaled robustness")
+
+
+def _most_promising(
+    process: GaussianProcess, targets: Vector, rng: np.random.Generator
+) -> tuple[Vector, float]:
+    """Point of largest log expected improvement below the best target, and that value."""
+    best = float(targets.min())
+    d = process.points.shape[1]
+    incumbent = process.points[int(np.argmin(targets))]
+    near = np.clip(incumbent + 0.1 * rng.standard_normal((_SAMPLES // 2, d)), 0.0, 1.0)
+    samples = np.concatenate([rng.random((_SAMPLES // 2, d)), near])
+    values = log_improvement(*process.predict(samples), best)
+    step = 1e-4
+
+    def loss_and_slope(x: Vector) -> tuple[float, Vector]:
+        shifts = np.where(x > 0.5, -step, step)
+        around = np.concatenate([x[None], x + np.diag(shifts)])
+        loss = -log_improvement(*process.predict(around), best)
+        return float(loss[0]), (loss[1:] - loss[0]) / shifts
+
+    winner, value = samples[int(np.argmax(values))], float(values.max())
+    for start in samples[np.argsort(-values, kind="stable")[:_STARTS]]:
+        found = minimize(
+            loss_and_slope, start, jac=True, method="L-BFGS-B", bounds=[(0, 1)] * d, options={"maxiter": 30}
+        )
+        if -found.fun > value:
+            winner, value = np.asarray(found.x), -float(found.fun)
+    return winner, value
+
+
+def log_improvement(mean: Vector, deviation: Vector, best: float) -> Vector:
+    """Logarithm of the expected improvement below ``best``; finite far above it, where the plain one is 0."""
+    z = (best - mean) / deviation
+    log_density = -0.5 * z * z - 0.5 * np.log(2 * np.pi)
+    plain = np.exp(log_density) + z * ndtr(z)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # phi(z) + z Phi(z) cancels for z << 0, where it tends to phi(z) / z^2.
+        ratio = 1.0 + z * np.exp(log_ndtr(z) - log_density)
+        tail = log_density + np.where(z < -20.0, -2.0 * np.log(np.abs(z)), np.log(np.maximum(ratio, 1e-300)))
+        inside = np.log(plain)
+    return np.asarray(np.where(z < -3.0, tail, inside) + np.log(deviation))

@@ -1,0 +1,108 @@
+"""What engines share that search the box of the fixed parameterization as vectors in [0, 1]^d."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.signals import even_times
+from falsifier.core.space import Candidate, SearchSpace
+from falsifier.engines.arrays import Array
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+
+Vector = Array
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A point with the reason why it was chosen.
+
+    Attributes:
+        point: in [0, 1]^d.
+        rationale: in words.
+    """
+
+    point: Vector
+    rationale: str
+
+
+class UnitBox:
+    """The search space's vector form, scaled to [0, 1]^d."""
+
+    def __init__(self, space: SearchSpace) -> None:
+        self.space = space
+        bounds = space.bounds
+        self.low = bounds[:, 0]
+        self.span = bounds[:, 1] - bounds[:, 0]
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates d."""
+        return len(self.low)
+
+    @property
+    def groups(self) -> list[NDArray[np.intp]]:
+        """Indices of the coordinates of each input and each parameter, in the space's order."""
+        names = [d.name for d in self.space.dimensions]
+        return [np.flatnonzero([n == name for n in names]) for name in self.space.names]
+
+    def candidate(self, point: Vector, *, origin: str, rationale: str) -> Candidate:
+        """Candidate of a point, clipped to the box."""
+        vector = self.low + self.span * np.clip(point, 0.0, 1.0)
+        return self.space.decode(vector, origin=origin, rationale=rationale)
+
+    def represents(self, candidate: Candidate) -> bool:
+        """Whether all signals have the fixed parameterization, so that a point stands for the candidate."""
+        return all(
+            candidate.signals[r.name].interpolation == r.interpolation
+            and candidate.signals[r.name].times
+            == even_times(r.control_points, stop_time=self.space.stop_time, interpolation=r.interpolation)
+            for r in self.space.inputs
+        )
+
+    def point(self, candidate: Candidate) -> Vector:
+        """Point of a candidate; a free signal is read at the fixed control points."""
+        span = np.where(self.span > 0, self.span, 1.0)
+        return np.clip((self.space.encode(candidate) - self.low) / span, 0.0, 1.0)
+
+
+class BoxProposer(ABC):
+    """An engine on the unit box: subclasses propose points and learn costs.
+
+    The cost is the robustness; a failed evaluation has none and is passed on as None.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        self.box = UnitBox(problem.space)
+        self.seed = seed
+        self._asked = 0
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """See Proposer.ask."""
+        candidates = []
+        for _ in range(max(n, 1)):
+            proposal = self._propose(np.random.default_rng([self.seed, self._asked]))
+            self._asked += 1
+            candidates.append(
+                self.box.candidate(proposal.point, origin=self.name, rationale=proposal.rationale)
+            )
+        return candidates
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """See Proposer.tell."""
+        for evaluation in evaluations:
+            if self.box.represents(evaluation.candidate):
+                self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
+
+    @abstractmethod
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        """Return the next point, drawn with this generator."""
+
+    def _learn(self, point: Vector, cost: float | None) -> None:  # noqa: B027 - most engines do not learn
+        """Take note of one evaluation."""

@@ -1,0 +1,69 @@
+"""Covariance matrix adaptation: the evolution strategy of the package ``cma``."""
+
+import numpy as np
+from cma import CMAEvolutionStrategy
+
+from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.problem.problem import Problem
+
+# First standard deviation, as a share of the ranges: the usual third of the box.
+_FIRST_STEP = 0.3
+
+
+class CMA(BoxProposer):
+    """CMA-ES from random starts; restarts where it has converged.
+
+    A generation is complete when all its points were told; further candidates asked for before that are
+    uniform random ones.
+    """
+
+    name = "cma"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        self._rng = np.random.default_rng([seed, 1])
+        self._worst = 0.0
+        self._strategy = self._start()
+        self._generation: list[Vector] = []
+        self._costs: list[float | None] = []
+        self._next = 0
+
+    def _start(self) -> CMAEvolutionStrategy:
+        # The package does not search along a line: a single coordinate gets an idle second one.
+        dimension = max(2, self.box.dimension)
+        return CMAEvolutionStrategy(
+            self._rng.random(dimension),
+            _FIRST_STEP,
+            {
+                "bounds": [0, 1],
+                "verbose": -9,
+                "seed": np.nan,  # leave numpy's global generator alone
+                "randn": lambda *shape: self._rng.standard_normal(shape),
+            },
+        )
+
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        if not self._generation:
+            if self._strategy.stop():
+                self._strategy = self._start()
+            self._generation = [np.asarray(x) for x in self._strategy.ask()]
+            self._costs = [None] * len(self._generation)
+            self._next = 0
+        if self._next == len(self._generation):
+            return Proposal(rng.random(self.box.dimension), "uniform random while a generation is simulated")
+        point = self._generation[self._next][: self.box.dimension]
+        self._next += 1
+        return Proposal(point, f"generation {self._strategy.countiter + 1} of the evolution strategy")
+
+    def _learn(self, point: Vector, cost: float | None) -> None:
+        if cost is not None:
+            self._worst = max(self._worst, cost)
+        for i in range(self._next):
+            own = self._generation[i][: self.box.dimension]
+            if self._costs[i] is None and np.allclose(point, own, rtol=0, atol=1e-9):
+                self._costs[i] = self._worst if cost is None else cost
+                break
+        told = [cost for cost in self._costs if cost is not None]
+        if self._generation and len(told) == len(self._generation):
+            self._strategy.tell(self._generation, told)
+            self._generation = []

@@ -1,0 +1,45 @@
+"""Constant extremes first: many requirements are tightest where inputs stay at an end of their range."""
+
+import numpy as np
+
+from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.corner_walk import CornerWalk, Levels
+from falsifier.problem.problem import Problem
+
+
+class Corners(BoxProposer):
+    """All corners of the inputs' and parameters' ranges, then uniform random points."""
+
+    name = "corners"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        self._groups = self.box.groups
+        self._walk = CornerWalk(len(self._groups))
+
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        levels = self._walk.next(rng)
+        if levels is None:
+            return Proposal(rng.random(self.box.dimension), "uniform random: all corners were tried")
+        point = np.empty(self.box.dimension)
+        for indices, level in zip(self._groups, levels, strict=True):
+            point[indices] = level
+        words = ", ".join(
+            f"{name} {'high' if level else 'low'}"
+            for name, level in zip(self.box.space.names, levels, strict=True)
+        )
+        return Proposal(point, f"constant extremes: {words}")
+
+    def _learn(self, point: Vector, cost: float | None) -> None:
+        levels = self._levels(point)
+        if levels is not None:
+            self._walk.learn(levels, cost)
+
+    def _levels(self, point: Vector) -> Levels | None:
+        levels = []
+        for indices in self._groups:
+            value = point[indices[0]]
+            if value not in (0.0, 1.0) or not (point[indices] == value).all():
+                return None
+            levels.append(int(value))
+        return tuple(levels)

@@ -1,0 +1,216 @@
+"""A language model and the surrogate engine on one history.
+
+The model opens, because its first guess is worth more than any corner. Later it is asked for several
+candidates at a time; the surrogate ranks them before one is simulated, and breeds from them. The model may
+call the surrogate for predictions in its turn; one that does not hears them afterwards and may answer them
+once. When its candidates stop helping, the surrogate goes on alone, near the critical time; when the
+surrogate stops helping or errs, the model is asked again and told why.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from falsifier.core.space import Candidate
+from falsifier.engines.adviser import Adviser
+from falsifier.engines.surrogate import Settings as SurrogateSettings
+from falsifier.engines.surrogate import Surrogate
+from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.tools import WhatIf
+from falsifier.problem.problem import Problem
+
+# The model's first inputs stand for the constants; one switching or stepping input still teaches more.
+ADVISED = SurrogateSettings(constants=0, bangs=1, probes=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """When the model is asked and how its answers are used.
+
+    Attributes:
+        opening: candidates of the first answer, simulated as they come.
+        count: candidates of a later answer.
+        tries: how many of a later answer are simulated at most, the best ranked first.
+        patience: simulations without a new best after which the other side gets its turn.
+        patience_growth: factor of the patience after each answer that helped nothing, so that a model that
+            does not help costs little.
+        misses: predicted violations in a row that did not happen after which the model is told so.
+        what_if: whether the model hears predictions of its candidates before one is simulated.
+        what_if_calls: how often it may call for them in a turn. Each call sends the whole conversation once
+            more, so a turn costs four requests, rejected replies apart: enough to compare, correct and check.
+    """
+
+    opening: int = 2
+    count: int = 5
+    tries: int = 2
+    patience: int = 4
+    patience_growth: float = 2.0
+    misses: int = 3
+    what_if: bool = True
+    what_if_calls: int = 3
+
+
+@dataclass(slots=True)
+class _Turn:
+    """Candidates of one answer: those that wait to be asked for, and those that wait to be told."""
+
+    queue: list[Candidate]
+    best_before: float
+    asked: set[object] = field(default_factory=set)
+
+
+class Hybrid:
+    """The surrogate engine with a language model as adviser."""
+
+    name = "hybrid"
+
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        seed: int,
+        adviser: Adviser,
+        settings: Settings | None = None,
+        surrogate_settings: SurrogateSettings = ADVISED,
+    ) -> None:
+        self.adviser = adviser
+        self.settings = settings or Settings()
+        self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
+        self._best = np.inf
+        self._since_best = 0
+        self._patience = float(self.settings.patience)
+        self._turn: _Turn | None = None
+        self._is_opened = False
+        self._numeric: Candidate | None = None
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """See Proposer.ask.
+
+        Raises:
+            ChatError: when the first answer cannot be had; later the surrogate goes on without.
+        """
+        return [self._ask_one() for _ in range(max(n, 1))]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """See Proposer.tell."""
+        self.surrogate.tell(evaluations)
+        self.adviser.tell(evaluations)
+        for evaluation in evaluations:
+            self._since_best += 1
+            if self._turn is not None:
+                self._turn.asked.discard(evaluation.candidate.key)
+            if evaluation.robustness is not None and evaluation.robustness < self._best:
+                self._best, self._since_best = evaluation.robustness, 0
+
+    def _ask_one(self) -> Candidate:
+        if not self._is_opened:
+            self._is_opened = True
+            opening = self.adviser.propose(self.settings.opening).candidates
+            self._turn = _Turn(opening[: self.settings.opening], self._best)
+        elif self._turn is None and (reason := self._reason_to_ask()):
+            self._consult(reason)
+        if self._turn is not None:
+            if self._turn.queue:
+                candidate = self._turn.queue.pop(0)
+                self._turn.asked.add(candidate.key)
+                return candidate
+            if not self._turn.asked:
+                self._close_turn(self._turn)
+        candidate, self._numeric = self._numeric or self.surrogate.ask(1)[0], None
+        return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
+
+    def _reason_to_ask(self) -> str:
+        """Why the model should be asked now, as it is told; empty when it should not."""
+        if self._since_best < self._patience:
+            return ""
+        if self.surrogate.misses >= self.settings.misses:
+            return (
+                f"A numerical model of the dynamics predicted a violation {self.surrogate.misses} times in a "
+                "row and was wrong each time: do not rely on small changes of the best sample, try another "
+                "structure."
+            )
+        return (
+            f"The last {self._since_best} simulations, most of them by a numerical optimiser, brought no new "
+            "best: suggest other structures (which parts of the time low, high or switching); numbers are "
+            "tuned later."
+        )
+
+    def _consult(self, reason: str) -> None:
+        """Ask the model, rank its candidates, and queue the most promising ones."""
+        settings = self.settings
+        notes = [reason, *self._prediction_notes()]
+        try:
+            advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
+            candidates = advice.candidates
+            predictions = self._trusted_predictions(candidates)
+            unheard = settings.what_if and not advice.foresaw
+            if unheard and predictions is not None and min(predictions) >= 0:
+                heard = self._predictions_told(candidates, predictions)
+                revised = self.adviser.propose(settings.count, [*notes, *heard], dispensable=True)
+                candidates = [*candidates, *revised.candidates]
+                predictions = self._trusted_predictions(candidates)
+        except ChatError:
+            # The search need not end because advice is not to be had; it is asked for again much later.
+            self._grow_patience()
+            return
+        self.surrogate.suggest(candidates)
+        ranked = candidates
+        if predictions is not None:
+            order = sorted(range(len(candidates)), key=lambda i: predictions[i])
+            ranked = [_ranked(candidates[i], predictions[i]) for i in order]
+        self._turn = _Turn(ranked[: settings.tries], self._best)
+
+    def _close_turn(self, turn: _Turn) -> None:
+        self._turn = None
+        self._since_best = 0
+        if self._best < turn.best_before:
+            self._patience = float(self.settings.patience)
+        else:
+            self._grow_patience()
+
+    def _grow_patience(self) -> None:
+        self._patience *= self.settings.patience_growth
+        self._since_best = 0
+
+    @property
+    def _is_trusted(self) -> bool:
+        """Whether predictions were good of late."""
+        return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
+
+    def _offer(self) -> WhatIf | None:
+        """Leave to call for predictions, where they are worth it."""
+        settings = self.settings
+        if not (settings.what_if and settings.what_if_calls and self._is_trusted):
+            return None
+        return WhatIf(self.surrogate, settings.what_if_calls)
+
+    def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[float] | None:
+        """Predicted robustness of candidates, or None where predictions were bad of late."""
+        if not self._is_trusted:
+            return None
+        return [verdict.robustness for verdict in self.surrogate.foresee(candidates)] or None
+
+    def _prediction_notes(self) -> list[str]:
+        """What the surrogate would simulate next, for the model."""
+        self._numeric = self._numeric or self.surrogate.ask(1)[0]
+        predictions = self._trusted_predictions([self._numeric])
+        if predictions is None:
+            return ["The numerical model's predictions were bad of late; judge by the trajectories alone."]
+        told = self.adviser.describe(self._numeric)
+        return [f"The numerical model expects robustness {predictions[0]:.4g} of its own best input: {told}."]
+
+    def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
+        """Predictions of the model's candidates, one line each."""
+        lines = [
+            f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; its predicted robustness is "
+            f"{p:.4g}."
+            for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
+        ]
+        return [*lines, "None is predicted to violate the requirement: revise them, or insist with a reason."]
+
+
+def _ranked(candidate: Candidate, prediction: float) -> Candidate:
+    text = f"{candidate.rationale} [predicted robustness {prediction:.4g}]"
+    return replace(candidate, rationale=text.strip())

@@ -1,0 +1,289 @@
+"""A language model as a search engine."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+from falsifier.core.space import Candidate
+from falsifier.engines.adviser import Advice, in_few_words
+from falsifier.engines.protocol import Proposer
+from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
+from falsifier.llm.disguise import Disguise
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, Tool
+from falsifier.llm.prompts import (
+    DEFAULT_PROMPT_TOKENS,
+    Variant,
+    View,
+    build_prompt,
+    choices,
+    render,
+    trimmed,
+    variant_named,
+)
+from falsifier.llm.prompts.what_if import what_if_tool
+from falsifier.llm.replies import ReplyForm
+from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
+from falsifier.problem.problem import Problem
+
+T = TypeVar("T")
+
+# Trajectories of older evaluations are let go, except for the best ones: prompts tell of few old samples.
+_KEPT_RECENT = 40
+_KEPT_BEST = 10
+
+
+class LLMProposer:
+    """Asks a language model for the next candidates.
+
+    Args:
+        view: the problem, without what simulates it.
+        chat: the model.
+        variant: what its prompts tell.
+        on_exchange: called with every question and answer.
+        sample: which of several runs with equal questions this is.
+        prompt_tokens: most tokens of a prompt, by estimate.
+        anonymous: whether the model is told neutral names only.
+        fallback: who goes on when the model cannot be reached or gives no valid reply; None: the error ends
+            the run.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        chat: Chat,
+        variant: Variant,
+        *,
+        on_exchange: OnExchange = lambda _: None,
+        sample: int = 0,
+        prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+        anonymous: bool = False,
+        fallback: Proposer | None = None,
+    ) -> None:
+        self._disguise = Disguise.of(view) if anonymous else None
+        self._view = self._disguise.view if self._disguise else view
+        self._chat = chat
+        self._variant = variant
+        self._on_exchange = on_exchange
+        self._sample = sample
+        self._prompt_tokens = prompt_tokens
+        self._fallback = fallback
+        self._handed_over = False
+        self._evaluations: list[Evaluation] = []
+        self._pending: list[Candidate] = []
+
+    @property
+    def name(self) -> str:
+        """Model and prompt variant."""
+        return f"{self._chat.model} {self._variant.name}"
+
+    @property
+    def handed_over(self) -> bool:
+        """Whether the fallback has taken over for good."""
+        return self._handed_over
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """Return n new candidates.
+
+        Raises:
+            ChatError: when the model cannot be reached or gives no valid reply, and there is no fallback.
+        """
+        candidates: list[Candidate] = []
+        while len(candidates) < n:
+            if self._handed_over and self._fallback is not None:
+                return candidates + self._fallback.ask(n - len(candidates))
+            try:
+                found = self._ask_once(n - len(candidates), dispensable=self._fallback is not None)
+            except ChatError:
+                if self._fallback is None:
+                    raise
+                self._handed_over = True
+                continue
+            self._pending += found
+            candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
+        return candidates
+
+    def propose(
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        *,
+        what_if: WhatIf | None = None,
+        dispensable: bool = False,
+    ) -> Advice:
+        """Return up to ``count`` new candidates, at least one, of a single question; see Adviser.propose.
+
+        Raises:
+            ChatError: when the model cannot be reached or gives no valid reply.
+        """
+        tool = None if what_if is None else self._tool(what_if)
+        found = self._ask_once(count, notes, tool, dispensable=dispensable)
+        self._pending += found
+        revealed = [self._disguise.revealed(c) for c in found] if self._disguise else found
+        return Advice(revealed, foresaw=tool is not None and tool.answered > 0)
+
+    def describe(self, candidate: Candidate) -> str:
+        """See Adviser.describe."""
+        shown = self._disguise.hidden_candidate(candidate) if self._disguise else candidate
+        if not self._variant.has("names"):
+            return "; ".join(choices.as_point(self._view, shown))
+        return in_few_words(shown)
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Add evaluations to the history, whoever proposed their candidates."""
+        if self._fallback is not None:
+            self._fallback.tell(evaluations)
+        told = [self._disguise.hidden(e) for e in evaluations] if self._disguise else evaluations
+        keys = {e.candidate.key for e in told}
+        self._pending = [c for c in self._pending if c.key not in keys]
+        self._evaluations = _thinned([*self._evaluations, *told])
+
+    def _tool(self, what_if: WhatIf) -> PredictionTool:
+        disguise = self._disguise
+        return PredictionTool(
+            what_if,
+            _form(self._view, self._variant, count=MOST_CANDIDATES, reasoned=False),
+            self._variant,
+            reveal=disguise.revealed if disguise else _unchanged,
+            hide=disguise.hidden_verdict if disguise else _unchanged,
+        )
+
+    def _ask_once(
+        self,
+        count: int,
+        notes: Sequence[str] = (),
+        tool: PredictionTool | None = None,
+        *,
+        dispensable: bool,
+    ) -> list[Candidate]:
+        variant = self._variant
+        form = _form(self._view, variant, count=count)
+        prompt = build_prompt(
+            self._view, variant, self._evaluations, pending=self._pending, notes=notes, count=count
+        )
+        request = ChatRequest(
+            messages=render(trimmed(prompt, self._prompt_tokens)),
+            reply_schema=form.schema(),
+            tools=() if tool is None else (tool.offer,),
+            sample=self._sample,
+        )
+        try:
+            return converse(
+                self._chat,
+                request,
+                lambda text: self._new(form.read(text, origin=self.name))[:count],
+                self._on_exchange,
+                respond=None if tool is None else tool.respond,
+            )
+        except NoValidReplyError:
+            raise
+        except ChatError as error:
+            if dispensable:  # so that a resumed run goes without at the same place
+                self._on_exchange(_unanswered(self._chat, request, error))
+            raise
+
+    def _new(self, candidates: list[Candidate]) -> list[Candidate]:
+        """Candidates that were not seen before.
+
+        Raises:
+            RejectedReplyError: when there is none.
+        """
+        seen = {e.candidate.key: f"sample {i}" for i, e in enumerate(self._evaluations, start=1)}
+        seen |= {c.key: "one that was proposed already" for c in self._pending}
+        new = {c.key: c for c in candidates if c.key not in seen}
+        if not new:
+            raise RejectedReplyError(f"it repeats {seen[candidates[0].key]}")
+        return list(new.values())
+
+
+def make_llm_proposer(
+    problem: Problem,
+    chat: Chat,
+    *,
+    variant: str | None = None,
+    on_exchange: OnExchange = lambda _: None,
+    sample: int = 0,
+    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+    anonymous: bool = False,
+    fallback: Proposer | None = None,
+) -> LLMProposer:
+    """Make the proposer for a problem; variant None means the default one. See LLMProposer.
+
+    Raises:
+        SpecError: for an unknown variant.
+    """
+    return LLMProposer(
+        View.of(problem),
+        chat,
+        variant_named(variant),
+        on_exchange=on_exchange,
+        sample=sample,
+        prompt_tokens=prompt_tokens,
+        anonymous=anonymous,
+        fallback=fallback,
+    )
+
+
+def preview(
+    problem: Problem,
+    *,
+    variant: str | None = None,
+    evaluations: Sequence[Evaluation] = (),
+    count: int = 1,
+    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+    anonymous: bool = False,
+) -> tuple[Message, ...]:
+    """Messages that would be sent next; sends nothing."""
+    view = View.of(problem)
+    if anonymous:
+        disguise = Disguise.of(view)
+        view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
+    prompt = build_prompt(view, variant_named(variant), evaluations, count=count)
+    return render(trimmed(prompt, prompt_tokens))
+
+
+def preview_tool(
+    problem: Problem, *, calls: int, variant: str | None = None, anonymous: bool = False
+) -> Tool:
+    """Tool that a question with leave to ask for predictions would offer; sends nothing."""
+    view = View.of(problem)
+    shown = Disguise.of(view).view if anonymous else view
+    form = _form(shown, variant_named(variant), count=MOST_CANDIDATES, reasoned=False)
+    return what_if_tool(form.schema(), calls=calls)
+
+
+def _form(view: View, variant: Variant, *, count: int, reasoned: bool = True) -> ReplyForm:
+    return ReplyForm(
+        view.space,
+        named=variant.has("names"),
+        free=variant.has("freedom"),
+        count=count,
+        reasoned=reasoned,
+    )
+
+
+def _unchanged(value: T) -> T:
+    return value
+
+
+def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
+    return Exchange(
+        model=chat.model,
+        messages=request.messages,
+        parameters=dict(chat.parameters),
+        reply=None,
+        problem=str(error),
+    )
+
+
+def _thinned(evaluations: list[Evaluation]) -> list[Evaluation]:
+    """Return the same evaluations without those trajectories that no prompt will tell."""
+    if len(evaluations) <= _KEPT_RECENT:
+        return evaluations
+    judged = sorted((e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None)
+    kept = {i for _, i in judged[:_KEPT_BEST]} | set(range(len(evaluations) - _KEPT_RECENT, len(evaluations)))
+    return [
+        e if i in kept or e.trajectory is None else replace(e, trajectory=None)
+        for i, e in enumerate(evaluations)
+    ]

@@ -1,0 +1,27 @@
+"""Quasi-random search: a scrambled Sobol sequence covers the box more evenly than random points."""
+
+import numpy as np
+from scipy.stats import qmc
+
+from falsifier.engines.box import BoxProposer, Proposal
+from falsifier.problem.problem import Problem
+
+# scipy's table of direction numbers ends here; more coordinates are drawn at random.
+_MOST_DIMENSIONS = qmc.Sobol.MAXDIM
+
+
+class Sobol(BoxProposer):
+    """Successive points of one scrambled Sobol sequence."""
+
+    name = "sobol"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        super().__init__(problem, seed=seed)
+        self._sequence = qmc.Sobol(
+            min(self.box.dimension, _MOST_DIMENSIONS), scramble=True, seed=np.random.default_rng(seed)
+        )
+
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        point = rng.random(self.box.dimension)
+        point[:_MOST_DIMENSIONS] = self._sequence.random(1)[0]
+        return Proposal(point, f"point {self._asked + 1} of a Sobol sequence")

@@ -1,0 +1,6 @@
+"""The default engine: learns the dynamics from trajectories and searches on the model."""
+
+from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.surrogate import Surrogate
+
+__all__ = ["Settings", "Surrogate"]

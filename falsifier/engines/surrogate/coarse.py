@@ -1,0 +1,314 @@
+"""Robustness of many predicted traces at once, on a coarse grid and with scaled margins.
+
+A formula is brought into negation normal form over *leaves*, signed margins of its predicates. On a coarse
+grid a sample is not enough: a peak between two samples decides an ``always``. So a leaf may be an envelope:
+its value at index k is the smallest (below an always) or largest (below an eventually) margin in the cell
+from t_k to t_(k+1).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, Literal
+
+import numpy as np
+
+from falsifier.engines.arrays import Array
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+)
+
+Envelope = Literal["sample", "low", "high"]
+Extreme = Callable[[Array, Array], Array]
+
+# A window bound that is this close to a grid point, in cells, counts as on it.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A predicate's margin as the normal form needs it.
+
+    Attributes:
+        predicate: the comparison.
+        sign: -1 where the normal form negates it.
+        envelope: what the value of a cell is.
+        discrete: whether it compares only signals with few values, so that its margin has no slope.
+    """
+
+    predicate: Predicate
+    sign: float
+    envelope: Envelope
+    discrete: bool
+
+    def margin(self, columns: Mapping[str, Any]) -> Array:
+        """Signed margin over columns of any shape; clipped to [-0.5, 0.5] where it is discrete."""
+        value = self.sign * margin(self.predicate, columns)
+        return np.clip(value, -0.5, 0.5) if self.discrete else value
+
+
+class Node(ABC):
+    """A form of the normal form; values have shape (traces, grid points)."""
+
+    @abstractmethod
+    def value(self, margins: Sequence[Array]) -> Array:
+        """Robustness at every grid point from the leaves' margins."""
+
+    @property
+    def needs_several(self) -> bool:
+        """Whether a violation needs several things at once: there is a disjunction somewhere."""
+        return False
+
+    @property
+    def cellwise(self) -> bool:
+        """Whether the value at k speaks of the whole cell behind t_k and not of t_k alone."""
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class _Atom(Node):
+    index: int
+    is_cell: bool
+
+    def value(self, margins: Sequence[Array]) -> Array:
+        return margins[self.index]
+
+    @property
+    def cellwise(self) -> bool:
+        return self.is_cell
+
+
+@dataclass(frozen=True, slots=True)
+class _Join(Node):
+    parts: tuple[Node, ...]
+    extreme: Extreme
+
+    def value(self, margins: Sequence[Array]) -> Array:
+        return reduce(self.extreme, (part.value(margins) for part in self.parts))
+
+    @property
+    def cellwise(self) -> bool:
+        return all(part.cellwise for part in self.parts)
+
+    @property
+    def needs_several(self) -> bool:
+        return self.extreme is np.maximum or any(part.needs_several for part in self.parts)
+
+
+@dataclass(frozen=True, slots=True)
+class _Slide(Node):
+    part: Node
+    first: int
+    last: int
+    extreme: Extreme
+
+    def value(self, margins: Sequence[Array]) -> Array:
+        return sliding(self.part.value(margins), self.first, self.last, self.extreme)
+
+    @property
+    def needs_several(self) -> bool:
+        return self.part.needs_several
+
+
+@dataclass(frozen=True, slots=True)
+class _Until(Node):
+    left: Node
+    right: Node
+    first: int
+    last: int
+    negated: bool
+
+    def value(self, margins: Sequence[Array]) -> Array:
+        # The release of negated operands is the negated until.
+        sign = -1.0 if self.negated else 1.0
+        left, right = sign * self.left.value(margins), sign * self.right.value(margins)
+        best: Array = np.full_like(right, -np.inf)
+        running: Array = np.full_like(left, np.inf)
+        for shift in range(min(self.last, left.shape[1] - 1) + 1):
+            running = np.minimum(running, shifted(left, shift))
+            if shift >= self.first:
+                best = np.maximum(best, np.minimum(running, shifted(right, shift)))
+        return sign * best
+
+    @property
+    def needs_several(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseFormula:
+    """A formula that judges traces on a grid.
+
+    Attributes:
+        leaves: margins that ``robustness`` needs, in this order.
+        root: the normal form.
+    """
+
+    leaves: tuple[Leaf, ...]
+    root: Node
+
+    def robustness(self, margins: Sequence[Array]) -> Array:
+        """Robustness at time 0 of each trace, shape (m,), from one margin array (m, n) for each leaf."""
+        return self.root.value(margins)[:, 0]
+
+    def deciding(self, margins: Sequence[Array]) -> list[tuple[int, int]]:
+        """Leaf and grid index that decide the robustness of each trace.
+
+        Only minima and maxima are taken, so the robustness is one of the margins. Equal margins are told
+        apart by increments of their own, far too small to matter.
+        """
+        stacked = np.stack(margins, axis=1).astype(np.float64)
+        traces, _, points = stacked.shape
+        marks = np.linspace(0.0, 1e-9 * max(1.0, float(np.abs(stacked).max())), stacked[0].size)
+        marked = stacked + marks.reshape(stacked.shape[1:])
+        values = self.robustness([marked[:, i] for i in range(len(margins))])
+        places = np.abs(marked.reshape(traces, -1) - values[:, None]).argmin(axis=1)
+        return [divmod(int(place), points) for place in places]
+
+
+def coarse_formula(
+    formula: Formula, step: float, *, discrete: frozenset[str] = frozenset(), stretch: float = 1.0
+) -> CoarseFormula:
+    """Compile a formula for a grid.
+
+    Args:
+        formula: the requirement.
+        step: of the grid in s.
+        discrete: names of signals that take only a few values.
+        stretch: factor of the end of every always window below another temporal operator.
+    """
+    builder = _Builder(step, discrete, stretch, sampled=_has_short_window(formula, step))
+    root = builder.build(formula, sign=1, above=None)
+    return CoarseFormula(tuple(builder.leaves), root)
+
+
+@dataclass(slots=True)
+class _Builder:
+    step: float
+    discrete: frozenset[str]
+    stretch: float
+    sampled: bool
+    leaves: list[Leaf]
+
+    def __init__(self, step: float, discrete: frozenset[str], stretch: float, *, sampled: bool) -> None:
+        self.step, self.discrete, self.stretch, self.sampled = step, discrete, stretch, sampled
+        self.leaves = []
+
+    def build(self, formula: Formula, *, sign: int, above: Extreme | None) -> Node:
+        match formula:
+            case Predicate():
+                return self._atom(formula, sign, above)
+            case Not(operand):
+                return self.build(operand, sign=-sign, above=above)
+            case And(left, right) | Or(left, right):
+                extreme = _extreme(smallest=isinstance(formula, And) == (sign > 0))
+                parts = tuple(self.build(part, sign=sign, above=above) for part in (left, right))
+                return _Join(parts, extreme)
+            case Implies(left, right):
+                return self.build(Or(Not(left), right), sign=sign, above=above)
+            case Iff(left, right):
+                both = And(Implies(left, right), Implies(right, left))
+                return self.build(both, sign=sign, above=above)
+            case Always(operand, window) | Eventually(operand, window):
+                smallest = isinstance(formula, Always) == (sign > 0)
+                extreme = _extreme(smallest=smallest)
+                stretch = self.stretch if smallest and above is not None else 1.0
+                part = self.build(operand, sign=sign, above=extreme)
+                first, last = self._indices(window, stretch, cellwise=part.cellwise)
+                return _Slide(part, first, last, extreme)
+            case Until(left, right, window):
+                held = self.build(left, sign=sign, above=_extreme(smallest=sign > 0))
+                reached = self.build(right, sign=sign, above=_extreme(smallest=sign < 0))
+                first, last = self._indices(window, 1.0, cellwise=False)
+                return _Until(held, reached, first, last, negated=sign < 0)
+            case Next(operand):
+                return _Slide(self.build(operand, sign=sign, above=above), 1, 1, np.minimum)
+        raise TypeError(f"no coarse robustness for {type(formula).__name__}")
+
+    def _atom(self, predicate: Predicate, sign: int, above: Extreme | None) -> Node:
+        names = {*predicate.left.signals, *predicate.right.signals}
+        discrete = bool(names) and names <= self.discrete
+        envelope: Envelope = "sample"
+        if above is not None and not self.sampled and not discrete:
+            envelope = "low" if above is np.minimum else "high"
+        self.leaves.append(Leaf(predicate, float(sign), envelope, discrete))
+        return _Atom(len(self.leaves) - 1, envelope != "sample")
+
+    def _indices(self, window: Window | None, stretch: float, *, cellwise: bool) -> tuple[int, int]:
+        if window is None:
+            return 0, 10**6
+        start, end = window.start / self.step, window.end * stretch / self.step
+        if window.end < self.step and window.end > 0:
+            return 1, 1
+        first = int(np.ceil(start - _ROUNDING))
+        last = int(np.floor(end + _ROUNDING))
+        return first, max(first, last - 1 if cellwise else last)
+
+
+def margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
+    """Robustness of a predicate over columns of any shape."""
+    left, right = predicate.left.evaluate(columns), predicate.right.evaluate(columns)
+    match predicate.operator:
+        case "<" | "<=":
+            return right - left
+        case ">" | ">=":
+            return left - right
+        case "==":
+            return -np.abs(left - right)
+        case "!=":
+            return np.abs(left - right)
+
+
+def sliding(values: Array, first: int, last: int, extreme: Extreme) -> Array:
+    """Extreme of values[:, k + first ... k + last] for each k; beyond the end the last value stays."""
+    count = values.shape[1]
+    first, last = min(first, count - 1), min(last, count - 1)
+    width = last - first + 1
+    padded = np.concatenate([values, np.repeat(values[:, -1:], last, axis=1)], axis=1)
+    covered = 1
+    while 2 * covered <= width:
+        padded = extreme(padded[:, :-covered], padded[:, covered:])
+        covered *= 2
+    tail = first + width - covered
+    return extreme(padded[:, first : first + count], padded[:, tail : tail + count])
+
+
+def shifted(values: Array, shift: int) -> Array:
+    """Values ``shift`` grid points later; beyond the end the last value stays."""
+    return sliding(values, shift, shift, np.minimum)
+
+
+def inner_windows(formula: Formula, *, nested: bool = False) -> list[float]:
+    """Lengths in s of the windows that stand below another temporal operator."""
+    lengths = []
+    if isinstance(formula, (Always, Eventually, Until)):
+        if nested and formula.window is not None:
+            lengths.append(formula.window.end - formula.window.start)
+        nested = True
+    for child in formula.children:
+        lengths += inner_windows(child, nested=nested)
+    return lengths
+
+
+def _extreme(*, smallest: bool) -> Extreme:
+    return np.minimum if smallest else np.maximum
+
+
+def _has_short_window(formula: Formula, step: float) -> bool:
+    return any(
+        isinstance(f, Next)
+        or (isinstance(f, (Always, Eventually)) and f.window is not None and 0 < f.window.end < step)
+        for f in formula.walk()
+    )

@@ -1,0 +1,102 @@
+"""What the models predict: the outputs, or their differences where only those matter.
+
+Positions of vehicles, levels of tanks, voltages against ground: a formula that compares such outputs only
+with each other does not care about a common shift, and neither does their dynamics, as a rule. Differences
+stay bounded where the positions run away, and one step of a trace then looks like any other.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.coarse import margin
+from falsifier.stl.formula import Formula
+
+# A shift of this many standard deviations must leave every margin as it is, but for rounding.
+_TRIAL_SHIFT = 3.0
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """Linear coordinates of the outputs.
+
+    Attributes:
+        outputs: names of the recorded outputs.
+        families: groups of indices into outputs that are replaced by differences of neighbours; the first
+            of a family is the reference of its shift and is not predicted.
+    """
+
+    outputs: tuple[str, ...]
+    families: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates."""
+        return len(self.outputs) - len(self.families)
+
+    @property
+    def _differences(self) -> NDArray[np.float64]:
+        """Matrix D of shape (dimension, outputs): coordinates = D outputs."""
+        matrix = np.eye(len(self.outputs))
+        for family in self.families:
+            for before, this in pairwise(family):
+                matrix[this, before] = -1.0
+        return np.delete(matrix, [family[0] for family in self.families], axis=0)
+
+    def of(self, trajectory: Trajectory) -> NDArray[np.float64]:
+        """Coordinates of a trajectory, shape (samples, dimension)."""
+        stacked = np.stack([trajectory[name] for name in self.outputs], axis=1)
+        return np.asarray(stacked @ self._differences.T)
+
+    def columns(self, values: Array) -> dict[str, Array]:
+        """Output columns of coordinates, shape (..., dimension); the reference of a family is set to 0."""
+        inverse = np.linalg.pinv(self._differences)
+        for family in self.families:
+            inverse[list(family)] -= inverse[family[0]]
+        outputs = values @ inverse.T.astype(values.dtype)
+        return {name: outputs[..., i] for i, name in enumerate(self.outputs)}
+
+
+def choose_coordinates(
+    formula: Formula, outputs: Sequence[str], units: Mapping[str, str], trajectory: Trajectory
+) -> Coordinates:
+    """Find the families of outputs that the formula compares only with each other.
+
+    A family are outputs of one unit whose names differ in digits alone, such as ``y1`` ... ``y5``.
+
+    Args:
+        formula: the requirement.
+        outputs: names of the recorded outputs.
+        units: units by name, where known.
+        trajectory: any one, to see whether a common shift changes a margin.
+    """
+    families: dict[tuple[str, str], list[int]] = {}
+    for i, name in enumerate(outputs):
+        families.setdefault((re.sub(r"\d+", "#", name), units.get(name, "")), []).append(i)
+    named = set(formula.signals)
+    relative = tuple(
+        tuple(family)
+        for family in families.values()
+        if len(family) > 1
+        and named & {outputs[i] for i in family}
+        and _is_relative(formula, [outputs[i] for i in family], trajectory)
+    )
+    return Coordinates(tuple(outputs), relative)
+
+
+def _is_relative(formula: Formula, family: Sequence[str], trajectory: Trajectory) -> bool:
+    columns = dict(trajectory.columns)
+    shift = _TRIAL_SHIFT * max(1.0, *(float(np.std(columns[name])) for name in family))
+    moved = {**columns, **{name: columns[name] + shift for name in family}}
+    for predicate in formula.predicates:
+        before, after = margin(predicate, columns), margin(predicate, moved)
+        if np.abs(after - before).max() > _SAME * (shift + np.abs(before).max()):
+            return False
+    return True

@@ -1,0 +1,158 @@
+"""Both models together: which of them to plan on, and what their errors teach."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.coarse import Envelope
+from falsifier.engines.surrogate.dynamics import (
+    DeviationDynamics,
+    Dynamics,
+    FourierDynamics,
+    StartState,
+)
+from falsifier.engines.surrogate.grid import Trace
+from falsifier.engines.surrogate.layout import Layout
+from falsifier.engines.surrogate.objective import LeafValues, Objective
+from falsifier.engines.surrogate.settings import Settings
+from falsifier.stl import Verdict
+
+_MODELS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
+    "nonlinear": FourierDynamics,
+    "linear": DeviationDynamics,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forecast:
+    """What the models predicted of one point.
+
+    Attributes:
+        values: of the objective's leaves, by model name.
+        chosen: name of the model that was planned on.
+        cost: scaled robustness that it predicted.
+    """
+
+    values: dict[str, LeafValues]
+    chosen: str
+    cost: float
+
+
+class Ensemble:
+    """Fits both models, prefers the one that erred less of late, and corrects each leaf by its recent errors.
+
+    The errors are honest ones: each prediction was made before the simulation.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._errors: dict[str, list[float]] = {name: [] for name in _MODELS}
+        self._deltas: list[list[float]] = []
+        self._missed: list[bool] = []
+        self._fitted: dict[str, Dynamics] = {}
+        self._start: StartState | None = None
+        self.chosen = ""
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether the better model's recent predictions were good."""
+        errors = self._recent_errors()
+        return bool(errors) and min(errors.values()) < self._settings.trusted_error
+
+    @property
+    def recent_error(self) -> float:
+        """Recent error of the model that was chosen last, as a share of the margins' spread; inf: unknown."""
+        return self._recent_errors().get(self.chosen, float("inf"))
+
+    @property
+    def misses(self) -> int:
+        """How many of the last forecasts in a row foretold a violation that did not happen."""
+        count = 0
+        for missed in reversed(self._missed):
+            if not missed:
+                break
+            count += 1
+        return count
+
+    def fit(self, traces: Sequence[Trace], best: Sequence[int], rng: np.random.Generator) -> None:
+        """Fit to traces, of which ``best`` are the least robust, and choose the model to plan on."""
+        self._fitted = {name: model(traces, best, self._settings, rng) for name, model in _MODELS.items()}
+        self._start = StartState(traces)
+        errors = self._recent_errors()
+        if errors and rng.random() >= self._settings.exploration:
+            self.chosen = min(errors, key=lambda name: errors[name])
+        else:
+            self.chosen = str(rng.choice(list(_MODELS)))
+
+    def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
+        """Return what maps points, shape (m, d), to the costs that the chosen model predicts, shape (m,)."""
+        corrected = self._corrected(objective)
+
+        def predict(points: Array) -> Array:
+            return corrected.cost(self._values(self.chosen, layout, corrected, points))
+
+        return predict
+
+    def verdicts(self, layout: Layout, objective: Objective, points: Array) -> list[Verdict]:
+        """Verdicts in the requirement's own unit that the chosen model predicts for points, shape (m, d)."""
+        corrected = self._corrected(objective).plain()
+        return corrected.verdicts(self._values(self.chosen, layout, corrected, points))
+
+    def forecast(self, layout: Layout, objective: Objective, point: Array) -> Forecast:
+        """Predictions of both models for one point, to be judged when it was simulated."""
+        values = {name: self._values(name, layout, objective, point[None]) for name in _MODELS}
+        cost = float(self._corrected(objective).cost(values[self.chosen])[0])
+        return Forecast(values, self.chosen, cost)
+
+    def judge(self, forecast: Forecast, true: LeafValues, objective: Objective, *, violated: bool) -> None:
+        """Compare a forecast with what the simulation gave."""
+        for name, values in forecast.values.items():
+            self._errors[name].append(_error(objective, values, true))
+        self._missed.append(forecast.cost < 0 and not violated)
+        self._deltas.append(_deltas(objective, forecast.values[forecast.chosen], true))
+
+    def _values(self, name: str, layout: Layout, objective: Objective, points: Array) -> LeafValues:
+        assert self._start is not None
+        inputs = layout.inputs(points, objective.grid)
+        prediction = self._fitted[name].predict(inputs, self._start.predict(inputs))
+        return objective.leaf_values(prediction.states, prediction.excess, inputs)
+
+    def _corrected(self, objective: Objective) -> Objective:
+        settings = self._settings
+        if len(self._deltas) < settings.offset_window:
+            return objective
+        offsets = np.median(self._deltas[-settings.offset_window :], axis=0)
+        return objective.shifted([float(v) for v in offsets], limit=settings.offset_limit)
+
+    def _recent_errors(self) -> dict[str, float]:
+        recent = self._settings.recent_errors
+        return {name: float(np.median(e[-recent:])) for name, e in self._errors.items() if e}
+
+
+def _error(objective: Objective, predicted: LeafValues, true: LeafValues) -> float:
+    """Root mean square error of the scaled leaf values, mean over the leaves."""
+    errors = [
+        np.sqrt(np.mean(((p - t) / scale) ** 2))
+        for p, t, scale in zip(predicted, true, objective.scales, strict=True)
+    ]
+    return float(np.mean(errors))
+
+
+def _deltas(objective: Objective, predicted: LeafValues, true: LeafValues) -> list[float]:
+    """For each leaf, how much larger its true extreme over the horizon is than the predicted one."""
+    return [
+        _extreme(leaf.envelope, t) - _extreme(leaf.envelope, p)
+        for leaf, p, t in zip(objective.leaves, predicted, true, strict=True)
+    ]
+
+
+def _extreme(envelope: Envelope, values: Array) -> float:
+    match envelope:
+        case "low":
+            return float(values.min())
+        case "high":
+            return float(values.max())
+        case "sample":
+            return float(np.median(values))

@@ -1,0 +1,99 @@
+"""The grid of predictions, and what one simulation looks like on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from falsifier.core.space import Candidate, SearchSpace
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.coarse import Leaf
+from falsifier.engines.surrogate.coordinates import Coordinates
+
+# What happens long after the formula's horizon teaches little about it.
+_MOST_HORIZONS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Evenly spaced times from 0 over the formula's horizon, and on to the end of the simulation.
+
+    Attributes:
+        step: in s.
+        cells: number of cells over the horizon.
+        all_cells: number of whole cells until the end of the simulation, or twenty horizons.
+    """
+
+    step: float
+    cells: int
+    all_cells: int
+
+    @classmethod
+    def over(cls, horizon: float, stop_time: float, *, cells: int, shortest: float) -> "Grid":
+        """Grid of so many cells over the horizon, fewer where they would be shorter than ``shortest`` s."""
+        horizon = min(horizon, stop_time) if horizon > 0 else stop_time
+        count = max(1, min(cells, round(horizon / shortest)))
+        step = horizon / count
+        rest = int(stop_time / step + 1e-6)
+        return cls(step, count, max(count, min(rest, _MOST_HORIZONS * count)))
+
+    @property
+    def middles(self) -> Array:
+        """Middle times of the horizon's cells in s, shape (cells,)."""
+        return np.asarray((np.arange(self.cells) + 0.5) * self.step)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """One simulation on the grid.
+
+    Attributes:
+        inputs: mean of each input in each cell and the parameters, scaled to [0, 1], shape
+            (all_cells, inputs + parameters).
+        states: coordinates at the grid points, shape (all_cells + 1, dimension).
+        excess: by how much each leaf's envelope in a cell lies beyond its margins at the cell's ends,
+            shape (all_cells, leaves); 0 where the leaf is a sample.
+    """
+
+    inputs: Array
+    states: Array
+    excess: Array
+
+
+def grid_inputs(space: SearchSpace, grid: Grid, candidate: Candidate) -> Array:
+    """Inputs and parameters of a candidate on all cells, as in Trace.inputs."""
+    # Eight samples a cell see the mean of a smooth signal and the middle of a held one.
+    fine = (np.arange(grid.all_cells * 8) + 0.5) * grid.step / 8
+    columns = []
+    for r in space.inputs:
+        means = candidate.signals[r.name].sample(fine).reshape(grid.all_cells, 8).mean(axis=1)
+        columns.append((means - r.low) / ((r.high - r.low) or 1.0))
+    for p in space.parameters:
+        value = (candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)
+        columns.append(np.full(grid.all_cells, value))
+    return np.stack(columns, axis=1)
+
+
+def trace_of(
+    space: SearchSpace,
+    grid: Grid,
+    coordinates: Coordinates,
+    leaves: Sequence[Leaf],
+    candidate: Candidate,
+    trajectory: Trajectory,
+) -> Trace:
+    """Bring a simulation onto the grid."""
+    points = np.round(np.arange(grid.all_cells + 1) * grid.step / trajectory.step).astype(int)
+    points = np.minimum(points, len(trajectory) - 1)
+    states = coordinates.of(trajectory)[points]
+    excess = np.zeros((grid.all_cells, len(leaves)))
+    for i, leaf in enumerate(leaves):
+        if leaf.envelope == "sample":
+            continue
+        margins = leaf.margin(trajectory.columns)[: points[-1] + 1]
+        extreme = np.minimum if leaf.envelope == "low" else np.maximum
+        inside = extreme.reduceat(margins, points[:-1])[: grid.all_cells]
+        ends = extreme(margins[points[:-1]], margins[points[1:]])
+        excess[:, i] = extreme(inside, ends) - ends
+    return Trace(grid_inputs(space, grid, candidate), states, excess)

@@ -1,0 +1,129 @@
+"""What was simulated so far, as the models and the planner need it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
+from falsifier.engines.surrogate.grid import Grid, Trace, trace_of
+from falsifier.engines.surrogate.layout import Layout
+from falsifier.engines.surrogate.objective import LeafValues, Objective, make_objective
+from falsifier.engines.surrogate.settings import Settings
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+
+# A signal with at most so many values, all whole numbers, has no slope that a search could follow.
+_MOST_LEVELS = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """One simulated candidate.
+
+    Attributes:
+        point: in the planning layout.
+        trace: on the grid.
+        values: of the objective's leaves, shape (1, cells + 1) each.
+        robustness: of the requirement.
+        critical: critical time as a share of the horizon.
+        arm: which arm of the engine proposed it, empty for foreign ones.
+    """
+
+    point: Array
+    trace: Trace
+    values: LeafValues
+    robustness: float
+    critical: float
+    arm: str
+
+
+@dataclass
+class History:
+    """Samples of one problem; the first trajectory decides coordinates and which signals are discrete."""
+
+    problem: Problem
+    grid: Grid
+    layout: Layout
+    settings: Settings
+    samples: list[Sample] = field(default_factory=list)
+    objective: Objective | None = None
+    _coordinates: Coordinates | None = None
+    _scaled: Objective | None = None
+
+    def add(self, evaluation: Evaluation, arm: str) -> Sample | None:
+        """Take note of an evaluation; None where it has no trajectory to learn from."""
+        trajectory, robustness = evaluation.trajectory, evaluation.robustness
+        if trajectory is None or robustness is None:
+            return None
+        if self.objective is None:
+            self._start(trajectory)
+        assert self.objective is not None and self._coordinates is not None
+        space = self.problem.space
+        trace = trace_of(
+            space, self.grid, self._coordinates, self.objective.leaves, evaluation.candidate, trajectory
+        )
+        cells = self.grid.cells
+        values = self.objective.leaf_values(
+            trace.states[None, : cells + 1], trace.excess[None, :cells], trace.inputs[None, :cells]
+        )
+        critical = evaluation.verdict.critical_time / (self.grid.step * cells) if evaluation.verdict else 1.0
+        point = self.layout.point(evaluation.candidate)
+        sample = Sample(point, trace, values, robustness, min(critical, 1.0), arm)
+        self.samples.append(sample)
+        self._scaled = None
+        return sample
+
+    def _start(self, trajectory: Trajectory) -> None:
+        problem = self.problem
+        driven = {r.name for r in problem.space.inputs}
+        outputs = [name for name in problem.experiment.outputs if name not in driven]
+        formula = problem.requirement.formula
+        self._coordinates = choose_coordinates(formula, outputs, trajectory.units, trajectory)
+        self.objective = make_objective(
+            formula,
+            problem.space,
+            self.grid,
+            self._coordinates,
+            discrete=frozenset(name for name in outputs if _is_discrete(problem, name, trajectory)),
+            stretches=self.settings.stretches,
+        )
+
+    def scaled_objective(self) -> Objective:
+        """Objective with the scales of all samples."""
+        assert self.objective is not None
+        if self._scaled is None:
+            self._scaled = self.objective.rescaled([s.values for s in self.samples])
+        return self._scaled
+
+    @property
+    def points(self) -> Array:
+        """Points of all samples, shape (samples, d)."""
+        return np.array([s.point for s in self.samples]).reshape(-1, self.layout.dimension)
+
+    def direct_costs(self) -> list[float]:
+        """What search without a model minimises: the robustness, or a relaxation that has a slope."""
+        return [self.direct_cost(s) for s in self.samples]
+
+    def direct_cost(self, sample: Sample) -> float:
+        """Mean of the relaxed formulas' robustness; the true one where it is negative or has a slope."""
+        if sample.robustness < 0 or self.objective is None or not self.objective.is_relaxed:
+            return sample.robustness
+        return float(self.scaled_objective().cost(sample.values)[0])
+
+
+def scaled_costs(samples: Sequence[Sample], objective: Objective) -> Array:
+    """Scaled robustness of the simulated traces, shape (samples,)."""
+    stacked = [np.concatenate(leaf) for leaf in zip(*(s.values for s in samples), strict=True)]
+    return np.asarray(objective.cost(stacked), dtype=np.float64)
+
+
+def _is_discrete(problem: Problem, name: str, trajectory: Trajectory) -> bool:
+    if name in problem.info:
+        kind = problem.info[name].kind
+        if kind in ("integer", "boolean", "enumeration"):
+            return True
+    levels = np.unique(trajectory[name])
+    return len(levels) > 1 and len(levels) <= _MOST_LEVELS and bool((levels == np.round(levels)).all())

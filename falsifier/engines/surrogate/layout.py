@@ -1,0 +1,170 @@
+"""How a vector in [0, 1]^d stands for a candidate: the parameterizations that the engine searches in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.signals import Interpolation, Signal, even_times
+from falsifier.core.space import Candidate, Freedom, InputRange, SearchSpace
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.grid import Grid
+
+
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """The coordinates of one input.
+
+    Attributes:
+        times: control-point times in s.
+        interpolation: between them.
+        fine: whether neighbours mostly stay equal (many held cells) or every point is set by itself.
+    """
+
+    times: tuple[float, ...]
+    interpolation: Interpolation
+    fine: bool
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Codings of all inputs, in the space's order, followed by one coordinate for each parameter.
+
+    Attributes:
+        space: what is searched.
+        codings: one for each input.
+    """
+
+    space: SearchSpace
+    codings: tuple[Coding, ...]
+
+    @cached_property
+    def groups(self) -> tuple[NDArray[np.intp], ...]:
+        """Indices of the coordinates of each input and each parameter."""
+        counts = [*(len(c.times) for c in self.codings), *(1 for _ in self.space.parameters)]
+        ends = np.cumsum(counts)
+        return tuple(np.arange(end - count, end) for count, end in zip(counts, ends, strict=True))
+
+    @cached_property
+    def dimension(self) -> int:
+        """Number of coordinates d."""
+        return sum(len(g) for g in self.groups)
+
+    @cached_property
+    def is_fine(self) -> tuple[bool, ...]:
+        """Whether each group consists of many held cells."""
+        return (*(c.fine for c in self.codings), *(False for _ in self.space.parameters))
+
+    def inputs(self, points: Array, grid: Grid) -> Array:
+        """Scaled inputs and parameters in the horizon's cells, shape (m, cells, groups), of m points."""
+        values = np.empty((len(points), grid.cells, len(self.groups)))
+        for j, group in enumerate(self.groups):
+            own = points[:, group]
+            values[:, :, j] = _read(self.codings[j], own, grid.middles) if j < len(self.codings) else own
+        return values
+
+    def candidate(self, point: Array, *, origin: str, rationale: str) -> Candidate:
+        """Candidate of a point; equal neighbours of held cells become one piece."""
+        point = np.clip(point, 0.0, 1.0)
+        signals = {}
+        for r, coding, group in zip(self.space.inputs, self.codings, self.groups, strict=False):
+            values = r.low + (r.high - r.low) * point[group]
+            keep = np.ones(len(values), dtype=bool)
+            if coding.fine:
+                keep[1:] = values[1:] != values[:-1]
+            times = np.asarray(coding.times)[keep]
+            signals[r.name] = Signal(
+                tuple(float(t) for t in times), tuple(float(v) for v in values[keep]), coding.interpolation
+            )
+        scalars = point[len(point) - len(self.space.parameters) :]
+        parameters = {
+            p.name: float(p.low + (p.high - p.low) * v)
+            for p, v in zip(self.space.parameters, scalars, strict=True)
+        }
+        return self.space.admit(Candidate(signals, parameters, origin, rationale))
+
+    def point(self, candidate: Candidate) -> Array:
+        """Point whose signals have the candidate's values at this layout's control points."""
+        parts = []
+        for r, coding in zip(self.space.inputs, self.codings, strict=True):
+            at = np.asarray(coding.times)
+            if coding.fine:
+                at = at + 0.5 * (at[1] - at[0] if len(at) > 1 else 0.0)
+            signal = candidate.signals[r.name]
+            values = np.asarray(
+                signal.values if signal.times == coding.times else signal.held(None).sample(at)
+            )
+            parts.append((values - r.low) / ((r.high - r.low) or 1.0))
+        for p in self.space.parameters:
+            parts.append(np.array([(candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)]))
+        return np.asarray(np.clip(np.concatenate(parts), 0.0, 1.0))
+
+    def constant(self, levels: Sequence[float]) -> Array:
+        """Point at which each input and parameter is constant at its level in [0, 1]."""
+        point = np.empty(self.dimension)
+        for group, level in zip(self.groups, levels, strict=True):
+            point[group] = level
+        return point
+
+
+def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
+    """Held cells where the parameterization is free, the spec's control points elsewhere."""
+    return Layout(
+        space,
+        tuple(
+            _fixed(r, space.stop_time)
+            if r.free is None
+            else _held(grid.step * grid.cells, grid.cells, r.free, fine=True)
+            for r in space.inputs
+        ),
+    )
+
+
+def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tuple[Layout, ...]:
+    """Layouts of few coordinates for search without a model, to be taken in turn.
+
+    Args:
+        space: what is searched.
+        grid: its horizon is what free inputs are divided over.
+        pieces: numbers of held pieces of the free inputs, one for each layout.
+    """
+    if all(r.free is None for r in space.inputs):
+        return (Layout(space, tuple(_fixed(r, space.stop_time) for r in space.inputs)),)
+    horizon = grid.step * grid.cells
+    return tuple(
+        Layout(
+            space,
+            tuple(
+                _fixed(r, space.stop_time) if r.free is None else _held(horizon, count, r.free, fine=False)
+                for r in space.inputs
+            ),
+        )
+        for count in pieces
+    )
+
+
+def _fixed(r: InputRange, stop_time: float) -> Coding:
+    times = even_times(r.control_points, stop_time=stop_time, interpolation=r.interpolation)
+    return Coding(times, r.interpolation, fine=False)
+
+
+def _held(horizon: float, count: int, free: Freedom, *, fine: bool) -> Coding:
+    count = max(1, min(count, free.max_control_points, int(horizon / free.min_interval + 1e-6)))
+    return Coding(even_times(count, stop_time=horizon, interpolation="constant"), "constant", fine)
+
+
+def _read(coding: Coding, values: Array, at: Array) -> Array:
+    """Values of m signals, shape (m, points), at times in s: shape (m, times)."""
+    knots = np.asarray(coding.times)
+    if len(knots) == 1:
+        return np.repeat(values, len(at), axis=1)
+    at = np.clip(at, knots[0], knots[-1])
+    if coding.interpolation == "constant":
+        return np.asarray(values[:, np.searchsorted(knots, at, side="right") - 1])
+    if coding.interpolation == "linear":
+        return np.stack([np.interp(at, knots, row) for row in values])
+    from scipy.interpolate import PchipInterpolator
+
+    return np.asarray(np.clip(PchipInterpolator(knots, values, axis=1)(at), 0.0, 1.0))

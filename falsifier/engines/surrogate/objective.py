@@ -1,0 +1,132 @@
+"""What the search minimises on predicted traces: robustness with margins in comparable units."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from falsifier.core.space import SearchSpace
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.coarse import CoarseFormula, Leaf, coarse_formula
+from falsifier.engines.surrogate.coordinates import Coordinates
+from falsifier.engines.surrogate.grid import Grid
+from falsifier.stl import Verdict
+from falsifier.stl.formula import Formula
+
+LeafValues = list[Array]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Robustness of traces on the grid, each leaf shifted by its offset and divided by its scale.
+
+    Attributes:
+        space: for the ranges of inputs that the formula names.
+        grid: of the traces.
+        coordinates: what the states of the traces are.
+        formulas: the formula; where it reads discrete signals, relaxed ones too, whose mean has a slope.
+        scales: unit of each leaf.
+        offsets: correction of each leaf, in the leaf's own unit.
+    """
+
+    space: SearchSpace
+    grid: Grid
+    coordinates: Coordinates
+    formulas: tuple[CoarseFormula, ...]
+    scales: tuple[float, ...]
+    offsets: tuple[float, ...]
+
+    @property
+    def leaves(self) -> tuple[Leaf, ...]:
+        """Leaves of the formula."""
+        return self.formulas[0].leaves
+
+    @property
+    def is_relaxed(self) -> bool:
+        """Whether the robustness alone has no slope."""
+        return len(self.formulas) > 1
+
+    def leaf_values(
+        self,
+        states: Array,
+        excess: Array,
+        inputs: Array,
+    ) -> LeafValues:
+        """Value of each leaf at every grid point of the horizon, shape (m, cells + 1) each.
+
+        Args:
+            states: shape (m, cells + 1, dimension).
+            excess: shape (m, cells, leaves).
+            inputs: scaled inputs, shape (m, cells, inputs).
+        """
+        columns = self.coordinates.columns(states)
+        for j, r in enumerate(self.space.inputs):
+            held = np.concatenate([inputs[:, :, j], inputs[:, -1:, j]], axis=1)
+            columns[r.name] = r.low + (r.high - r.low) * held
+        values = []
+        for i, leaf in enumerate(self.leaves):
+            margin = np.broadcast_to(leaf.margin(columns), states.shape[:2])
+            if leaf.envelope != "sample":
+                extreme = np.minimum if leaf.envelope == "low" else np.maximum
+                inside = extreme(margin[:, :-1], margin[:, 1:]) + extreme(excess[:, :, i], 0.0)
+                margin = np.concatenate([inside, margin[:, -1:]], axis=1)
+            values.append(margin)
+        return values
+
+    def scaled(self, values: LeafValues) -> LeafValues:
+        """Leaf values with offsets and scales applied."""
+        return [
+            (value + offset) / scale
+            for value, offset, scale in zip(values, self.offsets, self.scales, strict=True)
+        ]
+
+    def cost(self, values: LeafValues) -> Array:
+        """Scaled robustness of each trace from its leaf values, shape (m,)."""
+        scaled = self.scaled(values)
+        return np.asarray(np.mean([formula.robustness(scaled) for formula in self.formulas], axis=0))
+
+    def verdicts(self, values: LeafValues) -> list[Verdict]:
+        """Verdict of each trace from its leaf values, by this objective's cost and the formula as it is."""
+        deciding = self.formulas[0].deciding(self.scaled(values))
+        return [
+            Verdict(float(cost), self.grid.step * point, str(self.leaves[leaf].predicate))
+            for cost, (leaf, point) in zip(self.cost(values), deciding, strict=True)
+        ]
+
+    def rescaled(self, seen: Sequence[LeafValues]) -> "Objective":
+        """Return the objective with each leaf's scale set to the standard deviation of its seen values."""
+        scales = []
+        for i, leaf in enumerate(self.leaves):
+            spread = float(np.std(np.concatenate([values[i] for values in seen])))
+            scales.append(0.5 if leaf.discrete else max(spread, 1e-9))
+        return replace(self, scales=tuple(scales))
+
+    def plain(self) -> "Objective":
+        """Return the objective in the requirement's own unit, without relaxation; offsets stay."""
+        return replace(self, formulas=self.formulas[:1], scales=(1.0,) * len(self.leaves))
+
+    def shifted(self, offsets: Sequence[float], *, limit: float) -> "Objective":
+        """Return the objective with offsets, clipped to ``limit`` scales; discrete leaves have none."""
+        clipped = [
+            0.0 if leaf.discrete else float(np.clip(offset, -limit * scale, limit * scale))
+            for leaf, offset, scale in zip(self.leaves, offsets, self.scales, strict=True)
+        ]
+        return replace(self, offsets=tuple(clipped))
+
+
+def make_objective(
+    formula: Formula,
+    space: SearchSpace,
+    grid: Grid,
+    coordinates: Coordinates,
+    *,
+    discrete: frozenset[str],
+    stretches: Sequence[float],
+) -> Objective:
+    """Objective without scales yet."""
+    plain = coarse_formula(formula, grid.step, discrete=discrete)
+    formulas = [plain]
+    if any(leaf.discrete for leaf in plain.leaves):
+        formulas = [coarse_formula(formula, grid.step, discrete=discrete, stretch=s) for s in stretches]
+    count = len(plain.leaves)
+    return Objective(space, grid, coordinates, tuple(formulas), (1.0,) * count, (0.0,) * count)

@@ -1,0 +1,138 @@
+"""Optimising predicted traces: evolution on the model, steps towards bounds, and a liking for extremes."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from falsifier.engines.arrays import Array
+from falsifier.engines.surrogate.layout import Layout
+from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.variation import mutations, random_points
+
+# Two points that differ by less than this in every coordinate are the same simulation.
+_SAME_POINT = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A point with its predicted scaled robustness.
+
+    Attributes:
+        point: in [0, 1]^d.
+        cost: predicted.
+        is_simple: whether it was preferred for being extreme.
+    """
+
+    point: Array
+    cost: float
+    is_simple: bool
+
+
+def plan(
+    predict: Callable[[Array], Array],
+    layout: Layout,
+    *,
+    elites: Array,
+    critical: Array,
+    seen: Array,
+    settings: Settings,
+    snap: float,
+    rng: np.random.Generator,
+) -> Plan:
+    """Return the most promising point that was not simulated yet.
+
+    Args:
+        predict: cost of points.
+        layout: of the points.
+        elites: best simulated points, shape (e, d).
+        critical: their critical times as shares of the horizon, shape (e,).
+        seen: all simulated or asked points, shape (s, d).
+        settings: sizes.
+        snap: how much worse a simple point may be predicted and still be taken.
+        rng: generator.
+    """
+    bred = settings.pool // 3
+    children = np.concatenate(
+        [
+            random_points(layout, rng, settings.pool - bred),
+            elites,
+            mutations(layout, rng, elites, bred, critical=critical),
+        ]
+    )
+    pool, costs = _best(children, predict(children), settings.parents)
+    for _ in range(settings.generations - 1):
+        children = mutations(layout, rng, pool, settings.children)
+        pool, costs = _best(
+            np.concatenate([pool, children]),
+            np.concatenate([costs, predict(children)]),
+            settings.parents,
+        )
+    for step in range(settings.vertex_steps):
+        base = pool[0] if step % 2 == 0 else pool[rng.integers(min(5, len(pool)))]
+        towards = _towards_bounds(predict, base)
+        pool, costs = _best(
+            np.concatenate([pool, towards]),
+            np.concatenate([costs, predict(towards)]),
+            settings.parents,
+        )
+    simple = np.array([p for p in _simple_points(layout, pool) if not _is_seen(p, seen)])
+    if len(simple):
+        simple_costs = predict(simple)
+        best = int(np.argmin(simple_costs))
+        if simple_costs[best] <= costs[0] + snap:
+            return Plan(simple[best], float(simple_costs[best]), is_simple=True)
+    # Only where the whole pool was simulated before are the further points looked at.
+    others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
+    points = np.concatenate([pool, *others])
+    unseen = next((i for i, point in enumerate(points) if not _is_seen(point, seen)), 0)
+    return Plan(points[unseen], float(costs[min(unseen, len(costs) - 1)]), is_simple=False)
+
+
+def _best(points: Array, costs: Array, count: int) -> tuple[Array, Array]:
+    order = np.argsort(costs, kind="stable")[:count]
+    return points[order], costs[order]
+
+
+def _towards_bounds(predict: Callable[[Array], Array], base: Array) -> Array:
+    """Points between the base and the corner that its gradient points to."""
+    step = np.where(base > 0.5, -0.05, 0.05)
+    costs = predict(np.concatenate([base[None], base + np.diag(step)]))
+    gradient = (costs[1:] - costs[0]) / step
+    corner = (gradient < 0).astype(np.float64)
+    size = np.abs(gradient)
+    points = [base + share * (corner - base) for share in (0.1, 0.3, 0.6, 1.0)]
+    points += [np.where(size > share * size.max(), corner, base) for share in (0.1, 0.3)]
+    return np.array(points)
+
+
+def _simple_points(layout: Layout, pool: Array) -> Iterator[Array]:
+    """Variants of the best points that are constant or at bounds in some or all inputs."""
+    if len(layout.groups) <= 4:
+        choices: Sequence[tuple[float | None, ...]] = list(
+            product((None, 0.0, 1.0), repeat=len(layout.groups))
+        )
+        for levels in choices:
+            for base in pool[:3]:
+                point = base.copy()
+                for group, level in zip(layout.groups, levels, strict=True):
+                    if level is not None:
+                        point[group] = level
+                if _is_at_bounds(layout, point):
+                    yield point
+    for base in pool[:5]:
+        point = np.round(base)
+        if _is_at_bounds(layout, point):
+            yield point
+
+
+def _is_at_bounds(layout: Layout, point: Array) -> bool:
+    """Whether every coordinate is at a bound and every input constant, but for a hundredth of them."""
+    extreme = np.mean((point == 0.0) | (point == 1.0))
+    changing = np.mean([np.mean(np.diff(point[g]) != 0) if len(g) > 1 else 0.0 for g in layout.groups])
+    return bool(extreme - changing > 0.99)
+
+
+def _is_seen(point: Array, seen: Array) -> bool:
+    return bool(len(seen)) and bool((np.abs(seen - point).max(axis=1) < _SAME_POINT).any())

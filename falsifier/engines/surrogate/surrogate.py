@@ -1,0 +1,235 @@
+"""The surrogate engine: learn the dynamics, plan on the model, simulate, refit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.space import Candidate
+from falsifier.engines.arrays import Array
+from falsifier.engines.corner_walk import CornerWalk, Levels
+from falsifier.engines.surrogate.arms import choose_arm, quality
+from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
+from falsifier.engines.surrogate.forecast import Ensemble, Forecast
+from falsifier.engines.surrogate.grid import Grid
+from falsifier.engines.surrogate.history import History, Sample, scaled_costs
+from falsifier.engines.surrogate.layout import Layout, planning_layout, region_layouts
+from falsifier.engines.surrogate.opening import opening
+from falsifier.engines.surrogate.planning import plan
+from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.trust_region import TrustRegion
+from falsifier.engines.surrogate.variation import random_points, stepping, switching
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pending:
+    """What the engine must remember of a candidate until it is told its evaluation.
+
+    Attributes:
+        arm: which part of the engine proposed it.
+        layout: what the point is of.
+        point: in [0, 1]^d.
+        why: rationale of the candidate.
+        levels: of a constant extreme.
+        region: which trust region proposed it.
+        forecast: what the models predicted.
+    """
+
+    arm: str
+    layout: Layout
+    point: Array
+    why: str
+    levels: Levels | None = None
+    region: TrustRegion | None = None
+    forecast: Forecast | None = None
+
+
+class Surrogate:
+    """Learns the dynamics from whole trajectories and simulates what it predicts to be least robust.
+
+    Beside the model it searches directly, in a trust region, and gives whoever does better more turns.
+    """
+
+    name = "surrogate"
+
+    def __init__(self, problem: Problem, *, seed: int, settings: Settings | None = None) -> None:
+        self.problem, self.seed, self.settings = problem, seed, settings or Settings()
+        space, formula = problem.space, problem.requirement.formula
+        interval = problem.experiment.output_interval
+        self.grid = Grid.over(
+            formula.horizon(interval), space.stop_time, cells=self.settings.cells, shortest=interval
+        )
+        self.layout = planning_layout(space, self.grid)
+        self.history = History(problem, self.grid, self.layout, self.settings)
+        self.models = Ensemble(self.settings)
+        windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
+        self._windows = windows
+        self._opening = opening(
+            self.settings,
+            has_inputs=bool(space.inputs),
+            windows=windows,
+            needs_several=coarse_formula(formula, self.grid.step).root.needs_several,
+        )
+        self._walk = CornerWalk(len(self.layout.groups))
+        self._region_layouts = region_layouts(space, self.grid, self.settings.region_pieces)
+        self._regions = 0
+        self._region: TrustRegion | None = None
+        self._asked = self._planned = self._simple = 0
+        self._pending: dict[object, Pending] = {}
+        self._suggested: list[Array] = []
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """See Proposer.ask."""
+        return [self._ask_one() for _ in range(max(n, 1))]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """See Proposer.tell."""
+        for evaluation in evaluations:
+            told = self.problem.space.admit(evaluation.candidate)
+            pending = self._pending.pop(told.key, None)
+            sample = self.history.add(evaluation, pending.arm if pending else "")
+            if pending is not None:
+                self._settle(pending, sample)
+
+    def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
+        """Verdicts that the better model predicts for candidates, without a simulation.
+
+        Empty before two simulations are known. The values are in the requirement's own unit.
+        """
+        if len(self.history.samples) < 2 or not candidates:
+            return []
+        rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
+        self._fit(rng)
+        points = np.array([self.layout.point(c) for c in candidates])
+        return self.models.verdicts(self.layout, self.history.scaled_objective(), points)
+
+    @property
+    def recent_error(self) -> float:
+        """Error of recent predictions, as a share of the spread of the margins; inf while there are none."""
+        return self.models.recent_error
+
+    def suggest(self, candidates: Sequence[Candidate]) -> None:
+        """Let the next plan breed from these candidates, too."""
+        self._suggested = [self.layout.point(c) for c in candidates]
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether recent predictions were good."""
+        return self.models.is_trusted
+
+    @property
+    def misses(self) -> int:
+        """How many of the last planned inputs in a row were predicted to violate and did not."""
+        return self.models.misses
+
+    def _settle(self, pending: Pending, sample: Sample | None) -> None:
+        """Learn from the evaluation of a candidate of its own."""
+        if pending.levels is not None:
+            self._walk.learn(pending.levels, None if sample is None else sample.robustness)
+        if pending.region is not None:
+            if sample is None:
+                cost = max((s.robustness for s in self.history.samples), default=1.0)
+            else:
+                cost = self.history.direct_cost(sample)
+            pending.region.tell(pending.point, cost)
+        if pending.forecast is not None and sample is not None:
+            objective = self.history.scaled_objective()
+            self.models.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
+
+    def _ask_one(self) -> Candidate:
+        rng = np.random.default_rng([self.seed, self._asked])
+        pending = self._propose(rng)
+        self._asked += 1
+        candidate = pending.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
+        self._pending[candidate.key] = pending
+        return candidate
+
+    def _propose(self, rng: np.random.Generator) -> Pending:
+        kind = self._opening[self._asked] if self._asked < len(self._opening) else ""
+        if not self.problem.space.inputs and not self._walk.settled:
+            # Parameters alone: extremes are cheap to try and decide most often.
+            kind = "constant"
+        if kind == "constant" and (levels := self._walk.next(rng)) is not None:
+            point = self.layout.constant(levels)
+            return Pending("constant", self.layout, point, "constant extremes", levels)
+        if kind == "switching":
+            return self._switch(rng)
+        if kind == "stepping":
+            point = stepping(self.layout, rng, self.settings.probe_pieces)
+            return Pending("stepping", self.layout, point, "steps through many levels of each input")
+        if len(self.history.samples) < 2:
+            point = random_points(self.layout, rng, 1)[0]
+            return Pending("random", self.layout, point, "random: too little is known yet")
+        arm = self._choose_arm(rng)
+        if arm == "model":
+            return self._plan(rng)
+        return self._switch(rng) if arm == "switching" else self._search(rng)
+
+    def _choose_arm(self, rng: np.random.Generator) -> str:
+        settings = self.settings
+        if self._planned < settings.trial and rng.random() < settings.trial_share:
+            return "model"
+        costs = self.history.direct_costs()
+        arms = [s.arm for s in self.history.samples]
+        may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
+        names = ("model", "region", "switching") if may_switch else ("model", "region")
+        qualities = {name: quality(name, arms, costs, window=settings.bandit_window) for name in names}
+        if self.models.is_trusted and qualities["model"] == max(qualities.values()):
+            return "model" if rng.random() < settings.trusted_share else "region"
+        if self._region is None or self._region.is_starting:
+            qualities["region"] = max(0.5, qualities["region"])
+        return choose_arm(qualities, rng, least=settings.least_share)
+
+    def _switch(self, rng: np.random.Generator) -> Pending:
+        dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
+        why = f"inputs switch between their bounds every {dwell:.3g} s, a part of an inner window"
+        return Pending("switching", self.layout, switching(self.layout, rng, dwell), why)
+
+    def _plan(self, rng: np.random.Generator) -> Pending:
+        settings, samples = self.settings, self.history.samples
+        objective = self.history.scaled_objective()
+        order = self._fit(rng)
+        points, elites = self.history.points, order[: settings.elites]
+        suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
+        self._suggested = []
+        asked = [p.point for p in self._pending.values() if p.layout is self.layout]
+        result = plan(
+            self.models.predictor(self.layout, objective),
+            self.layout,
+            elites=np.concatenate([suggested, points[elites]]),
+            critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
+            seen=np.concatenate([points, np.array(asked).reshape(-1, self.layout.dimension)]),
+            settings=settings,
+            snap=settings.snap * settings.snap_decay**self._simple,
+            rng=rng,
+        )
+        self._planned += 1
+        self._simple += result.is_simple
+        why = (
+            f"the {self.models.chosen} model predicts a scaled robustness of {result.cost:.3g}"
+            f"{', preferred for its simple shape' if result.is_simple else ''}"
+        )
+        forecast = self.models.forecast(self.layout, objective, result.point)
+        return Pending("model", self.layout, result.point, why, forecast=forecast)
+
+    def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
+        """Fit the models; return the indices of the samples, the least robust first."""
+        samples = self.history.samples
+        order = np.argsort(scaled_costs(samples, self.history.scaled_objective()), kind="stable")
+        best = [int(i) for i in order[: self.settings.best_count]]
+        self.models.fit([s.trace for s in samples], best, rng)
+        return order
+
+    def _search(self, rng: np.random.Generator) -> Pending:
+        if self._region is None or self._region.is_exhausted:
+            layout = self._region_layouts[self._regions % len(self._region_layouts)]
+            self._regions += 1
+            self._region = TrustRegion(layout.dimension, self.settings)
+        layout = self._region_layouts[(self._regions - 1) % len(self._region_layouts)]
+        point = self._region.ask(rng)
+        why = f"direct search in a trust region of {layout.dimension} coordinates"
+        return Pending("region", layout, point, why, region=self._region)

@@ -1,0 +1,117 @@
+"""One candidate in, one evaluation out."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.space import Candidate
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import MonitorError, SimulationError
+from falsifier.problem.problem import Problem
+from falsifier.stl import Formula, Monitor
+from falsifier.stl.verdict import Verdict
+
+Status = Literal["ok", "failed", "crashed", "timeout"]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """A candidate with its verdict, or the reason why there is none.
+
+    Attributes:
+        candidate: what was simulated.
+        status: ``ok``, or how the simulation ended instead.
+        verdict: robustness and what decided it; None unless the status is ok.
+        reason: why there is no verdict, empty otherwise.
+        trajectory: outputs, then inputs, on the output grid; None unless the status is ok.
+        seconds: wall-clock time of the simulation.
+        log: messages of the model.
+    """
+
+    candidate: Candidate
+    status: Status = "ok"
+    verdict: Verdict | None = None
+    reason: str = ""
+    trajectory: Trajectory | None = None
+    seconds: float = 0.0
+    log: tuple[str, ...] = ()
+
+    @property
+    def robustness(self) -> float | None:
+        """Robustness, or None without a verdict."""
+        return None if self.verdict is None else self.verdict.robustness
+
+    @property
+    def violated(self) -> bool:
+        """Whether the requirement is violated; a failed simulation violates nothing."""
+        return self.verdict is not None and self.verdict.violated
+
+    def _repr_html_(self) -> str:
+        from falsifier.views.notebook import evaluation_html
+
+        return evaluation_html(self)
+
+
+def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
+    """Simulate one candidate and judge it.
+
+    A pure function of its arguments, whatever process it runs in. A simulation that fails, crashes or hangs
+    is an evaluation with a status and a reason.
+
+    Raises:
+        ModelError: when the model cannot be used at all.
+    """
+    experiment = problem.experiment
+    started = perf_counter()
+    try:
+        outputs = problem.model.simulate(
+            candidate.signals, {**problem.parameters, **candidate.parameters}, experiment
+        )
+    except SimulationError as error:
+        seconds = perf_counter() - started
+        return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
+    seconds = perf_counter() - started
+    trajectory = outputs.with_columns(*_inputs(problem, candidate, outputs))
+    try:
+        verdict = monitor_for(problem).evaluate(trajectory)
+    except MonitorError as error:
+        return Evaluation(candidate, "failed", None, str(error), None, seconds, outputs.log)
+    return Evaluation(candidate, "ok", verdict, "", trajectory, seconds, outputs.log)
+
+
+def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
+    """Judge a simulation that was made for another requirement of the same system."""
+    if evaluation.trajectory is None:
+        return evaluation
+    try:
+        return replace(evaluation, verdict=monitor_for(problem).evaluate(evaluation.trajectory))
+    except MonitorError as error:
+        return replace(evaluation, status="failed", verdict=None, reason=str(error), trajectory=None)
+
+
+def monitor_for(problem: Problem) -> Monitor:
+    """Compiled monitor of the problem's requirement on its output grid, made once per process."""
+    return _monitor(
+        problem.requirement.formula, problem.experiment.output_interval, problem.experiment.samples
+    )
+
+
+@lru_cache(maxsize=256)
+def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
+    return Monitor(formula, step=step, samples=samples)
+
+
+def _inputs(
+    problem: Problem, candidate: Candidate, outputs: Trajectory
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
+    """Columns and units of the inputs on the output grid, so that formulas and plots can speak of them."""
+    columns = {name: signal.sample(outputs.times) for name, signal in candidate.signals.items()}
+    for variable in problem.info.inputs:
+        value = problem.parameters.get(variable.name, variable.start)
+        if variable.name not in columns and isinstance(value, int | float):
+            columns[variable.name] = np.full(outputs.times.shape, float(value))
+    return columns, {v.name: v.unit for v in problem.info.inputs if v.unit}

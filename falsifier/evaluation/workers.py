@@ -1,0 +1,181 @@
+"""Where work happens: here, or on any ``concurrent.futures`` executor."""
+
+import logging
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from falsifier.core.space import Candidate
+from falsifier.errors import ModelError, SpecError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+# How long in s to wait for a cluster's scheduler.
+_CONNECT_TIMEOUT = 20
+# Logger of everything that simulates FMUs.
+_SIMULATING = "falsifier.fmu"
+# In the form of python -W: warnings that begin with this word.
+_TRACKER_FILTER = "ignore:resource_tracker"
+
+
+@contextmanager
+def local_executor(jobs: int) -> Iterator[Executor | None]:
+    """Executor with this many processes on this machine; None for one job, which runs in this process.
+
+    Raises:
+        SpecError: when jobs is not positive.
+    """
+    _check_jobs(jobs)
+    if jobs == 1:
+        yield None
+        return
+    with _process_pool(jobs) as executor:
+        yield executor
+
+
+@dataclass(slots=True)
+class Workers:
+    """An executor that can be replaced when its workers have died.
+
+    Attributes:
+        executor: where to submit.
+        slots: how many tasks can run at a time right now.
+        make: makes another executor.
+    """
+
+    executor: Executor
+    slots: Callable[[], int]
+    make: Callable[[], Executor]
+
+    def restart(self) -> None:
+        """Replace the executor; what it was doing is lost."""
+        self.executor.shutdown(wait=False, cancel_futures=True)
+        self.executor = self.make()
+
+
+@contextmanager
+def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
+    """Processes on this machine, or those of a cluster.
+
+    Args:
+        jobs: number of processes on this machine; not used with a cluster.
+        cluster: ``dask:tcp://HOST:PORT``, the address of a Dask scheduler.
+
+    Raises:
+        SpecError: for another kind of cluster, or when the package for it is not installed.
+        ModelError: when the scheduler cannot be reached.
+    """
+    if cluster is not None:
+        with _dask_workers(cluster) as workers:
+            yield workers
+        return
+    _check_jobs(jobs)
+    workers = Workers(_process_pool(jobs), lambda: jobs, lambda: _process_pool(jobs))
+    try:
+        yield workers
+    finally:
+        workers.executor.shutdown(cancel_futures=True)
+
+
+def evaluate_all(
+    problem: Problem, candidates: Sequence[Candidate], executor: Executor | None
+) -> Iterator[Evaluation]:
+    """Evaluations in the order of the candidates, each as soon as it and those before it are there.
+
+    A worker process that dies is an evaluation with the status ``crashed``.
+    """
+    if executor is None:
+        yield from (evaluate(problem, candidate) for candidate in candidates)
+        return
+    futures = [executor.submit(evaluate, problem, candidate) for candidate in candidates]
+    for candidate, future in zip(candidates, futures, strict=True):
+        try:
+            yield future.result()
+        except BrokenExecutor as error:
+            yield Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
+
+
+def _check_jobs(jobs: int) -> None:
+    if jobs < 1:
+        raise SpecError(f"jobs must be 1 or more, got {jobs}")
+
+
+def _process_pool(jobs: int) -> "ProcessPoolExecutor":
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    _start_silent_tracker()
+    level = logging.getLogger(_SIMULATING).level
+    return ProcessPoolExecutor(
+        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level,)
+    )
+
+
+def _start_silent_tracker() -> None:
+    """Start the process that frees a pool's semaphores, so that it says nothing of those that a kill left.
+
+    It frees them all the same; its warning would reach the terminal after the command has ended, and nobody
+    could do anything about it.
+    """
+    if sys.platform == "win32":
+        return
+    from multiprocessing.resource_tracker import ensure_running
+
+    sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
+    try:
+        ensure_running()
+    finally:
+        sys.warnoptions.remove(_TRACKER_FILTER)
+
+
+def _prepare_worker(log_level: int) -> None:
+    """End with the parent, however it ends, and leave Ctrl-C to it: it lets workers finish in order.
+
+    Args:
+        log_level: of what simulates, as in the parent.
+    """
+    import os
+    import signal
+    from multiprocessing import parent_process
+    from threading import Thread
+
+    logging.getLogger(_SIMULATING).setLevel(log_level)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=follow, daemon=True).start()
+
+
+@contextmanager
+def _dask_workers(cluster: str) -> Iterator[Workers]:
+    kind, _, address = cluster.partition(":")
+    if kind != "dask" or not address:
+        raise SpecError(f"--executor {cluster}: expected dask:tcp://HOST:PORT")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise SpecError(
+            f"--executor {cluster}: Dask is not installed; pip install 'falsifier[cluster]'"
+        ) from None
+    try:
+        client = Client(address, timeout=_CONNECT_TIMEOUT)
+    except (OSError, ValueError) as error:
+        raise ModelError(f"--executor {cluster}: no Dask scheduler answers there: {error}") from None
+    with client:
+        yield Workers(
+            client.get_executor(pure=False),
+            lambda: len(client.scheduler_info(n_workers=-1)["workers"]),
+            lambda: client.get_executor(pure=False),
+        )

@@ -1,0 +1,230 @@
+"""Spec files: the TOML schema, its defaults and its errors.
+
+A spec names a model, what may be varied, and requirements. Profiles are other parameterizations of the same
+problem. What a requirement or a profile says of an input, a parameter or the model goes before what the file
+says in general::
+
+    base <- requirement <- profile <- the profile's own words on that requirement
+"""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from falsifier.core.model import Interface
+from falsifier.core.signals import Interpolation
+from falsifier.errors import SpecError, did_you_mean, rejected
+
+Section = TypeVar("Section", bound=BaseModel)
+Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FreeSection(_Strict):
+    """Limits of a free parameterization."""
+
+    max_control_points: int = Field(ge=1, description="Most control points a proposer may use.")
+    min_interval: Seconds = Field(description="Shortest time between two control points, in s.")
+
+
+def _check_order(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:g}, {limits[1]:g}]")
+    return limits
+
+
+class InputSection(_Strict):
+    """One input signal: searched within a range, or kept at a value."""
+
+    range: tuple[Number, Number] | None = Field(
+        None, description="[low, high]; default: the FMU's min and max."
+    )
+    control_points: int | None = Field(None, ge=1, description="Number of evenly spaced control points.")
+    interpolation: Interpolation | None = Field(
+        None,
+        description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
+    )
+    hold: Seconds | None = Field(None, description="Sample-and-hold period in s.")
+    free: FreeSection | None = Field(
+        None, description="Proposers may choose the control points within limits."
+    )
+    value: Number | None = Field(None, description="Keep this input at a constant value.")
+
+    @model_validator(mode="after")
+    def _searched_or_fixed(self) -> "InputSection":
+        if self.range is not None:
+            _check_order(self.range)
+        if self.value is not None and (self.range is not None or self.control_points is not None):
+            raise ValueError("value keeps the input constant: remove it, or remove range and control_points")
+        return self
+
+
+def _bare_number_is_a_value(section: object) -> object:
+    return {"value": section} if isinstance(section, int | float | bool) else section
+
+
+class ParameterSection(_Strict):
+    """One parameter or initial state: searched within a range, or fixed to a value."""
+
+    range: tuple[Number, Number] | None = Field(None, description="[low, high] to search within.")
+    value: Number | None = Field(None, description="Fixed value.")
+
+    @model_validator(mode="after")
+    def _searched_or_fixed(self) -> "ParameterSection":
+        if self.range is not None:
+            _check_order(self.range)
+        if (self.range is None) == (self.value is None):
+            raise ValueError("expected either range = [low, high] (searched) or value = number (fixed)")
+        return self
+
+
+Inputs = dict[str, InputSection]
+Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_number_is_a_value)]]
+
+
+class ModelSection(_Strict):
+    """What is simulated and how."""
+
+    fmu: str = Field(description="Path of the FMU, relative to the spec file.")
+    interface: Interface | None = Field(None, description="Needed where the FMU offers both.")
+    stop_time: Seconds | None = Field(None, description="End of each simulation in s.")
+    output_interval: Seconds | None = Field(None, description="Step of the monitored time grid in s.")
+    step_size: Seconds | None = Field(None, description="Communication or largest solver step in s.")
+    tolerance: Seconds | None = Field(None, description="Relative tolerance of the solver.")
+    time_limit: Seconds | None = Field(None, description="Wall-clock seconds for one simulation.")
+    record: tuple[str, ...] = Field((), description="Internal variables to record beside the outputs.")
+
+
+class ModelChanges(_Strict):
+    """What a requirement or a profile may change of the experiment."""
+
+    interface: Interface | None = None
+    stop_time: Seconds | None = None
+    output_interval: Seconds | None = None
+    step_size: Seconds | None = None
+    tolerance: Seconds | None = None
+    inputs: Inputs = Field(default_factory=dict)
+    parameters: Parameters = Field(default_factory=dict)
+
+
+class RequirementSection(ModelChanges):
+    """One requirement, and what it narrows or changes for itself."""
+
+    formula: str = Field(description="Signal Temporal Logic.")
+    description: str = Field("", description="What it means, in words.")
+
+
+class ProfileSection(ModelChanges):
+    """Another parameterization of the same problems."""
+
+    description: str = ""
+    requirements: dict[str, ModelChanges] = Field(default_factory=dict)
+
+
+class Spec(_Strict):
+    """A whole spec file."""
+
+    model: ModelSection
+    inputs: Inputs = Field(default_factory=dict)
+    parameters: Parameters = Field(default_factory=dict)
+    requirements: dict[str, RequirementSection] = Field(min_length=1)
+    profiles: dict[str, ProfileSection] = Field(default_factory=dict)
+
+    def changes(self, requirement: str, profile: str | None) -> list[ModelChanges]:
+        """Sections that speak of this requirement under this profile, the strongest last."""
+        layers: list[ModelChanges] = [self.requirements[requirement]]
+        if profile is not None:
+            layers.append(self.profiles[profile])
+            if requirement in self.profiles[profile].requirements:
+                layers.append(self.profiles[profile].requirements[requirement])
+        return layers
+
+
+def read_spec(path: Path) -> Spec:
+    """Read and validate a spec file.
+
+    Raises:
+        SpecError: naming the file, the key, and what was expected.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise SpecError("no such spec file", file=str(path)) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(f"cannot be read: {error}", file=str(path)) from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"not valid TOML: {error}", file=str(path)) from None
+    return parse_spec(data, file=str(path))
+
+
+def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
+    """Validate the content of a spec file; file names it in errors."""
+    try:
+        return Spec.model_validate(data)
+    except ValidationError as error:
+        raise _spec_error(error, file) from None
+
+
+def overlay(base: Section | None, changes: Section) -> Section:
+    """Return base with those keys replaced that changes states."""
+    if base is None:
+        return changes
+    stated = {name: getattr(changes, name) for name in changes.model_fields_set}
+    if isinstance(base, InputSection):
+        if "value" in stated:  # a fixed value and a searched range replace each other
+            return changes
+        stated.setdefault("value", None)
+        if {"control_points", "interpolation"} & stated.keys():  # a parameterization of its own is fixed
+            stated.setdefault("free", None)
+    if isinstance(base, ParameterSection):
+        return changes
+    return base.model_copy(update=stated)
+
+
+def _spec_error(error: ValidationError, file: str) -> SpecError:
+    first = error.errors()[0]
+    location = [str(part) for part in first["loc"] if part not in ("tuple", "function-before")]
+    key = ".".join(location)
+    kind = first["type"]
+    if kind == "extra_forbidden":
+        return SpecError(
+            f"unknown key; {did_you_mean(location[-1], _known_keys(location[:-1]))}", file=file, key=key
+        )
+    if kind == "missing":
+        field = _fields(location[:-1]).get(location[-1])
+        meaning = f" ({field.description})" if field is not None and field.description else ""
+        return SpecError(f"this key is missing{meaning}", file=file, key=key)
+    return SpecError(rejected(first["msg"], first["input"]), file=file, key=key)
+
+
+def _fields(location: list[str]) -> dict[str, Any]:
+    """Fields of the section at this place of a spec."""
+    fields = dict(Spec.model_fields)
+    sections: dict[str, type[BaseModel]] = {
+        "model": ModelSection,
+        "inputs": InputSection,
+        "parameters": ParameterSection,
+        "requirements": RequirementSection,
+        "profiles": ProfileSection,
+        "free": FreeSection,
+    }
+    for i, part in enumerate(location):
+        if part in ("model", "free"):
+            fields = dict(sections[part].model_fields)
+        elif i > 0 and location[i - 1] in sections and location[i - 1] not in ("model", "free"):
+            nested = location[i - 1] == "requirements" and "profiles" in location[:i]
+            fields = dict((ModelChanges if nested else sections[location[i - 1]]).model_fields)
+    return fields
+
+
+def _known_keys(location: list[str]) -> list[str]:
+    return sorted(_fields(location))

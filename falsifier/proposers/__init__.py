@@ -1,5 +1,0 @@
-"""Search engines, one file each (``surrogate`` is a folder); all are made by ``make_proposer``."""
-
-from falsifier.proposers.registry import DEFAULT_ENGINE, ENGINES, check_engine, make_proposer
-
-__all__ = ["DEFAULT_ENGINE", "ENGINES", "check_engine", "make_proposer"]

@@ -1,0 +1,47 @@
+"""How a run ended."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Spent
+
+ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How a run ended.
+
+    Attributes:
+        problem: what was searched.
+        status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
+            ``interrupted`` or ``failed`` (the simulator or the language model).
+        reason: in words.
+        counterexample: the confirmed violation, or None.
+        best: evaluation with the smallest robustness, or None when every simulation failed.
+        evaluations: all evaluations in order, without trajectories except the best's.
+        refuted: violations that a second simulation or the second monitor did not confirm.
+        fragile: violations that vanish at half the communication step.
+        spent: what the run used.
+        directory: the run directory, or None.
+    """
+
+    problem: Problem
+    status: ResultStatus
+    reason: str
+    counterexample: Confirmation | None
+    best: Evaluation | None
+    evaluations: tuple[Evaluation, ...]
+    refuted: tuple[Confirmation, ...]
+    spent: Spent
+    directory: Path | None = None
+    fragile: tuple[Confirmation, ...] = ()
+
+    def _repr_html_(self) -> str:
+        from falsifier.views.notebook import result_html
+
+        return result_html(self)

@@ -1,0 +1,1 @@
+"""What people see: text, progress, notebooks, pictures, pages."""

@@ -1,0 +1,195 @@
+"""How problems, trajectories, verdicts and results look in notebooks, and progress that moves there.
+
+The ``_repr_html_`` of those values calls these functions; the markup is plain tables and PNG pictures, so
+that a code host shows it, too::
+
+    result = falsify(load_problem("AT1"), listeners=[progress()])
+    result
+"""
+
+from base64 import b64encode
+from collections.abc import Iterable
+from typing import Any
+
+from falsifier.core.space import Candidate, SearchSpace
+from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
+from falsifier.search.result import Result
+from falsifier.stl import in_words
+from falsifier.stl.verdict import Verdict
+from falsifier.views.html import Html, el, join
+from falsifier.views.text import note, seconds_text, signal_text
+
+# Pictures are kept in the notebook's file: this makes some 20 kB each.
+_DPI = 80
+# Front ends align cells of tables to the right.
+_LEFT = "text-align: left"
+# Signals whose course is drawn; all are in the table.
+_DRAWN_SIGNALS = 6
+
+Fact = tuple[str, str]
+
+
+def problem_html(problem: Problem) -> str:
+    """Requirement in signs and words, the model, and what is searched."""
+    requirement, experiment = problem.requirement, problem.experiment
+    facts: list[Fact] = [
+        ("requirement", el("code", str(requirement.formula))),
+        ("in words", requirement.description or in_words(requirement.formula)),
+        ("model", ": ".join(part for part in (problem.info.name, problem.info.description) if part)),
+        (
+            "simulated",
+            f"for {experiment.stop_time:g} s, recorded every {experiment.output_interval:g} s",
+        ),
+        *((f"fixed {name}", f"{value:g}") for name, value in problem.parameters.items()),
+    ]
+    return join(el("b", problem.name), _facts(facts), _space(problem.space))
+
+
+def verdict_html(verdict: Verdict) -> str:
+    """Robustness, and what decided it."""
+    return _facts(_verdict_facts(verdict))
+
+
+def evaluation_html(evaluation: Evaluation) -> str:
+    """Verdict and candidate, or why there is no verdict."""
+    verdict = evaluation.verdict
+    facts = [("status", f"{evaluation.status}: {evaluation.reason}")] if verdict is None else []
+    facts += _verdict_facts(verdict) if verdict is not None else []
+    return _facts([*facts, *_candidate_facts(evaluation.candidate)])
+
+
+def trajectory_html(trajectory: Trajectory) -> str:
+    """Range of each signal, and a picture of the first few."""
+    from falsifier.views.plotting import plot_trajectory, png
+
+    header = ("signal", "unit", "first", "smallest", "largest", "last")
+    rows = [
+        (name, trajectory.units.get(name, ""), *map(_number, (c[0], c.min(), c.max(), c[-1])))
+        for name, c in trajectory.columns.items()
+    ]
+    end = trajectory.times[-1]
+    about = f"{len(trajectory)} samples from 0 to {end:g} s, every {trajectory.step:g} s"
+    parts = [el("p", about), _table(header, rows)]
+    if trajectory.names:
+        drawn = plot_trajectory(trajectory, trajectory.names[:_DRAWN_SIGNALS])
+        parts.append(_picture(png(drawn, dpi=_DPI), "signals over time"))
+    return join(*parts)
+
+
+def result_html(result: Result) -> str:
+    """How the run ended, with a picture of the counterexample or of the best evaluation."""
+    from falsifier.views.plotting import plot_evaluation, png
+
+    found, spent = result.counterexample, result.spent
+    shown = found.evaluation if found else result.best
+    title = f"{result.problem.name}: {result.status} after {spent.simulations} simulation"
+    facts: list[Fact] = [("confirmed" if found else "reason", found.reason if found else result.reason)]
+    if shown is not None:
+        facts += _verdict_facts(shown.verdict) if shown.verdict else []
+        facts += _candidate_facts(shown.candidate)
+    facts.append(("time", seconds_text(spent)))
+    parts = [el("b", title + ("" if spent.simulations == 1 else "s")), _facts(facts)]
+    if shown is not None and shown.trajectory is not None:
+        drawn = plot_evaluation(result.problem, shown)
+        parts.append(_picture(png(drawn, dpi=_DPI), "counterexample" if found else "best evaluation"))
+    return join(*parts)
+
+
+def progress() -> Listener:
+    """Listener that shows a run as one line below the cell, written over while the run goes on.
+
+    It takes IPython alone: no widgets, so that every front end shows it and the last line stays in the file.
+    """
+    return _Line()
+
+
+class _Line:
+    """One display that is updated; made when the run starts."""
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+        self._name = self._note = ""
+        self._total: int | None = None
+
+    def __call__(self, event: Event) -> None:
+        """Show what an event tells."""
+        match event:
+            case RunStarted():
+                self._name = f"{event.problem.name}, {event.proposer}"
+                self._handle, self._total = None, event.budget.simulations
+                self._show(0)
+            case Evaluated():
+                self._note = note(event)
+                self._show(event.spent.simulations)
+            case Exchanged():
+                self._note = f"model answered, {event.spent.tokens} tokens so far"
+                self._show(event.spent.simulations)
+            case Confirmed():
+                self._note = f"violation {event.confirmation.outcome}"
+            case RunEnded():
+                result = event.result
+                self._note = f"{result.status}; {self._note}"
+                self._show(result.spent.simulations)
+
+    def _show(self, done: int) -> None:
+        from IPython.display import HTML, display
+
+        bar = el("progress", value=done, max=self._total) if self._total else ""
+        count = f" {done}" + (f" of {self._total}" if self._total else "")
+        text = join(el("code", self._name), " ", bar, count, " simulations. ", self._note)
+        line = HTML(text)  # type: ignore[no-untyped-call]
+        if self._handle is None:
+            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            self._handle.update(line)
+
+
+def _verdict_facts(verdict: Verdict) -> list[Fact]:
+    sign = "violated" if verdict.violated else "holds"
+    values = ", ".join(f"{name} = {value:g}" for name, value in verdict.values.items())
+    return [
+        ("robustness", f"{verdict.robustness:+.6g} ({sign})"),
+        ("critical time", f"{verdict.critical_time:g} s"),
+        ("decided by", el("code", verdict.predicate)),
+        ("values there", values),
+    ]
+
+
+def _candidate_facts(candidate: Candidate) -> list[Fact]:
+    facts = [(f"input {name}", signal_text(signal)) for name, signal in candidate.signals.items()]
+    facts += [(f"parameter {name}", f"{value:g}") for name, value in candidate.parameters.items()]
+    origin = ": ".join(part for part in (candidate.origin, candidate.rationale) if part)
+    return [*facts, *([("proposed by", origin)] if origin else [])]
+
+
+def _space(space: SearchSpace) -> Html:
+    rows = [
+        (r.name, r.unit, f"{r.low:g} to {r.high:g}", f"{r.control_points}, {r.interpolation}", r.description)
+        for r in space.inputs
+    ]
+    rows += [
+        (p.name, p.unit, f"{p.low:g} to {p.high:g}", "one number", p.description) for p in space.parameters
+    ]
+    return _table(("searched", "unit", "range", "control points", "description"), rows)
+
+
+def _facts(facts: Iterable[Fact]) -> Html:
+    rows = (el("tr", el("th", name, style=_LEFT), el("td", value, style=_LEFT)) for name, value in facts)
+    return el("table", *rows)
+
+
+def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Html:
+    head = el("tr", *(el("th", name, style=_LEFT) for name in header))
+    return el("table", head, *(el("tr", *(el("td", cell, style=_LEFT) for cell in row)) for row in rows))
+
+
+def _picture(content: bytes, description: str) -> Html:
+    """A PNG picture inside the markup."""
+    return Html(f'<img src="data:image/png;base64,{b64encode(content).decode()}" alt="{description}">')
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}"

@@ -1,0 +1,169 @@
+"""What there is to draw of one simulation, as values: compared quantities with their bounds, then inputs.
+
+The pictures of matplotlib and the drawings of reports are made from the same panels.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.space import Candidate
+from falsifier.core.trajectory import Trajectory
+from falsifier.stl import Formula
+from falsifier.stl.expression import Expression, Number
+from falsifier.stl.formula import Always, Eventually, Predicate, Until
+from falsifier.stl.verdict import Verdict
+
+Array = NDArray[np.float64]
+
+
+class Range(Protocol):
+    """Name, limits and unit of a searched input."""
+
+    @property
+    def name(self) -> str:
+        """Name of the input."""
+        ...
+
+    @property
+    def low(self) -> float:
+        """Lower bound."""
+        ...
+
+    @property
+    def high(self) -> float:
+        """Upper bound."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit, empty where unknown."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bound:
+    """What a quantity is compared with, where the comparison counts.
+
+    Attributes:
+        predicate: text of the comparison.
+        start: earliest time in s at which it counts.
+        end: latest time in s at which it counts.
+        values: the bound at the panel's times, shape (n,).
+    """
+
+    predicate: str
+    start: float
+    end: float
+    values: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """One quantity over time.
+
+    Attributes:
+        title: name of the quantity, with its unit where known.
+        times: in s, shape (n,).
+        values: shape (n,).
+        bounds: what it is compared with; none for inputs.
+        critical: time in s that decided the verdict, where this quantity did.
+        points: control points (time, value) of an input.
+        limits: range of an input.
+        steps: whether values are held until the next sample.
+    """
+
+    title: str
+    times: Array
+    values: Array
+    bounds: tuple[Bound, ...] = ()
+    critical: float | None = None
+    points: tuple[tuple[float, float], ...] = ()
+    limits: tuple[float, float] | None = None
+    steps: bool = False
+
+
+def panels(
+    formula: Formula,
+    trajectory: Trajectory,
+    candidate: Candidate,
+    inputs: Iterable[Range],
+    verdict: Verdict | None,
+) -> list[Panel]:
+    """Panels of one simulation: each compared quantity once, then each searched input."""
+    quantities = [_quantity(trajectory, predicates, verdict) for predicates in _compared(formula).values()]
+    return quantities + [_input(r, trajectory, candidate) for r in inputs]
+
+
+def judged_windows(
+    formula: Formula, start: float = 0.0, end: float = 0.0
+) -> Iterator[tuple[Predicate, tuple[float, float]]]:
+    """Yield each predicate with the earliest and latest time in s at which its value counts.
+
+    Operators without a bound reach to infinity.
+    """
+    if isinstance(formula, Predicate):
+        yield formula, (start, end)
+        return
+    if isinstance(formula, Always | Eventually | Until):
+        window = formula.window
+        begin, finish = (window.start, window.end) if window else (0.0, np.inf)
+        # The left operand of until counts from the operator's own time on.
+        start, end = (start if isinstance(formula, Until) else start + begin), end + finish
+    for child in formula.children:
+        yield from judged_windows(child, start, end)
+
+
+_Judged = list[tuple[Predicate, tuple[float, float]]]
+
+
+def _compared(formula: Formula) -> dict[str, _Judged]:
+    """Predicates with their windows by compared quantity, in order of first appearance."""
+    found: dict[str, _Judged] = {}
+    for predicate, window in judged_windows(formula):
+        found.setdefault(str(_sides(predicate)[0]), []).append((predicate, window))
+    return found
+
+
+def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) -> Panel:
+    expression = _sides(judged[0][0])[0]
+    end = float(trajectory.times[-1])
+    bounds = tuple(
+        Bound(str(p), begin, min(finish, end), _evaluated(_sides(p)[1], trajectory))
+        for p, (begin, finish) in judged
+    )
+    decided = verdict is not None and any(str(p) == verdict.predicate for p, _ in judged)
+    units = {trajectory.units.get(name, "") for name in expression.signals} - {""}
+    return Panel(
+        f"{expression} [{units.pop()}]" if len(units) == 1 else str(expression),
+        trajectory.times,
+        _evaluated(expression, trajectory),
+        bounds,
+        critical=verdict.critical_time if verdict is not None and decided else None,
+    )
+
+
+def _input(r: Range, trajectory: Trajectory, candidate: Candidate) -> Panel:
+    signal = candidate.signals[r.name]
+    return Panel(
+        f"{r.name} [{r.unit}]" if r.unit else r.name,
+        trajectory.times,
+        signal.held(None).sample(trajectory.times),
+        points=tuple(zip(signal.times, signal.values, strict=True)),
+        limits=(r.low, r.high),
+        steps=signal.interpolation == "constant",
+    )
+
+
+def _evaluated(expression: Expression, trajectory: Trajectory) -> Array:
+    return np.broadcast_to(expression.evaluate(trajectory.columns), trajectory.times.shape)
+
+
+def _sides(predicate: Predicate) -> tuple[Expression, Expression]:
+    """Varying side, then the side that it is compared with."""
+    if isinstance(predicate.left, Number):
+        return predicate.right, predicate.left
+    return predicate.left, predicate.right

@@ -1,0 +1,34 @@
+"""Pictures: what was simulated, what decided the verdict, how searches went and how methods compare.
+
+The only place that imports matplotlib. Functions draw on the axes that they are given, or make a figure;
+nothing here needs a display.
+"""
+
+from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_rates
+from falsifier.views.plotting.diagnosis import plot_diagnosis
+from falsifier.views.plotting.evaluation import (
+    plot_evaluation,
+    plot_panel,
+    plot_requirement,
+    png,
+    save_figure,
+)
+from falsifier.views.plotting.prediction import plot_predictions
+from falsifier.views.plotting.robustness_map import plot_neighbourhood
+from falsifier.views.plotting.trajectory import plot_signal, plot_trajectory
+
+__all__ = [
+    "plot_comparison",
+    "plot_diagnosis",
+    "plot_evaluation",
+    "plot_history",
+    "plot_neighbourhood",
+    "plot_panel",
+    "plot_predictions",
+    "plot_rates",
+    "plot_requirement",
+    "plot_signal",
+    "plot_trajectory",
+    "png",
+    "save_figure",
+]

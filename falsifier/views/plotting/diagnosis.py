@@ -1,0 +1,48 @@
+"""Picture of how a formula came to its value: windows within windows, down to the critical time."""
+
+from typing import TYPE_CHECKING
+
+from falsifier.evaluation.evaluate import Evaluation, monitor_for
+from falsifier.problem.problem import Problem
+from falsifier.views.plotting.axes import figure_of
+from falsifier.views.plotting.evaluation import plot_requirement
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS = ("#8a5a00", "#2f7d4f", "#6a3d9a", "#1f5fa8")
+# Height of a window's bar and of its row, as a share of the axes.
+_BAR, _ROW = 0.025, 0.11
+
+
+def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
+    """The deciding quantity, and below it the window of each operator on the way to the critical time.
+
+    Args:
+        problem: what was required.
+        evaluation: an evaluation with its trajectory.
+        ax: where to draw; None: a figure of its own.
+
+    Raises:
+        ValueError: when the evaluation has no trajectory.
+    """
+    from matplotlib.transforms import blended_transform_factory
+
+    figure = plot_requirement(problem, evaluation, ax)
+    ax = figure.axes[0] if ax is None else ax
+    assert evaluation.trajectory is not None
+    path = monitor_for(problem).diagnose(evaluation.trajectory).path
+    windows = [step for step in path if step.window is not None]
+    in_axes = blended_transform_factory(ax.transData, ax.transAxes)
+    low, high = ax.get_ylim()
+    room = _ROW * (len(windows) + 1)
+    ax.set_ylim(low - room * (high - low) / (1 - room), high)
+    for row, step in enumerate(windows):
+        assert step.window is not None
+        start, end = step.window
+        y, colour = _ROW * (len(windows) - row), _COLOURS[row % len(_COLOURS)]
+        ax.fill_between([start, end], y, y - _BAR, color=colour, transform=in_axes, linewidth=0, alpha=0.8)
+        operator = step.text.partition(" was ")[0]
+        ax.text(start, y, operator, color=colour, transform=in_axes, va="bottom", fontsize=8)
+    return figure_of(ax)

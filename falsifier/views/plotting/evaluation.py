@@ -1,0 +1,111 @@
+"""Pictures of one simulation."""
+
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.views.panels import Panel, panels
+from falsifier.views.plotting.axes import figure_of, own_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_OUTPUT, _INPUT, _BOUND, _CRITICAL, _WINDOW = "#1f5fa8", "#2f7d4f", "#b3261e", "#b3261e", "#8a8a8a"
+_PANEL_HEIGHT = 1.9
+
+
+def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
+    """Figure of one simulation: compared quantities with their bounds and windows, then inputs.
+
+    Args:
+        problem: what was searched.
+        evaluation: an evaluation with its trajectory.
+
+    Raises:
+        ValueError: when the evaluation has no trajectory.
+    """
+    trajectory, verdict = evaluation.trajectory, evaluation.verdict
+    if trajectory is None or verdict is None:
+        raise ValueError("a simulation that failed has nothing to draw")
+    from matplotlib.figure import Figure
+
+    drawn = panels(
+        problem.requirement.formula, trajectory, evaluation.candidate, problem.space.inputs, verdict
+    )
+    figure = Figure(figsize=(9, 1.0 + _PANEL_HEIGHT * len(drawn)), layout="constrained")
+    axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, panel in zip(axes, drawn, strict=True):
+        plot_panel(ax, panel)
+        ax.axvline(verdict.critical_time, color=_CRITICAL, linewidth=0.8, linestyle=":")
+    axes[-1].set_xlabel("time [s]")
+    parameters = "".join(f"  {name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
+    figure.suptitle(
+        f"{problem.name}: robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s"
+        + parameters,
+        fontsize=11,
+    )
+    return figure
+
+
+def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
+    """The quantity that decided the verdict, with its bound, its window and the critical time.
+
+    Args:
+        problem: what was required.
+        evaluation: an evaluation with its trajectory.
+        ax: where to draw; None: a figure of its own.
+
+    Raises:
+        ValueError: when the evaluation has no trajectory.
+    """
+    trajectory, verdict = evaluation.trajectory, evaluation.verdict
+    if trajectory is None or verdict is None:
+        raise ValueError("a simulation that failed has nothing to draw")
+    ax = ax if ax is not None else own_axes(8, 3)
+    drawn = panels(problem.requirement.formula, trajectory, evaluation.candidate, (), verdict)
+    plot_panel(ax, next(panel for panel in drawn if panel.critical is not None))
+    ax.axvline(verdict.critical_time, color=_CRITICAL, linewidth=0.8, linestyle=":")
+    ax.set(
+        xlabel="time [s]",
+        title=f"robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s",
+    )
+    return figure_of(ax)
+
+
+def plot_panel(ax: "Axes", panel: Panel) -> None:
+    """Draw a quantity with its bounds, windows and critical point, or an input with its control points."""
+    is_input = panel.limits is not None
+    color = _INPUT if is_input else _OUTPUT
+    style = "steps-post" if panel.steps else "default"
+    ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
+    for bound in panel.bounds:
+        within = (panel.times >= bound.start) & (panel.times <= bound.end)
+        ax.plot(panel.times[within], bound.values[within], color=_BOUND, linewidth=1.2, linestyle="--")
+        ax.axvspan(bound.start, bound.end, color=_WINDOW, alpha=0.08, linewidth=0)
+    if panel.critical is not None:
+        k = abs(panel.times - panel.critical).argmin()
+        ax.plot(panel.times[k], panel.values[k], "o", color=_CRITICAL, markersize=5)
+    if panel.points:
+        ax.plot(*zip(*panel.points, strict=True), "o", color=_INPUT, markersize=3.5)
+    if panel.limits is not None:
+        low, high = panel.limits
+        margin = 0.06 * (high - low)
+        ax.set_ylim(low - margin, high + margin)
+        for limit in panel.limits:
+            ax.axhline(limit, color=_WINDOW, linewidth=0.6, linestyle=":")
+    ax.set_ylabel(panel.title)
+
+
+def save_figure(figure: "Figure", path: Path) -> None:
+    """Write a figure; the file's ending decides the format."""
+    figure.savefig(path, dpi=130)
+
+
+def png(figure: "Figure", *, dpi: int) -> bytes:
+    """A figure as the content of a PNG file."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()

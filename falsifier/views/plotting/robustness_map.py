@@ -1,0 +1,59 @@
+"""Picture of the neighbourhood of a counterexample."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from falsifier.counterexamples.robustness_map import Neighbourhood
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_VIOLATES, _HOLDS, _ZERO = "#b3261e", "#1f5fa8", "#8a8a8a"
+
+
+def plot_neighbourhood(found: Neighbourhood, title: str = "") -> "Figure":
+    """Figure with two panels: robustness over the size of the change, and the map of the deciding inputs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _plot_sizes(left, found)
+    if len(found.grid) > 1:
+        _plot_map(right, found)
+    else:
+        _plot_line(right, found)
+    figure.suptitle(f"{title}: where the violation persists" if title else "where the violation persists")
+    return figure
+
+
+def _plot_sizes(ax: "Axes", found: Neighbourhood) -> None:
+    violates = found.robustness < 0
+    for mask, color, label in ((violates, _VIOLATES, "violates"), (~violates, _HOLDS, "holds")):
+        ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
+    ax.plot(0.0, found.original, "o", color=_VIOLATES, label="counterexample")
+    ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
+    ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
+    ax.legend()
+
+
+def _plot_map(ax: "Axes", found: Neighbourhood) -> None:
+    first, second = (found.coordinates[i] for i in found.axes)
+    largest = float(np.nanmax(np.abs(found.surface))) or 1.0
+    mesh = ax.pcolormesh(
+        *found.grid, found.surface, cmap="RdBu", vmin=-largest, vmax=largest, shading="nearest"
+    )
+    if (found.surface < 0).any() and (found.surface >= 0).any():
+        ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
+    ax.plot(first.value, second.value, "o", color="black", markersize=5)
+    ax.set(xlabel=first.label, ylabel=second.label)
+    ax.figure.colorbar(mesh, ax=ax, label="robustness, below 0 violates")
+
+
+def _plot_line(ax: "Axes", found: Neighbourhood) -> None:
+    coordinate = found.coordinates[found.axes[0]]
+    ax.plot(found.grid[0], found.surface[0], color=_HOLDS, linewidth=1.2)
+    ax.plot(coordinate.value, found.original, "o", color=_VIOLATES)
+    ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
+    ax.set(xlabel=coordinate.label, ylabel="robustness")

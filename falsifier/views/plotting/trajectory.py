@@ -1,0 +1,49 @@
+"""Pictures of signals, whatever was required of them."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.views.plotting.axes import figure_of, own_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOUR = "#1f5fa8"
+
+
+def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
+    """Figure with one small panel a signal.
+
+    Args:
+        trajectory: what was simulated.
+        names: of the signals; None: all.
+    """
+    from matplotlib.figure import Figure
+
+    names = trajectory.names if names is None else names
+    figure = Figure(figsize=(8, 0.6 + 1.1 * len(names)), layout="constrained")
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, name in zip(axes, names, strict=True):
+        plot_signal(trajectory, name, ax)
+        ax.set_xlabel("")
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def plot_signal(trajectory: Trajectory, name: str, ax: "Axes | None" = None, *, label: str = "") -> "Figure":
+    """One signal over time.
+
+    Args:
+        trajectory: what was simulated.
+        name: of the signal.
+        ax: where to draw; None: a figure of its own.
+        label: of the line in a legend; then each line has a colour of its own.
+    """
+    ax = ax if ax is not None else own_axes(8, 2.5)
+    colour = None if label else _COLOUR
+    ax.plot(trajectory.times, trajectory[name], linewidth=1.2, label=label or None, color=colour)
+    unit = trajectory.units.get(name, "")
+    ax.set(xlabel="time [s]", ylabel=f"{name} [{unit}]" if unit else name)
+    return figure_of(ax)

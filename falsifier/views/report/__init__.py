@@ -1,0 +1,12 @@
+"""Reports of runs and campaigns: a self-contained page, Markdown, JUnit XML.
+
+::
+
+    Path("report.html").write_text(html_report(Path("runs/nightly")), encoding="utf-8")
+"""
+
+from falsifier.views.report.junit import junit_report
+from falsifier.views.report.markdown import markdown_report
+from falsifier.views.report.page import html_report
+
+__all__ = ["html_report", "junit_report", "markdown_report"]

@@ -1,0 +1,68 @@
+"""The report as JUnit XML: a test case for each run; a falsified requirement is a failure."""
+
+from itertools import groupby
+from pathlib import Path
+from xml.etree import ElementTree
+
+from falsifier.campaigns.analysis import Run, load
+from falsifier.views.report.content import replay_command, run_command, searches
+
+# What XML 1.0 cannot hold; names and reasons may carry anything that a model printed.
+_NO_CONTROLS = {code: "�" for code in range(32) if chr(code) not in "\t\n\r"}
+
+
+def junit_report(directory: Path) -> str:
+    """Results of a run or a campaign, one test suite for each method.
+
+    Raises:
+        JournalError: when the directory is neither, or is damaged.
+    """
+    runs = sorted(load(directory), key=lambda run: run.method)
+    root = ElementTree.Element("testsuites", name="falsifier")
+    for method, members in groupby(runs, key=lambda run: run.method):
+        root.append(_suite(method.label, list(members)))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _suite(label: str, runs: list[Run]) -> ElementTree.Element:
+    counts = {
+        "tests": len(runs),
+        "failures": sum(run.falsified for run in runs),
+        "errors": sum(run.status == "failed" for run in runs),
+        "skipped": sum(not run.finished and run.status != "failed" for run in runs),
+    }
+    suite = ElementTree.Element(
+        "testsuite", name=label, time=f"{sum(r.spent.seconds for r in searches(runs)):.3f}"
+    )
+    for name, count in counts.items():
+        suite.set(name, str(count))
+    suite.extend(_case(label, run) for run in runs)
+    return suite
+
+
+def _case(label: str, run: Run) -> ElementTree.Element:
+    case = ElementTree.Element(
+        "testcase",
+        classname=f"{label}.{run.requirement}",
+        name=f"seed {run.seed}",
+        time=f"{run.spent.seconds:.3f}",
+    )
+    if run.falsified and run.verdict is not None:
+        message = f"robustness {run.verdict.robustness:+.6g} after {run.simulations} simulations"
+        failure = ElementTree.SubElement(case, "failure", message=message, type="falsified")
+        failure.text = "\n".join(
+            line.translate(_NO_CONTROLS)
+            for line in (
+                run.manifest.requirement["formula"],
+                f"at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
+                run.reason,
+                replay_command(run),
+                run_command(run.manifest.request),
+            )
+        )
+    elif run.status == "failed":
+        ElementTree.SubElement(case, "error", message=run.reason.translate(_NO_CONTROLS), type="failed")
+    elif not run.finished:
+        ElementTree.SubElement(case, "skipped", message=run.status)
+    return case

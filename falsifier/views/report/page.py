@@ -1,0 +1,194 @@
+"""The report as one HTML page that needs nothing from elsewhere and runs no script."""
+
+from importlib.resources import files
+from pathlib import Path
+
+from falsifier.campaigns.analysis import Table
+from falsifier.views.html import Html, el, join
+from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
+from falsifier.views.report.content import (
+    Content,
+    Section,
+    Shown,
+    gather,
+    replay_command,
+    run_command,
+    searches,
+)
+from falsifier.views.text import signal_text
+
+
+def html_report(directory: Path) -> str:
+    """Page on a run or a campaign.
+
+    Raises:
+        JournalError: when the directory is neither, or is damaged.
+    """
+    return page(gather(directory))
+
+
+def page(content: Content) -> str:
+    """Lay out a report."""
+    style = Html(files("falsifier.views.report").joinpath("style.css").read_text(encoding="utf-8"))
+    title = f"Falsification report: {content.title}"
+    head = el(
+        "head",
+        el("meta", charset="utf-8"),
+        el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        el("meta", name="color-scheme", content="light dark"),
+        el("title", title),
+        el("style", style),
+    )
+    body = el(
+        "body",
+        el("a", "Skip to the results", href="#summary", class_="skip"),
+        el("header", el("h1", title), el("p", _overview(content))),
+        _navigation(content),
+        el("main", _summary(content), *map(_section, content.sections), _environment(content)),
+    )
+    return f"<!DOCTYPE html>\n{el('html', head, body, lang='en')}\n"
+
+
+def _overview(content: Content) -> str:
+    runs = content.runs
+    falsified = sum(run.falsified for run in runs)
+    failed = sum(run.status == "failed" for run in runs)
+    open_ = sum(not run.finished for run in runs) - failed
+    started = min((run.manifest.started for run in runs), default="")
+    parts = [
+        f"{len(content.sections)} requirements, {len(runs)} runs, {falsified} falsified",
+        *([f"{failed} failed"] if failed else []),
+        *([f"{open_} not finished"] if open_ else []),
+        f"{sum(run.simulations for run in searches(runs))} simulations",
+        f"started {started}",
+    ]
+    return ", ".join(parts) + "."
+
+
+def _navigation(content: Content) -> Html:
+    names = [("summary", "Summary"), *((_anchor(s), s.name) for s in content.sections)]
+    links = [el("li", el("a", name, href=f"#{anchor}")) for anchor, name in names]
+    links.append(el("li", el("a", "Environment", href="#environment")))
+    return el("nav", el("ul", *links), aria_label="Sections")
+
+
+def _summary(content: Content) -> Html:
+    anchors = {section.name: _anchor(section) for section in content.sections}
+    return el(
+        "section",
+        el("h2", "Summary"),
+        _table(content.table, anchors),
+        *(el("p", note, class_="note") for note in content.table.notes),
+        id="summary",
+    )
+
+
+def _table(table: Table, anchors: dict[str, str]) -> Html:
+    header = el("tr", *(el("th", name, scope="col") for name in table.header))
+    rows = []
+    for row in table.rows:
+        first = el("a", row[0], href=f"#{anchors[row[0]]}") if row[0] in anchors else row[0]
+        rows.append(el("tr", el("th", first, scope="row"), *(el("td", cell) for cell in row[1:])))
+    return _scrolling(el("table", el("thead", header), el("tbody", *rows)), table.title)
+
+
+def _scrolling(content: Html, label: str) -> Html:
+    """Wide content that scrolls by itself, reachable by keyboard."""
+    return el("div", content, class_="scroll", tabindex="0", role="region", aria_label=label)
+
+
+def _section(section: Section) -> Html:
+    charts = [
+        el("figure", el("figcaption", label), history_chart(runs, label))
+        for label, runs in section.by_method.items()
+    ]
+    if len(section.runs) > 1:
+        charts.append(
+            el("figure", el("figcaption", "Falsified runs"), rate_chart(section.by_method), _legend(section))
+        )
+    found = any(shown.run.falsified for shown in section.shown)
+    title = "Counterexamples" if found else "Nearest to a violation"
+    return el(
+        "section",
+        el("h2", section.name),
+        el("p", section.description) if section.description else Html(""),
+        el("p", el("code", section.formula), class_="formula"),
+        *charts,
+        el("h3", title),
+        *(_shown(shown, opened=i == 0) for i, shown in enumerate(section.shown)),
+        _troubles(section),
+        id=_anchor(section),
+    )
+
+
+def _legend(section: Section) -> Html:
+    items = [
+        el("li", el("span", class_=f"chip s{i % SERIES_COLOURS}"), f"{label} ({len(runs)} runs)")
+        for i, (label, runs) in enumerate(section.by_method.items())
+    ]
+    return el("ul", *items, class_="legend")
+
+
+def _shown(shown: Shown, *, opened: bool) -> Html:
+    run, verdict = shown.run, shown.run.verdict
+    robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
+    heading = f"{run.method.label}, seed {run.seed}: {run.simulations} simulations, {robustness}"
+    critical = verdict.critical_time if verdict else None
+    facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
+    if verdict is not None:
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in verdict.values.items())
+        facts += [
+            ("critical time", f"{verdict.critical_time:.6g} s, at {verdict.predicate}"),
+            ("values there", values),
+        ]
+    facts += [(f"input {name}", signal_text(signal)) for name, signal in shown.candidate.signals.items()]
+    facts += [(f"parameter {name}", f"{value:.10g}") for name, value in shown.candidate.parameters.items()]
+    commands = [("repeat the search", run_command(run.manifest.request))]
+    if run.falsified:
+        commands.insert(0, ("simulate it again", replay_command(run)))
+    rationale = shown.candidate.rationale
+    return el(
+        "details",
+        el("summary", heading),
+        *(el("figure", panel_chart(panel, critical)) for panel in shown.panels),
+        _facts(facts),
+        el("blockquote", rationale, title="the proposer's own words") if rationale else Html(""),
+        el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),
+        open="" if opened else None,
+    )
+
+
+def _facts(facts: list[tuple[str, str]]) -> Html:
+    return el("dl", *(join(el("dt", name), el("dd", text)) for name, text in facts))
+
+
+def _troubles(section: Section) -> Html:
+    """Runs that failed, and violations that were not confirmed."""
+    items = [
+        el("li", f"{run.method.label}, seed {run.seed}: {run.status}: {run.reason}")
+        for run in section.runs
+        if run.status in ("failed", "interrupted")
+    ]
+    items += [
+        el("li", f"{run.method.label}, seed {run.seed}, simulation {index + 1}: {said}")
+        for run in section.runs
+        for index, said in run.unconfirmed.items()
+    ]
+    return join(el("h3", "Not counted"), el("ul", *items)) if items else Html("")
+
+
+def _environment(content: Content) -> Html:
+    facts: dict[str, str] = {}
+    for manifest in (run.manifest for run in content.runs):
+        facts |= {
+            "falsifier": manifest.falsifier,
+            "Python": manifest.python,
+            "platform": manifest.platform,
+            **manifest.packages,
+            **{path: f"SHA-256 {digest}" for path, digest in manifest.hashes.items()},
+        }
+    return el("section", el("h2", "Environment"), _facts(list(facts.items())), id="environment")
+
+
+def _anchor(section: Section) -> str:
+    return f"requirement-{section.name}"

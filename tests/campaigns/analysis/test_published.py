@@ -1,0 +1,52 @@
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns.analysis import Score, read_published
+from falsifier.campaigns.analysis.published import rank
+from falsifier.errors import SpecError
+
+BEST, LLM = Score(10, 10, 1.3, "FReaK"), Score(10, 10, 2.3)
+
+
+@pytest.mark.parametrize(
+    ("score", "place"),
+    [
+        (Score(10, 10, 1.0), 1),
+        (Score(10, 10, 1.34), 1),  # equal to a published 1.3: the first place is shared
+        (Score(10, 10, 1.4), 2),
+        (Score(10, 10, 50.0), 3),
+        (Score(9, 10, 1.0), 3),  # more falsified runs go before fewer simulations
+        (Score(3, 3, 1.0), 1),
+        (Score(0, 10, None), None),
+    ],
+)
+def test_rank_is_by_falsified_runs_then_by_simulations(score: Score, place: int | None) -> None:
+    assert rank(score, [BEST, LLM, Score(0, 10, None)]) == place
+
+
+def test_the_bundled_table_has_all_columns() -> None:
+    published = read_published()
+    assert set(published.columns) == {"best", "llm_falsifier", "uniform"}
+    assert {len(column) for column in published.columns.values()} == {21}
+    assert published.scores("AT1")["best"] == Score(10, 10, 4.8, "FReaK")
+    assert published.scores("AT1")["uniform"] == Score(0, 10, None)
+    assert set(published.ablation) == {"MP1", "MP2", "MP3", "MP4"}
+    assert published.models["gpt-5-mini-high"]["NN"] == Score(1, 10, 97.0)
+    assert published.scores("my own") == {}
+
+
+def test_the_published_ranks_follow_from_the_published_numbers() -> None:
+    """Where the published table gives its first place, our rule gives it too."""
+    published = read_published()
+    first = [
+        r for r, s in published.columns["llm_falsifier"].items() if rank(s, published.scores(r).values()) == 1
+    ]
+    assert len(first) == 14
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text("runs = 10\n")
+    with pytest.raises(SpecError, match="not a table of published numbers"):
+        read_published(path)

@@ -1,0 +1,89 @@
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from falsifier.campaigns.analysis import columns, frame, histories, load, load_run
+from falsifier.campaigns.analysis.curves import falsification_curve, improvements, thinned
+from falsifier.errors import JournalError
+from falsifier.search.journal import (
+    AskedRecord,
+    EvaluatedRecord,
+    VerdictRecord,
+    read_journal,
+    recorded_evaluations,
+    write_manifest,
+)
+from falsifier.search.manifest import manifest
+from falsifier.search.request import ProblemRequest, RunRequest
+from tests.problems import easy
+
+
+def test_a_run_is_loaded_as_it_was(campaign: Path) -> None:
+    runs = load(campaign)
+    assert len(runs) == 8
+    for run in runs:
+        records = read_journal(run.directory)
+        evaluations = recorded_evaluations(run.directory, records)
+        assert run.robustness.tolist() == [e.robustness for e in evaluations]
+        assert run.simulations == len(evaluations)
+        assert run.falsified == (run.counterexample is not None) == (run.requirement == "HARD")
+        assert run.verdict == evaluations[int(np.nanargmin(run.robustness))].verdict
+        assert run.best_so_far[-1] == run.verdict.robustness  # type: ignore[union-attr]
+    assert load_run(runs[0].directory).seed == 0
+
+
+def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:
+    runs = load(campaign)
+    table = columns(runs)
+    assert {len(column) for column in table.values()} == {8}
+    assert table["requirement"] == ["HARD"] * 4 + ["NEVER"] * 4
+    assert sum(table["falsified"]) == 4
+    long = histories(runs)
+    assert len(long["best"]) == sum(run.simulations for run in runs)
+    assert long["simulation"][: runs[0].simulations] == list(range(1, runs[0].simulations + 1))
+    assert frame(runs).groupby("requirement").falsified.mean().to_dict() == {"HARD": 1.0, "NEVER": 0.0}
+
+
+def test_a_folder_that_is_neither_is_named(tmp_path: Path) -> None:
+    with pytest.raises(JournalError, match="neither a campaign nor a run"):
+        load(tmp_path)
+
+
+def test_a_damaged_line_is_named(campaign: Path, tmp_path: Path) -> None:
+    run = load(campaign)[0]
+    (tmp_path / "manifest.json").write_bytes((run.directory / "manifest.json").read_bytes())
+    (tmp_path / "journal.jsonl").write_text('{"kind":"evaluated"}\n')
+    with pytest.raises(JournalError, match="line 1 is damaged"):
+        load_run(tmp_path)
+
+
+def test_curves(campaign: Path) -> None:
+    runs = [run for run in load(campaign) if run.method.engine == "uniform"]
+    counts, shares = falsification_curve(runs)
+    found = sorted(run.simulations for run in runs if run.falsified)
+    assert counts.tolist() == [0, *found, 20]
+    assert shares.tolist() == [0, 0.25, 0.5, 0.5]
+    values = np.array([3.0, np.nan, 4.0, 1.0, 1.0, 0.5])
+    assert [c.tolist() for c in improvements(values)] == [[1, 4, 6], [3, 1, 0.5]]
+    assert [c.tolist() for c in improvements(np.array([np.nan, 2.0]))] == [[2], [2]]
+    assert [c.tolist() for c in thinned(values, 2)] == [[4, 6], [1, 0.5]]
+    assert len(thinned(values, 10)[0]) == 5
+
+
+def test_a_journal_of_ten_thousand_simulations_loads_quickly(tmp_path: Path) -> None:
+    problem = easy()
+    request = RunRequest(problem=ProblemRequest(target="python:tests.problems:easy"))
+    write_manifest(tmp_path, manifest(request, problem).model_dump(mode="json"))
+    candidate = problem.space.decode([0.5, 0.25, 0.1, -0.3], origin="uniform").to_json()
+    verdict = VerdictRecord(robustness=0.1, critical_time=3.0, predicate="x <= 0.9", values={"x": 0.8})
+    with (tmp_path / "journal.jsonl").open("w") as file:
+        for i in range(10_000):
+            asked = AskedRecord(first=i, n=1, candidates=[candidate], seconds=1e-4)
+            done = EvaluatedRecord(index=i, status="ok", verdict=verdict, seconds=0.01)
+            file.write(f"{asked.model_dump_json()}\n{done.model_dump_json()}\n")
+    load_run(tmp_path)
+    started = perf_counter()
+    assert load_run(tmp_path).simulations == 10_000
+    assert perf_counter() - started < 1.0

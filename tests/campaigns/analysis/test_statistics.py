@@ -1,0 +1,59 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.campaigns.analysis import group, load, statistics
+from falsifier.campaigns.analysis.statistics import bootstrap, wilson
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"),
+    [  # from the closed formula with z = 1.959964
+        (10, 10, 0.7225, 1.0),
+        (0, 10, 0.0, 0.2775),
+        (5, 10, 0.2366, 0.7634),
+        (1, 10, 0.0179, 0.4042),
+    ],
+)
+def test_wilson_interval(successes: int, trials: int, low: float, high: float) -> None:
+    assert wilson(successes, trials) == pytest.approx((low, high), abs=5e-5)
+
+
+def test_bootstrap_interval_holds_the_mean_and_repeats() -> None:
+    values = np.array([1.0, 2.0, 4.0, 8.0, 100.0])
+    low, high = bootstrap(values)
+    assert 1.0 < low < values.mean() < high < 100.0
+    assert bootstrap(values) == (low, high)
+    assert bootstrap(np.array([3.0, 3.0])) == (3.0, 3.0)
+
+
+def test_statistics_are_over_the_falsified_runs(campaign: Path) -> None:
+    runs = [run for run in load(campaign) if run.requirement == "HARD" and run.method.engine == "uniform"]
+    found = statistics(runs)
+    counts = [run.simulations for run in runs if run.falsified]
+    assert (found.runs, found.falsified) == (2, len(counts))
+    assert len(counts) == 2
+    assert found.mean == np.mean(counts)
+    assert found.median == np.median(counts)
+    assert found.deviation == pytest.approx(np.std(counts, ddof=1))
+    assert found.cost == 0
+    assert found.best == min(run.verdict.robustness for run in runs if run.verdict)
+
+
+def test_without_a_falsified_run_there_is_no_mean(campaign: Path) -> None:
+    found = statistics(run for run in load(campaign) if run.requirement == "NEVER")
+    assert (found.runs, found.falsified) == (4, 0)
+    assert (found.mean, found.median, found.deviation, found.mean_interval) == (None, None, None, None)
+    assert found.rate_interval is not None
+    assert found.rate_interval[0] == 0
+
+
+def test_methods_are_never_counted_together(campaign: Path) -> None:
+    groups = group(load(campaign))
+    assert [(r, m.engine, len(runs)) for (r, m), runs in groups.items()] == [
+        ("HARD", "uniform", 2),
+        ("HARD", "corners", 2),
+        ("NEVER", "uniform", 2),
+        ("NEVER", "corners", 2),
+    ]

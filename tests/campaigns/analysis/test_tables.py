@@ -1,0 +1,100 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns import Method
+from falsifier.campaigns.analysis import Published, Run, Score, ablation_table, load, main_table, models_table
+from falsifier.campaigns.analysis.tables import Table, statistics_json
+
+PUBLISHED = Published(
+    {
+        "best": {"HARD": Score(10, 10, 1.5, "FReaK"), "NEVER": Score(10, 10, 40.0, "FReaK")},
+        "llm_falsifier": {"HARD": Score(10, 10, 1.0), "NEVER": Score(0, 10, None)},
+        "uniform": {"HARD": Score(10, 10, 90.0), "NEVER": Score(0, 10, None)},
+    },
+    {"MP1": {"HARD": Score(9, 10, 25.2)}},
+    {"gpt-5-mini-high": {"HARD": Score(10, 10, 1.0)}},
+    {"best": "a report"},
+)
+
+
+@pytest.fixture
+def runs(campaign: Path) -> list[Run]:
+    return load(campaign)
+
+
+def cells(table_rows: tuple[tuple[str, ...], ...], header: tuple[str, ...], name: str) -> list[str]:
+    return [row[header.index(name)] for row in table_rows]
+
+
+def test_the_main_table_stands_beside_the_published_numbers(runs: list[Run]) -> None:
+    table = main_table(runs, PUBLISHED)
+    assert cells(table.rows, table.header, "requirement") == ["HARD", "HARD", "NEVER", "NEVER"]
+    assert cells(table.rows, table.header, "method") == ["uniform", "corners"] * 2
+    assert cells(table.rows, table.header, "FR") == ["2/2", "2/2", "0/2", "0/2"]
+    # uniform needs 2 and 1 simulations, corners too
+    assert cells(table.rows, table.header, "mean S") == ["1.5", "1.5", "–", "–"]
+    assert cells(table.rows, table.header, "rank") == ["2", "2", "–", "–"]
+    assert cells(table.rows, table.header, "best ARCH-COMP tool")[0] == "FReaK 10 / 1.5"
+    assert cells(table.rows, table.header, "LLM-Falsifier")[2] == "0 / –"
+    assert any("a report" in note for note in table.notes)
+
+
+def test_free_parameterizations_and_other_profiles_stand_apart_and_without_published_numbers(
+    runs: list[Run],
+) -> None:
+    free = [replace(run, method=replace(run.method, parameterization="free")) for run in runs]
+    other = [replace(run, method=replace(run.method, profile="instance2")) for run in runs]
+    table = main_table([*runs, *free, *other], PUBLISHED)
+    assert len(table.rows) == 12
+    for row in table.rows:
+        apart = "free" in row[1] or "instance2" in row[1]
+        assert (row[-1] == "") == apart
+        assert row[table.header.index("rank")] in (("–",) if apart else ("2", "–"))
+
+
+def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
+    first, *others = [run for run in runs if run.requirement == "NEVER" and run.method.engine == "uniform"]
+    table = main_table([replace(first, status="failed"), *others], PUBLISHED)
+    assert table.rows[0][2] == "0/1 +1"
+    assert any(note.startswith("+n") for note in table.notes)
+
+
+def asked(run: Run, variant: str) -> Run:
+    return replace(run, method=Method(model="openai/gpt-5-nano", effort="low", variant=variant))
+
+
+def test_the_ablation_table_has_a_column_a_variant(runs: list[Run]) -> None:
+    hard = [run for run in runs if run.requirement == "HARD"]
+    table = ablation_table([asked(run, variant=v) for v in ("MP1", "MP5") for run in hard[:2]], PUBLISHED)
+    assert table.header == ("requirement", "MP1 (gpt-5-nano low)", "MP5 (gpt-5-nano low)", "MP1 published")
+    assert table.rows == (("HARD", "2/2 / 1.5", "2/2 / 1.5", "9/10 / 25.2"),)
+
+
+def test_the_models_table_has_a_column_a_model(runs: list[Run]) -> None:
+    hard = [run for run in runs if run.requirement == "HARD"]
+    table = models_table([*(asked(run, variant="MP4") for run in hard[:2]), *hard[2:]], PUBLISHED)
+    assert table.header == ("requirement", "gpt-5-nano low MP4", "gpt-5-mini-high published")
+    assert table.rows == (("HARD", "2/2 / 1.5", "10/10 / 1.0"),)
+
+
+def test_formats_carry_the_same_cells(runs: list[Run]) -> None:
+    table = main_table(runs, PUBLISHED)
+    assert table.csv().splitlines()[0] == ",".join(table.header)
+    assert "| HARD | uniform | 2/2 |" in table.markdown()
+    assert len({len(line.split("|")) for line in table.markdown().splitlines() if line.startswith("|")}) == 1
+    assert table.text().splitlines()[4].split()[:3] == ["HARD", "uniform", "2/2"]
+    data = json.loads(statistics_json(runs))
+    assert [(row["requirement"], row["label"], row["falsified"]) for row in data][:2] == [
+        ("HARD", "uniform", 2),
+        ("HARD", "corners", 2),
+    ]
+
+
+def test_a_table_can_be_narrowed_to_some_columns() -> None:
+    table = Table("t", ("a", "b", "c"), (("1", "2", "3"),), ("note",))
+    assert table.only("c", "a") == Table("t", ("c", "a"), (("3", "1"),), ("note",))
+    with pytest.raises(ValueError, match="not in tuple"):
+        table.only("d")

@@ -1,0 +1,61 @@
+"""Small campaigns over Python functions, and what is compared of them."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns import CampaignRequest, Method, cross
+from falsifier.campaigns.analysis import Run, load
+from falsifier.evaluation.workers import Workers
+from falsifier.search.budget import Budget
+from falsifier.search.request import ProblemRequest
+
+
+def request(
+    *names: str,
+    engines: Sequence[str] = ("uniform",),
+    seeds: int = 2,
+    budget: int = 20,
+    limits: Budget | None = None,
+) -> CampaignRequest:
+    """Campaign over problems of tests.problems."""
+    return CampaignRequest(
+        runs=cross(
+            [ProblemRequest(target=f"python:tests.problems:{name}") for name in names],
+            [Method(engine) for engine in engines],
+            seeds=range(seeds),
+            budget=Budget(budget),
+        ),
+        limits=limits,
+    )
+
+
+def work_in_threads(patch: pytest.MonkeyPatch) -> None:
+    """Give campaigns workers without the time that processes take to start."""
+
+    @contextmanager
+    def pool(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
+        with ThreadPoolExecutor(jobs) as executor:
+            yield Workers(executor, lambda: jobs, lambda: ThreadPoolExecutor(jobs))
+
+    patch.setattr("falsifier.campaigns.runner.open_workers", pool)
+
+
+def outcomes(directory: Path) -> list[tuple[object, ...]]:
+    """What must not depend on how often a campaign was killed: everything but times."""
+    return [_outcome(run) for run in load(directory)]
+
+
+def _outcome(run: Run) -> tuple[object, ...]:
+    return (
+        run.directory.name,
+        run.status,
+        run.reason,
+        run.simulations,
+        run.robustness.tolist(),
+        run.counterexample,
+        run.verdict,
+    )

@@ -1,0 +1,112 @@
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.campaigns.archcomp import COLUMNS, export, read_rows, tolerance, validate
+from falsifier.errors import SpecError
+from falsifier.problem.problem import Problem
+from tests import problems
+
+HEADER = ",".join(COLUMNS)
+
+
+def find(requirement: str, instance: str, stop_time: float | None) -> Problem:
+    """The problems of these tests by the names of their requirements."""
+    return {"HARD": problems.hard, "CC1": problems.easy, "AT51": problems.easy}[requirement]()
+
+
+def rows(tmp_path: Path, *lines: str) -> Path:
+    path = tmp_path / "claims.csv"
+    path.write_text("\n".join([HEADER, *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_path: Path) -> None:
+    path = tmp_path / "claims.csv"
+    path.write_text(export(campaign), encoding="utf-8")
+    with path.open(newline="") as file:
+        cells = list(csv.DictReader(file))
+    assert [c["falsified"] for c in cells] == ["yes"] * 4 + ["no"] * 4
+    assert {c["input"] for c in cells[4:]} == {"[]"}
+    findings = validate(read_rows(path), find=find)
+    assert [f.holds for f in findings] == [True] * 4
+    for finding in findings:
+        assert finding.robustness == pytest.approx(finding.row.robustness, abs=1e-6)
+        steps = np.diff(finding.row.input[:, 0])
+        assert steps == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("line", "holds", "reason"),
+    [
+        ('S,HARD,1,"[0 1]",[],yes,3,1,1,-0.4,10', True, "violates again"),
+        ('S,HARD,1,"[0 1; 5 1; 10 1]",[],true,3,1,1,-0.4,', True, "violates again"),
+        ('S,HARD,1,"[0 -1; 10 -1]",[],yes,3,1,1,-0.4,10', False, "does not violate"),
+        ('S,HARD,1,"[0 1]",[],yes,1501,1,1,-0.4,10', False, "1501 simulations, over 1500"),
+        ('S,HARD,1,"[0 1.5]",[],yes,3,1,1,-0.4,10', False, "1.5 is outside its range [-1, 1]"),
+        ('S,HARD,1,"[0 1 1]",[],yes,3,1,1,-0.4,10', False, "2 inputs and 0 parameters; expected 1 and 0"),
+        ('S,HARD,1,"[0 1; 0 1]",[],yes,3,1,1,-0.4,10', False, "must increase strictly from 0"),
+        # easy() with half the input has robustness 0.4: within CC's tolerance of 1, but AT5x has none.
+        ('S,CC1,1,"[0 0.5]",[],yes,3,1,1,-0.4,10', True, "within the tolerance of 1"),
+        ('S,AT51,1,"[0 0.5]",[],yes,3,1,1,-0.4,10', False, "does not violate"),
+    ],
+)
+def test_claims_are_judged_by_the_rules(tmp_path: Path, line: str, holds: bool, reason: str) -> None:
+    (finding,) = validate(read_rows(rows(tmp_path, line)), find=find)
+    assert finding.holds == holds
+    assert reason in finding.reason
+
+
+def test_coarse_inputs_are_piecewise_constant_and_dense_ones_are_as_given(tmp_path: Path) -> None:
+    coarse, dense = '"[0 1; 1 -1]"', '"[0 1; 0.5 1; 0.9 -1]"'
+    first, second = validate(
+        read_rows(rows(tmp_path, *(f"S,HARD,1,{m},[],yes,3,1,1,-0.4,10" for m in (coarse, dense)))), find=find
+    )
+    # One second of full input, then the opposite: x(1) = 1 - 0.9**10; the dense one falls from 0.5 s on.
+    assert first.robustness == pytest.approx(0.6 - (1 - 0.9**10))
+    assert second.robustness is not None
+    assert 0.6 > second.robustness > 0
+    assert second.robustness != first.robustness
+
+
+def test_rows_that_claim_nothing_are_not_simulated(tmp_path: Path) -> None:
+    assert validate(read_rows(rows(tmp_path, "S,HARD,1,[],[],no,1500,1,1,0.1,10")), find=find) == []
+
+
+def test_unknown_requirements_are_findings_not_errors(tmp_path: Path) -> None:
+    (finding,) = validate(read_rows(rows(tmp_path, 'AFC,AFC27,2,"[0 1]",[],yes,3,1,1,-0.4,10')))
+    assert not finding.holds
+    assert "AFC27" in finding.reason
+
+
+def test_unreadable_cells_name_their_row(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="row 1: could not convert string to float: 'x'"):
+        read_rows(rows(tmp_path, 'S,HARD,1,"[0 x]",[],yes,3,1,1,-0.4,10'))
+    with pytest.raises(SpecError, match="row 1: instance '3'"):
+        read_rows(rows(tmp_path, 'S,HARD,3,"[0 1]",[],yes,3,1,1,-0.4,10'))
+
+
+def test_names_of_the_competition_are_understood(tmp_path: Path) -> None:
+    lines = [
+        f'S,{name},1,"[0 1]",[],yes,3,1,1,-0.4,10' for name in ('"(NN 0.005 0.04)"', "F16a", "SCa", "AT1")
+    ]
+    assert [row.requirement for row in read_rows(rows(tmp_path, *lines))] == ["NNb", "F16", "SC", "AT1"]
+
+
+@pytest.mark.parametrize(
+    ("requirement", "expected"),
+    [("AT1", 1.2), ("AT2", 10.0), ("AT6abc", 1.0), ("NNx", 0.1), ("CCx", 1.0), ("SC", 0.05)]
+    + [(name, 0.0) for name in ("AT51", "AT54", "F16", "mine")],
+)
+def test_tolerances(requirement: str, expected: float) -> None:
+    assert tolerance(requirement) == expected
+
+
+def test_another_tools_counterexample_of_the_bundled_transmission_holds(tmp_path: Path) -> None:
+    """Full throttle without braking, as a tool with piecewise constant inputs writes it."""
+    line = 'AT,AT1,2,"[0 100 0; 5 100 0; 25 100 0]",[],1,7,1,1,-1.0,30'
+    (finding,) = validate(read_rows(rows(tmp_path, line)))
+    assert finding.holds
+    assert finding.reason == "violates again"

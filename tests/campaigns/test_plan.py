@@ -1,0 +1,89 @@
+import pytest
+
+from falsifier.campaigns import CampaignRequest, Method, cross, method_of, run_name, suite
+from falsifier.errors import SpecError
+from falsifier.search.budget import Budget
+from falsifier.search.request import ModelRequest, ProblemRequest
+
+AT1 = ProblemRequest(target="AT1")
+
+
+def test_a_campaign_is_requirements_times_methods_times_seeds() -> None:
+    methods = [Method("uniform"), Method(model="openai/gpt-5-nano", effort="low", variant="MP4")]
+    runs = cross(
+        [AT1, ProblemRequest(target="my.toml:R")],
+        methods,
+        seeds=range(3),
+        budget=Budget(7),
+        asking=ModelRequest(name="", api_base="http://x", options={"top_p": 0.5}, cache=False),
+    )
+    assert len(runs) == 12
+    assert [r.seed for r in runs[:3]] == [0, 1, 2]
+    assert [method_of(r) for r in runs] == [m for _ in range(2) for m in methods for _ in range(3)]
+    assert runs[3].model == ModelRequest(
+        name="openai/gpt-5-nano",
+        effort="low",
+        api_base="http://x",
+        variant="MP4",
+        options={"top_p": 0.5},
+        cache=False,
+    )
+    assert {r.problem.parameterization for r in runs} == {"fixed"}
+    assert {r.budget for r in runs} == {Budget(7)}
+
+
+def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
+    def name(method: Method, seed: int = 0, budget: int = 5, target: str = "specs/AT.toml:AT1") -> str:
+        problem = ProblemRequest(target=target)
+        return run_name(cross([problem], [method], seeds=[seed], budget=Budget(budget))[0])
+
+    base = name(Method("uniform"))
+    assert base.startswith("AT1-uniform-0-")
+    others = {
+        name(Method("sobol")),
+        name(Method("uniform", parameterization="free")),
+        name(Method("uniform", profile="instance2")),
+        name(Method("uniform"), seed=1),
+        name(Method("uniform"), budget=6),
+        name(Method("uniform"), target="other/AT.toml:AT1"),
+    }
+    assert len(others | {base}) == 7
+    assert name(Method("uniform")) == base
+    unsafe = name(Method(model="ollama_chat/gpt-oss:20b", variant="MP4"))
+    assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
+
+
+def test_free_and_fixed_parameterizations_are_different_methods() -> None:
+    fixed, free = Method("uniform"), Method("uniform", parameterization="free")
+    assert fixed != free
+    assert (fixed.label, free.label) == ("uniform", "uniform, free")
+    assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
+        "hybrid + gpt-5-mini high MP4, instance2"
+    )
+    named = Method(model="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
+    assert named.label == "gpt-5-mini, neutral names, then surrogate"
+    assert method_of(cross([AT1], [named], seeds=[0], budget=Budget(1))[0]) == named
+
+
+def test_the_same_run_twice_is_refused() -> None:
+    run = cross([AT1], [Method("uniform")], seeds=[0], budget=Budget(5))
+    with pytest.raises(SpecError, match="the same run twice"):
+        CampaignRequest(runs=run + run).named()
+
+
+def test_the_suite_has_the_published_requirements() -> None:
+    names = [r.target for r in suite("arch-comp")]
+    assert len(names) == 21
+    assert {"AT:AT1", "AT:AT6abc", "NN:NN", "CC:CCx", "F16:F16", "SC:SC"} < set(names)
+    assert [r.load().name for r in suite("arch-comp")] == [name.split(":")[1] for name in names]
+
+
+def test_instance_2_leaves_out_what_has_none() -> None:
+    names = [r.target for r in suite("arch-comp", profile="instance2")]
+    assert "F16:F16" not in names
+    assert len(names) == 20
+
+
+def test_an_unknown_suite_is_named() -> None:
+    with pytest.raises(SpecError, match="arch-comp"):
+        suite("archcomp")

@@ -1,0 +1,159 @@
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns import (
+    CampaignRequest,
+    Follower,
+    Method,
+    Progress,
+    cross,
+    resume_campaign,
+    run_campaign,
+)
+from falsifier.campaigns.directory import locked, run_directory
+from falsifier.counterexamples.store import load, problem_of, replay
+from falsifier.errors import JournalError, SpecError
+from falsifier.search.budget import Budget
+from falsifier.search.loop import falsify
+from falsifier.search.request import ProblemRequest
+from tests import problems
+from tests.campaigns.support import outcomes, request, work_in_threads
+
+
+@pytest.fixture(autouse=True)
+def threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """test_kill.py has real processes."""
+    work_in_threads(monkeypatch)
+
+
+def test_each_run_is_the_one_that_runs_alone(tmp_path: Path) -> None:
+    run_campaign(request("easy", "hard", engines=("uniform", "corners")), tmp_path / "c")
+    found = {(o[0], o[3], o[6].robustness) for o in outcomes(tmp_path / "c")}  # type: ignore[attr-defined]
+    expected = set()
+    for name in request("easy", "hard", engines=("uniform", "corners")).named():
+        target, engine, seed = name.split("-")[:3]
+        result = falsify(getattr(problems, target)(), engine, budget=20, seed=int(seed))
+        assert result.best is not None
+        expected.add((name, result.spent.simulations, result.best.robustness))
+    assert found == expected
+
+
+def test_resume_repeats_nothing_that_is_finished(tmp_path: Path) -> None:
+    directory = tmp_path / "c"
+    first = run_campaign(request("easy", "impossible"), directory)
+    assert first.progress.finished == 4
+    files = {p: p.read_bytes() for p in directory.rglob("journal.jsonl")}
+    seen: list[Progress] = []
+    second = resume_campaign(directory, listeners=[seen.append])
+    assert second.progress == first.progress
+    assert {p: p.read_bytes() for p in directory.rglob("journal.jsonl")} == files
+
+
+def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path) -> None:
+    directory = tmp_path / "c"
+    run_campaign(request("easy"), directory)
+    with pytest.raises(JournalError, match="already holds a campaign"):
+        run_campaign(request("easy"), directory)
+    with locked(directory), pytest.raises(JournalError, match="another process is working on this campaign"):
+        resume_campaign(directory)
+
+
+def test_limits_of_the_whole_campaign_stop_it_where_it_is(tmp_path: Path) -> None:
+    directory = tmp_path / "c"
+    wanted = request("impossible", seeds=4, budget=2000, limits=Budget(100))
+    stopped = run_campaign(wanted, directory)
+    assert stopped.reason == "the budget of 100 simulations is used up"
+    assert 0 < stopped.progress.spent.simulations < 8000
+    assert stopped.progress.counts["interrupted"] == 1
+    assert stopped.progress.counts["waiting"] == 3
+    assert not (directory / "stop").exists()
+    again = resume_campaign(directory)
+    assert again.reason == stopped.reason
+    assert again.progress.spent.simulations == stopped.progress.spent.simulations
+
+
+def test_more_budget_finishes_a_stopped_campaign_like_an_unlimited_one(tmp_path: Path) -> None:
+    wanted = request("impossible", seeds=2, budget=300)
+    run_campaign(wanted, tmp_path / "whole")
+    limited = wanted.model_copy(update={"limits": Budget(10)})
+    assert run_campaign(limited, tmp_path / "c").reason
+    done = resume_campaign(tmp_path / "c", limits=Budget(100_000))
+    assert not done.reason
+    assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
+
+
+def test_failed_runs_are_told_apart_and_tried_again(tmp_path: Path) -> None:
+    directory = tmp_path / "c"
+    first = run_campaign(request("easy", "unusable", seeds=1), directory)
+    failed = next(run for run in first.progress.runs if run.requirement == "unusable")
+    assert failed.status == "failed"
+    assert "10 simulations failed" in failed.reason
+    assert first.progress.finished == 1
+    again = resume_campaign(directory)
+    assert again.progress.counts == first.progress.counts == {"not falsified": 1, "failed": 1}
+
+
+def test_another_worker_error_is_a_failed_run_in_its_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("no memory")
+
+    monkeypatch.setattr("falsifier.campaigns.work.perform", broken)
+    directory = tmp_path / "c"
+    run_campaign(request("easy", seeds=1), directory)
+    monkeypatch.undo()
+    (run,) = Follower(directory).look().runs
+    assert (run.status, run.reason) == ("failed", "RuntimeError: no memory")
+
+
+def test_a_changed_model_is_refused(tmp_path: Path) -> None:
+    spec = tmp_path / "lag.toml"
+    directory = tmp_path / "c"
+    fmu = Path(__file__).resolve().parents[2] / "fmus" / "AT.fmu"
+    spec.write_text(
+        f'[model]\nfmu = "{fmu}"\ninterface = "co-simulation"\nstop_time = 1.0\noutput_interval = 0.1\n'
+        "[inputs.throttle]\ncontrol_points = 1\n[requirements.R]\nformula = 'G[0,1] (speed <= -1)'\n"
+    )
+    runs = cross([ProblemRequest(target=f"{spec}:R")], [Method("uniform")], seeds=[0], budget=Budget(1))
+    run_campaign(CampaignRequest(runs=runs), directory)
+    spec.write_text(spec.read_text() + "# changed\n")
+    with pytest.raises(JournalError, match=r"lag\.toml has changed"):
+        resume_campaign(directory)
+
+
+def test_requirements_of_the_same_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="both called 'EASY'"):
+        run_campaign(request("easy", "easy_again"), tmp_path / "c")
+
+
+def test_best_trajectories_only_are_kept(tmp_path: Path) -> None:
+    wanted = request("impossible", seeds=1, budget=30)
+    run_campaign(wanted, tmp_path)
+    (name,) = wanted.named()
+    kept = list((run_directory(tmp_path, name) / "trajectories").iterdir())
+    assert len(kept) == 1
+
+
+def test_a_torn_last_line_is_dropped(tmp_path: Path) -> None:
+    wanted = request("impossible", seeds=1, budget=12)
+    run_campaign(wanted, tmp_path / "whole")
+    run_campaign(wanted, tmp_path / "torn")
+    (journal,) = (tmp_path / "torn").rglob("journal.jsonl")
+    content = journal.read_bytes()
+    journal.write_bytes(content[: len(content) * 2 // 3])
+    assert Follower(tmp_path / "torn").look().counts["running"] == 1
+    resume_campaign(tmp_path / "torn")
+    assert outcomes(tmp_path / "torn") == outcomes(tmp_path / "whole")
+
+
+def test_counterexamples_are_files_that_can_be_replayed(tmp_path: Path) -> None:
+    run_campaign(request("hard", "impossible", seeds=1), tmp_path)
+    (file,) = tmp_path.rglob("counterexample.json")
+    stored = load(file.parent)
+    assert stored.problem == ProblemRequest(target="python:tests.problems:hard", parameterization="fixed")
+    assert replay(stored, problem_of(stored)).status == "violates"
+    file.unlink()
+    resume_campaign(tmp_path)
+    assert load(file) == stored

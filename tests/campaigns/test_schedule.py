@@ -1,0 +1,146 @@
+"""Which runs are given out when, on executors that do as the test says."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from falsifier.campaigns.schedule import Schedule
+from falsifier.campaigns.work import Done, Missing, Task
+from falsifier.evaluation.workers import Workers
+from falsifier.search.budget import Budget
+from falsifier.search.manifest import manifest
+from falsifier.search.request import ModelRequest, ProblemRequest, RunRequest
+from tests.problems import easy
+
+PROBLEM = easy()
+
+
+def task(name: str, model: str | None = None) -> Task:
+    request = RunRequest(
+        problem=ProblemRequest(target="python:tests.problems:easy"),
+        model=ModelRequest(name=model) if model else None,
+        budget=Budget(1),
+    )
+    return Task(name, request, PROBLEM, manifest(request, PROBLEM), Path("unused"), "")
+
+
+def run(
+    tasks: list[Task],
+    workers: Workers,
+    monkeypatch: pytest.MonkeyPatch,
+    work: Callable[..., Any],
+    calls: int = 8,
+) -> dict[str, Done]:
+    monkeypatch.setattr("falsifier.campaigns.schedule.run_task", work)
+    done: dict[str, Done] = {}
+    Schedule(tasks, workers, calls=calls).run(lambda t, d: done.__setitem__(t.name, d), lambda: True)
+    return done
+
+
+def threads(slots: int) -> Workers:
+    return Workers(ThreadPoolExecutor(8), lambda: slots, lambda: ThreadPoolExecutor(8))
+
+
+class Gauge:
+    """Counts how many calls are inside at a time."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.inside = self.most = 0
+
+    def __call__(self, task: Task, files: object) -> Done:
+        with self.lock:
+            self.inside += 1
+            self.most = max(self.most, self.inside)
+        threading.Event().wait(0.02)
+        with self.lock:
+            self.inside -= 1
+        return Done("not falsified", "")
+
+
+def test_never_more_runs_than_slots(monkeypatch: pytest.MonkeyPatch) -> None:
+    gauge = Gauge()
+    done = run([task(str(i)) for i in range(9)], threads(3), monkeypatch, gauge)
+    assert len(done) == 9
+    assert gauge.most == 3
+
+
+def test_runs_with_a_language_model_have_a_limit_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    asking = Gauge()
+    together = Gauge()
+
+    def work(task: Task, files: object) -> Done:
+        return asking(task, files) if task.request.model else together(task, files)
+
+    tasks = [task(f"m{i}", "openai/any") for i in range(6)] + [task(f"n{i}") for i in range(6)]
+    done = run(tasks, threads(5), monkeypatch, work, calls=2)
+    assert len(done) == 12
+    assert asking.most == 2
+    assert together.most == 3
+
+
+def test_a_missing_file_is_sent_once_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "a.fmu"
+    file.write_bytes(b"content")
+    monkeypatch.setattr("falsifier.campaigns.schedule.fmu_file", lambda problem: file)
+    sent: list[dict[str, bytes]] = []
+
+    def work(task: Task, files: dict[str, bytes]) -> Done | Missing:
+        sent.append(files)
+        return Done("falsified", "") if files else Missing("digest")
+
+    assert run([task("a")], threads(1), monkeypatch, work)["a"].status == "falsified"
+    assert sent == [{}, {"digest": b"content"}]
+
+
+def _finish(future: "Future[Done]") -> None:
+    if not future.done():
+        future.set_result(Done("not falsified", ""))
+
+
+class Mortal(Executor):
+    """Breaks like a process pool when it is given the deadly run: everything in it is lost."""
+
+    def __init__(self) -> None:
+        self.pending: list[Future[Done]] = []
+        self.broken = False
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        if self.broken:
+            raise BrokenExecutor("dead")
+        future: Future[Done] = Future()
+        self.pending.append(future)
+        task = args[0]
+        if task.name == "deadly":
+            self.broken = True
+            for each in self.pending:
+                if not each.done():
+                    each.set_exception(BrokenExecutor("killed"))
+        elif len(self.pending) > 2 or task.name.startswith("last"):
+            future.set_result(Done("not falsified", ""))
+        else:
+            threading.Timer(0.02, _finish, [future]).start()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        pass
+
+
+def test_only_the_run_that_kills_workers_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Mortal] = []
+
+    def make() -> Mortal:
+        made.append(Mortal())
+        return made[-1]
+
+    names = ["a", "b", "deadly", "c", "last"]
+    done = run([task(n) for n in names], Workers(make(), lambda: 3, make), monkeypatch, lambda *_: None)
+    assert {name: d.status for name, d in done.items()} == {
+        **dict.fromkeys(["a", "b", "c", "last"], "not falsified"),
+        "deadly": "failed",
+    }
+    assert len(made) == 3

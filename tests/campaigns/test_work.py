@@ -1,0 +1,66 @@
+"""What a worker does that sees neither the campaign's directory nor its FMU."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns.work import Done, Missing, Task, run_task, unpack
+from falsifier.fmu import FmuModel
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.search.journal import EvaluatedRecord, read_journal
+from falsifier.search.manifest import manifest
+from falsifier.search.request import ProblemRequest, RunRequest
+from tests.problems import easy
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("FALSIFIER_STORE", str(tmp_path / "store"))
+    return tmp_path / "store"
+
+
+def remote_task(problem: Problem, target: str) -> Task:
+    request = RunRequest(
+        problem=ProblemRequest(target=target), engine="corners", budget=Budget(2), keep="best"
+    )
+    return Task(
+        "R-0", request, problem, manifest(request, problem), Path("/nowhere"), "another machine's mark"
+    )
+
+
+def test_a_run_comes_back_packed_where_the_directory_is_not_seen(store: Path, tmp_path: Path) -> None:
+    done = run_task(remote_task(easy(), "python:tests.problems:easy"), {})
+    assert isinstance(done, Done)
+    assert done.packed is not None
+    place = tmp_path / "campaign" / "runs" / "R-0"
+    unpack(done.packed, place)
+    assert any(isinstance(r, EvaluatedRecord) for r in read_journal(place))
+    assert (place / "manifest.json").exists()
+    assert len(list((place / "trajectories").iterdir())) == 1
+    assert not list(store.rglob("journal.jsonl")), "the worker keeps no copy"
+
+
+def test_an_fmu_that_the_worker_does_not_have_is_asked_for_and_kept(store: Path, tmp_path: Path) -> None:
+    problem = load_problem("AT2")
+    model = problem.model
+    assert isinstance(model, FmuModel)
+    content = model.path.read_bytes()
+    moved = replace(problem, model=_with_path(model, tmp_path / "gone" / "AT.fmu"))
+    task = remote_task(problem, "AT2")
+    task = replace(task, problem=moved)
+    assert run_task(task, {}) == Missing(model.sha256)
+    assert isinstance(run_task(task, {model.sha256: content}), Done)
+    assert (store / "files" / model.sha256 / "AT.fmu").read_bytes() == content
+    assert isinstance(run_task(task, {}), Done), "the second time it has the file"
+
+
+def _with_path(model: FmuModel, path: Path) -> FmuModel:
+    """The model as it arrives on a machine that does not have its file: nothing is read when unpickling."""
+    import copy
+
+    arrived = copy.copy(model)
+    object.__setattr__(arrived, "path", path)
+    return arrived

@@ -1,0 +1,85 @@
+import pickle
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.signals import Signal
+from falsifier.errors import SimulationError
+
+INFO = ModelInfo(
+    "tank",
+    variables=(
+        Variable("inflow", causality="input", unit="m3/s"),
+        Variable("area", causality="parameter", start=2.0),
+        Variable("level", causality="output", unit="m"),
+        Variable("full", "boolean", "output"),
+    ),
+)
+Floats = NDArray[np.float64]
+
+
+def tank(times: Floats, inputs: dict[str, Floats], parameters: dict[str, float]) -> dict[str, Floats]:
+    """Level of a tank: the integral of the inflow by the left rule."""
+    step = float(times[1])
+    level = np.concatenate([[0.0], np.cumsum(inputs["inflow"][:-1])]) * step / parameters.get("area", 2.0)
+    return {"level": level, "full": (level > 1.0).astype(np.float64)}
+
+
+def divide(times: Floats, inputs: dict[str, Floats], parameters: dict[str, float]) -> dict[str, Floats]:
+    """An output that is inf at t = 0.5."""
+    with np.errstate(divide="ignore"):
+        return {"level": 1.0 / (times - 0.5), "full": times}
+
+
+def broken(times: Floats, inputs: dict[str, Floats], parameters: dict[str, float]) -> dict[str, Floats]:
+    """Raise."""
+    raise ZeroDivisionError("no water")
+
+
+def short(times: Floats, inputs: dict[str, Floats], parameters: dict[str, float]) -> dict[str, Floats]:
+    """One sample too few."""
+    return {"level": times[:-1]}
+
+
+EXPERIMENT = Experiment(1.0, 0.1, ("level", "full"))
+INFLOW = {"inflow": Signal((0.0,), (4.0,))}
+
+
+def test_a_function_is_a_model() -> None:
+    got = FunctionModel(tank, INFO).simulate(INFLOW, {"area": 1.0}, EXPERIMENT)
+    assert got["level"][-1] == pytest.approx(4.0)
+    assert got["full"].tolist() == [0.0] * 3 + [1.0] * 8
+    assert got.units == {"level": "m"}
+
+
+def test_it_travels_between_processes() -> None:
+    model = pickle.loads(pickle.dumps(FunctionModel(tank, INFO)))
+    assert model.simulate(INFLOW, {}, EXPERIMENT)["level"][-1] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "outputs", "message"),
+    [
+        (divide, ("level",), "tank: output 'level' is inf at t = 0.5 s"),
+        (broken, ("level",), "tank: ZeroDivisionError: no water"),
+        (short, ("level",), r"output 'level' has shape \(10,\), expected \(11,\)"),
+        (tank, ("levle",), "no output 'levle'; did you mean 'level'"),
+    ],
+)
+def test_what_goes_wrong_is_a_failed_simulation(
+    function: object, outputs: tuple[str, ...], message: str
+) -> None:
+    model = FunctionModel(function, INFO)  # type: ignore[arg-type]
+    with pytest.raises(SimulationError, match=message) as caught:
+        model.simulate(INFLOW, {}, Experiment(1.0, 0.1, outputs))
+    assert caught.value.status == "failed"
+
+
+def test_info_finds_variables_by_name_and_role() -> None:
+    assert INFO["area"].start == 2.0
+    assert "level" in INFO and "pressure" not in INFO
+    assert [v.name for v in INFO.parameters] == ["area"]
+    with pytest.raises(KeyError, match="did you mean 'inflow'"):
+        INFO["inflwo"]

@@ -1,0 +1,108 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from falsifier.core.signals import Signal
+from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.errors import CandidateError
+
+THROTTLE = InputRange("throttle", 0.0, 100.0, 7, hold=0.05, unit="%")
+BRAKE = InputRange("brake", 0.0, 325.0, 3, "constant")
+ROLL = ParameterRange("roll", 0.63, 0.89)
+SPACE = SearchSpace((THROTTLE, BRAKE), (ROLL,), 50.0)
+
+
+def test_dimensions_name_control_points_and_parameters() -> None:
+    dimensions = SPACE.dimensions
+    assert [d.name for d in dimensions] == ["throttle"] * 7 + ["brake"] * 3 + ["roll"]
+    assert dimensions[1].time == pytest.approx(50 / 6)
+    assert dimensions[8].time == pytest.approx(50 / 3)
+    assert dimensions[-1].time is None
+    assert SPACE.bounds.shape == (11, 2)
+
+
+@given(st.lists(st.floats(0, 1), min_size=11, max_size=11))
+def test_decode_and_encode_are_inverse(unit: list[float]) -> None:
+    low, high = SPACE.bounds.T
+    vector = low + np.array(unit) * (high - low)
+    candidate = SPACE.decode(vector, origin="test")
+    np.testing.assert_allclose(SPACE.encode(candidate), vector, rtol=0, atol=1e-12)
+    assert Candidate.from_json(candidate.to_json()) == candidate
+
+
+def test_admitted_signals_bear_the_hold_of_their_input() -> None:
+    candidate = SPACE.decode(SPACE.bounds[:, 0])
+    assert candidate.signals["throttle"].hold == 0.05
+    assert candidate.signals["brake"].hold is None
+
+
+def test_rounding_is_clipped_and_more_is_refused() -> None:
+    vector = SPACE.bounds[:, 1].copy()
+    vector[-1] += 1e-6
+    assert SPACE.decode(vector).parameters["roll"] == 0.89
+    vector[0] = 101
+    with pytest.raises(CandidateError, match=r"'throttle' at t = 0 s: 101 is outside its range \[0, 100\]"):
+        SPACE.decode(vector)
+
+
+def test_unknown_and_missing_names_are_named() -> None:
+    good = SPACE.decode(SPACE.bounds[:, 0])
+    with pytest.raises(CandidateError, match="did you mean 'throttle'"):
+        SPACE.admit(Candidate({"throtle": good.signals["throttle"]}, {}))
+    with pytest.raises(CandidateError, match="'brake' is missing"):
+        SPACE.admit(Candidate({"throttle": good.signals["throttle"]}, {"roll": 0.7}))
+    with pytest.raises(CandidateError, match="expected 11 numbers, got 2"):
+        SPACE.decode([1.0, 2.0])
+
+
+def test_a_free_parameterization_is_checked_against_its_limits() -> None:
+    fixed = SearchSpace((InputRange("u", 0.0, 1.0, 3),), (), 10.0)
+    steps = Candidate({"u": Signal((0.0, 0.5, 9.0), (0.0, 1.0, 0.5), "constant")})
+    with pytest.raises(CandidateError, match="expected 3 evenly spaced control points"):
+        fixed.admit(steps)
+    free = SearchSpace((InputRange("u", 0.0, 1.0, 3, free=Freedom(3, 0.4)),), (), 10.0)
+    assert free.admit(steps).signals["u"].interpolation == "constant"
+    with pytest.raises(CandidateError, match="at most 3"):
+        free.admit(Candidate({"u": Signal((0.0, 1.0, 2.0, 3.0), (0.0,) * 4)}))
+    with pytest.raises(CandidateError, match=r"closer than 0\.4 s"):
+        free.admit(Candidate({"u": Signal((0.0, 0.3), (0.0, 1.0))}))
+    with pytest.raises(CandidateError, match="behind the stop time"):
+        free.admit(Candidate({"u": Signal((0.0, 11.0), (0.0, 1.0))}))
+
+
+def test_equal_simulations_have_equal_keys() -> None:
+    a = SPACE.decode(SPACE.bounds[:, 0], origin="a", rationale="because")
+    b = SPACE.decode(SPACE.bounds[:, 0], origin="b")
+    assert a.key == b.key
+    assert a.key != SPACE.decode(SPACE.bounds[:, 1]).key
+
+
+GEAR = InputRange("gear", 1.0, 7.0, 3, "constant", kind="enumeration", items=(("a", 1), ("b", 3), ("c", 7)))
+COUNT = ParameterRange("count", 0.5, 3.5, kind="integer")
+
+
+@given(st.floats(1, 7), st.floats(0.5, 3.5))
+def test_whole_numbers_are_admitted_whole(gear: float, count: float) -> None:
+    space = SearchSpace((GEAR,), (COUNT,), 10.0)
+    candidate = space.decode([gear, 1.0, 7.0, count])
+    assert candidate.signals["gear"].values[0] in (1.0, 3.0, 7.0)
+    assert candidate.parameters["count"] in (1.0, 2.0, 3.0)
+    assert space.admit(candidate) == candidate
+    assert space.decode(space.encode(candidate)) == candidate
+
+
+def test_the_nearest_item_is_taken() -> None:
+    space = SearchSpace((GEAR,), (COUNT,), 10.0)
+    assert space.decode([1.9, 2.1, 5.2, 2.6]).signals["gear"].values == (1.0, 3.0, 7.0)
+    assert space.decode([1.9, 2.1, 5.2, 2.6]).parameters["count"] == 3.0
+
+
+def test_whole_numbers_are_not_interpolated_freely() -> None:
+    space = SearchSpace((replace(GEAR, free=Freedom(9, 0.1)),), (), 10.0)
+    held = space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.2, 6.9), "constant")}))
+    assert held.signals["gear"].values == (1.0, 7.0)
+    with pytest.raises(CandidateError, match='cannot be interpolated with linear: use "constant"'):
+        space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.0, 7.0), "linear")}))

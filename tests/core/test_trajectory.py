@@ -1,0 +1,31 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import MonitorError
+
+TIMES = np.linspace(0, 1, 11)
+TRAJECTORY = Trajectory(TIMES, {"x": TIMES**2, "y": -TIMES}, {"x": "m"})
+
+
+def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
+    TRAJECTORY.save(tmp_path / "t.npz")
+    loaded = Trajectory.load(tmp_path / "t.npz")
+    assert loaded.names == ("x", "y")
+    assert loaded.units == {"x": "m"}
+    assert loaded.times.tobytes() == TIMES.tobytes()
+    assert loaded["x"].tobytes() == TRAJECTORY["x"].tobytes()
+
+
+def test_values_at_a_time() -> None:
+    assert TRAJECTORY.at(0.52) == pytest.approx({"x": 0.25, "y": -0.5})
+    assert TRAJECTORY.step == pytest.approx(0.1)
+
+
+def test_missing_signals_and_unequal_lengths_are_named() -> None:
+    with pytest.raises(MonitorError, match=r"no signal 'z'.*Known: x, y"):
+        TRAJECTORY["z"]
+    with pytest.raises(MonitorError, match="'x' has 3 samples, the time grid has 11"):
+        Trajectory(TIMES, {"x": np.zeros(3)})

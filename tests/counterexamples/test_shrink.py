@@ -1,0 +1,199 @@
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from falsifier.core.signals import Signal
+from falsifier.core.space import Candidate, Freedom, ParameterRange
+from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
+from falsifier.counterexamples.simplicity import digits, rest_value, rounder, simplicity
+from falsifier.errors import SpecError
+from falsifier.evaluation.confirm import half_step
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from tests.problems import STEP, Array, lag_problem
+from tests.stepped import euler_problem
+
+FREE = Freedom(max_control_points=20, min_interval=0.1)
+
+
+def ramp(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Integrator of the input, from x0."""
+    x0 = parameters.get("x0", 0.0)
+    return {"x": x0 + np.concatenate(([0.0], np.cumsum(inputs["u"][:-1]) * STEP))}
+
+
+def violation(problem: Problem, seed: int = 0) -> Evaluation:
+    """First violation among uniform samples."""
+    rng = np.random.default_rng(seed)
+    low, high = problem.space.bounds.T
+    for _ in range(500):
+        found = evaluate(problem, problem.space.decode(rng.uniform(low, high)))
+        if found.violated:
+            return found
+    raise AssertionError("no violation among 500 samples")
+
+
+def assert_local_minimum(problem: Problem, shrunk: Shrunk) -> None:
+    """No pass has a simpler candidate that violates, at half the step too."""
+    limit = simplicity(problem, shrunk.evaluation.candidate)
+    for propose in PASSES:
+        for proposal in propose(problem, shrunk.evaluation.candidate):
+            try:
+                candidate = problem.space.admit(proposal)
+            except Exception:
+                continue
+            if simplicity(problem, candidate) < limit:
+                violated = evaluate(problem, candidate).violated
+                assert not (violated and evaluate(half_step(problem), candidate).violated), propose.__name__
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("free", [None, FREE])
+def test_the_result_is_a_violating_local_minimum(seed: int, free: Freedom | None) -> None:
+    x0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
+    problem = lag_problem(
+        "G[0,10] (x <= 2)  or F[0,10] (x < -1.5)", function=ramp, free=free, parameters=(x0,)
+    )
+    shrunk = shrink(problem, violation(problem, seed), budget=2000)
+    assert shrunk.minimal
+    assert shrunk.evaluation.violated
+    assert simplicity(problem, shrunk.evaluation.candidate) < simplicity(problem, shrunk.original.candidate)
+    assert problem.space.admit(shrunk.evaluation.candidate).key == shrunk.evaluation.candidate.key
+    assert_local_minimum(problem, shrunk)
+
+
+def test_what_does_not_matter_comes_to_rest_and_what_does_becomes_round() -> None:
+    x0 = ParameterRange("x0", -1.0, 1.0, nominal=0.25)
+    problem = lag_problem("G[0,10] (x <= 5.1)", function=ramp, free=FREE, parameters=(x0,))
+    signal = Signal((0.0, 3.3, 7.1, 9.0), (0.81, 0.72, 0.93, 0.64), "pchip")
+    original = evaluate(problem, problem.space.admit(Candidate({"u": signal}, {"x0": 0.777})))
+    shrunk = shrink(problem, original)
+    assert shrunk.original is original
+    assert shrunk.evaluation.candidate.signals["u"] == Signal((0.0,), (1.0,), "constant")
+    assert shrunk.evaluation.candidate.parameters == {"x0": 0.25}
+    assert shrunk.evaluation.candidate.origin == "shrink"
+
+
+def test_a_change_that_is_needed_stays() -> None:
+    problem = lag_problem("(F[0,4] (x >= 2)) -> (G[4,10] (x >= 1))", function=ramp, free=FREE)
+    signal = Signal((0.0, 3.1, 5.2, 8.8), (0.9, 0.95, -0.7, -0.9), "linear")
+    original = evaluate(problem, Candidate({"u": signal}, {}))
+    assert original.violated
+    shrunk = shrink(problem, original, budget=3000)
+    found = shrunk.evaluation.candidate.signals["u"]
+    assert shrunk.minimal
+    assert found.switches == 1
+    assert len(found.times) == 2
+    assert set(found.values) == {1.0, -1.0}
+    assert_local_minimum(problem, shrunk)
+
+
+def test_shrinking_is_deterministic_and_keeps_its_budget() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", function=ramp)
+    original = violation(problem)
+    first, second = shrink(problem, original), shrink(problem, original)
+    assert first.evaluation.candidate.key == second.evaluation.candidate.key
+    assert first.simulations == second.simulations
+    for budget in (1, 2, 3, 5):
+        short = shrink(problem, original, budget=budget)
+        assert short.simulations <= budget
+        assert short.evaluation.violated
+        assert not short.minimal
+
+
+def test_what_is_minimal_already_is_returned_as_it_was() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", function=ramp)
+    once = shrink(problem, violation(problem)).evaluation
+    again = shrink(problem, once)
+    assert again.minimal
+    assert again.evaluation is once
+
+
+def test_a_demanded_margin_is_kept() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", function=ramp)
+    original = evaluate(problem, problem.space.decode([0.9, 0.8, 0.95, 0.9]))
+    shrunk = shrink(problem, original, margin=5.0)
+    assert shrunk.evaluation.robustness is not None
+    assert shrunk.evaluation.robustness <= -5.0
+    with pytest.raises(SpecError, match="not violated by 9 or more"):
+        shrink(problem, original, margin=9.0)
+
+
+def test_shrinking_does_not_end_at_a_fragile_one() -> None:
+    # x(1) of a constant u is 0.6513 u with 0.1 s and 0.6415 u with 0.05 s: at 0.5 only the former violates.
+    problem = euler_problem("G[1,1] (x <= 0.323 or u >= 0.6)")
+    original = evaluate(problem, problem.space.decode([0.52, 0.53, 0.4, 0.52]))
+    rounded = evaluate(problem, problem.space.decode([0.5] * 4))
+    assert rounded.violated
+    assert not evaluate(half_step(problem), rounded.candidate).violated
+    shrunk = shrink(problem, original)
+    assert shrunk.minimal
+    assert shrunk.evaluation.candidate.signals["u"].values == (0.52,) * 4
+
+
+def test_the_order_of_simplicity() -> None:
+    problem = lag_problem(free=FREE)
+
+    def key(times: tuple[float, ...], values: tuple[float, ...], interpolation: str = "linear") -> object:
+        return simplicity(problem, Candidate({"u": Signal(times, values, interpolation)}))  # type: ignore[arg-type]
+
+    in_order = [
+        key((0.0,), (0.0,), "constant"),  # at rest
+        key((0.0,), (0.0,)),  # the same as a line
+        key((0.0, 5.0), (0.0, 0.0)),  # with a point more
+        key((0.0,), (1.0,)),  # at a bound
+        key((0.0,), (0.5,)),  # a round number
+        key((0.0,), (0.51,)),  # a longer one
+        key((0.0, 5.0), (0.0, 1.0)),  # a change
+        key((0.0, 5.1), (0.0, 1.0)),  # at a longer time
+        key((0.0, 5.0, 6.0), (0.0, 1.0, 0.0)),  # two changes between the same values
+        key((0.0, 5.0, 6.0), (0.0, 1.0, 0.5)),  # a third value
+    ]
+    assert in_order == sorted(in_order)  # type: ignore[type-var]
+    assert len(set(map(repr, in_order))) == len(in_order)
+
+
+def test_rest_is_the_start_value_within_the_range() -> None:
+    problem = lag_problem(parameters=(ParameterRange("x0", 0.5, 1.0, nominal=0.0),))
+    assert rest_value(problem, "u") == 0.0
+    assert rest_value(problem, "x0") is None
+    moved = replace(problem.space.inputs[0], low=0.2)
+    space = replace(problem.space, inputs=(moved,))
+    assert rest_value(replace(problem, space=space), "u") is None
+
+
+def test_digits_and_rounder_numbers() -> None:
+    assert [digits(v) for v in (0.0, 100.0, 0.05, -33.25, 1e-7)] == [1, 1, 1, 4, 1]
+    assert list(rounder(33.25)) == [30.0, 40.0, 33.0, 34.0, 33.2, 33.3]
+    assert list(rounder(-0.12)) == [-0.1, -0.2]
+    assert list(rounder(7.0)) == []
+
+
+def test_at6a_shrinks_to_one_change_of_throttle_without_brake() -> None:
+    problem = load_problem("AT6a")
+    signals = {
+        "throttle": Signal((0.0, 3.4575, 6.2728), (44.82, 53.369, 17.89), "linear"),
+        "brake": Signal((0.0, 20.0), (1.7146, 32.187), "pchip"),
+    }
+    original = evaluate(problem, problem.space.admit(Candidate(signals)))
+    shrunk = shrink(problem, original)
+    found = shrunk.evaluation.candidate.signals
+    assert shrunk.minimal
+    assert found["brake"].values == (0.0,)
+    assert found["throttle"].interpolation == "constant"
+    assert found["throttle"].switches == 1
+    assert_local_minimum(problem, shrunk)
+
+
+def test_f16_shrinks_its_idle_parameter_only() -> None:
+    problem = load_problem("F16")
+    roll, pitch, _ = problem.space.parameters
+    start = {"roll": roll.high, "pitch": pitch.low, "yaw": -0.7853981}
+    shrunk = shrink(problem, evaluate(problem, problem.space.admit(Candidate({}, start))))
+    found = shrunk.evaluation.candidate.parameters
+    assert shrunk.minimal
+    assert (found["roll"], found["pitch"]) == (roll.high, pitch.low)
+    assert digits(found["yaw"]) == 1

@@ -1,0 +1,194 @@
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.counterexamples.regression import check
+from falsifier.counterexamples.store import Database, load, problem_of, replay, save, to_store
+from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.confirm import Confirmation, confirm
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.loading import bundled
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.search.run import execute
+from falsifier.stl import parse
+from tests.problems import lag_problem, never
+from tests.stepped import euler_problem
+
+SPEC = """
+[model]
+fmu = "AT.fmu"
+interface = "co-simulation"
+stop_time = 30
+[inputs.throttle]
+control_points = 2
+[inputs.brake]
+value = 0
+[parameters]
+finalDrive = 3.23
+[requirements.R]
+formula = "G[0,20] (speed <= 120)"
+"""
+
+
+def violation(problem: Problem) -> Confirmation:
+    vector = [d.high for d in problem.space.dimensions]
+    return confirm(problem, evaluate(problem, problem.space.decode(vector)))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "project"
+    folder.mkdir()
+    shutil.copy(bundled("fmus") / "AT.fmu", folder / "AT.fmu")
+    (folder / "my.toml").write_text(SPEC)
+    return folder
+
+
+def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
+    problem = lag_problem()
+    stored = to_store(problem, violation(problem), None)
+    assert load(save(stored, tmp_path / "deep" / "c.json")) == stored
+    assert list((tmp_path / "deep").iterdir()) == [tmp_path / "deep" / "c.json"]
+
+
+def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    request = ProblemRequest(target="my.toml:R", parameters=("finalDrive=3.225",))
+    problem = request.load()
+    database = Database(Path("counterexamples"))
+    path = database.save(problem, to_store(problem, violation(problem), request))
+    assert json.loads(path.read_text())["problem"]["target"] == "../../my.toml:R"
+    monkeypatch.chdir(tmp_path)
+    folder.rename(tmp_path / "moved")
+    stored = load(tmp_path / "moved" / path)
+    loaded = problem_of(stored)
+    assert loaded.parameters == {"brake": 0.0, "finalDrive": 3.225}
+    assert replay(stored, loaded).status == "violates"
+
+
+def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    request = ProblemRequest(target="my.toml:R")
+    problem = request.load()
+    path = save(to_store(problem, violation(problem), request), folder / "c.json")
+    Path("my.toml").write_text(SPEC.replace("120", "130"))
+    with Path("AT.fmu").open("ab") as fmu:
+        fmu.write(b"\0")  # a comment after the archive: another file with the same model
+    stored = load(path)
+    replayed = replay(stored, problem_of(stored))
+    assert replayed.status == "does not violate"
+    assert replayed.evaluation is not None
+    assert replayed.evaluation.robustness == pytest.approx(10 + stored.robustness)
+    assert "the FMU has changed since" in replayed.text
+    assert "the requirement was G[0,20] (speed <= 120) then" in replayed.text
+
+
+def test_a_counterexample_of_another_parameterization_does_not_fit() -> None:
+    problem = lag_problem()
+    stored = to_store(problem, violation(problem), None)
+    replayed = replay(stored, lag_problem(points=5))
+    assert (replayed.status, replayed.evaluation) == ("does not fit", None)
+    assert "expected 5 evenly spaced control points" in replayed.text
+
+
+def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() -> None:
+    coarse = euler_problem("G[1,1] (x <= 0.65)")
+    found = violation(coarse)
+    assert replay(to_store(coarse, found, None), coarse).status == "fragile"
+    broken = lag_problem(function=never)
+    with pytest.raises(SimulationError, match="out of order"):
+        replay(to_store(coarse, found, None), broken)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [("{", "c.json: not a counterexample file"), ('{"format": 2}', "c.json: format: not a counterexample")],
+)
+def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "c.json").write_text(content)
+    with pytest.raises(SpecError, match=message):
+        load(tmp_path / "c.json")
+
+
+def test_what_is_not_there_is_said(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="has found no confirmed counterexample"):
+        load(tmp_path)
+    with pytest.raises(SpecError, match="no such file"):
+        load(tmp_path / "gone.json")
+
+
+def test_a_run_without_the_file_is_read_from_its_journal(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    request = RunRequest(problem=ProblemRequest(target="my.toml:R"), engine="corners", budget=Budget(5))
+    result = execute(request, Path("run"))[0]
+    assert result.counterexample is not None
+    stored = load(Path("run"))
+    assert stored.robustness == result.counterexample.evaluation.robustness
+    assert replay(stored, problem_of(stored)).text.count("changed") == 0
+    assert json.loads(Path("run/counterexample.json").read_text())["problem"]["target"] == "../my.toml:R"
+
+
+def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
+    problem = lag_problem()
+    for name in ("counterexample-A.json", "counterexample-B.json"):
+        save(to_store(problem, violation(problem), None), tmp_path / name)
+    with pytest.raises(SpecError, match=r"several counterexamples, .*counterexample-A\.json"):
+        load(tmp_path)
+
+
+def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
+    problem = lag_problem()
+    path = save(to_store(problem, violation(problem), None), tmp_path / "c.json")
+    with pytest.raises(SpecError, match="LAG is of a problem made in Python"):
+        problem_of(load(path))
+
+
+def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 0.5)")
+    database = Database(tmp_path)
+    first = check(problem, engine="uniform", budget=100, database=database)
+    assert first.counterexample is not None
+    assert first.result is not None
+    assert first.counterexample.evaluation.candidate.signals["u"].values == (1.0,) * 4
+    assert first.file is not None
+    second = check(problem, engine="uniform", budget=100, database=database)
+    assert second.result is None
+    assert second.file == first.file
+    assert [r.status for r in second.replayed] == ["violates"]
+    mended = replace(problem, parameters={"gain": 0.4})
+    third = check(mended, engine="uniform", budget=5, database=database)
+    assert (third.counterexample, third.file) == (None, None)
+    assert [r.status for r in third.replayed] == ["does not violate"]
+    assert third.result is not None
+    assert third.result.spent.simulations == 5
+
+
+def test_databases_keep_requirements_of_one_name_apart(tmp_path: Path) -> None:
+    database = Database(tmp_path)
+    one = replace(lag_problem(), source="a/one.toml:LAG")
+    other = replace(lag_problem(), source="a/other.toml:LAG")
+    path = database.save(one, to_store(one, violation(one), None))
+    assert path.parent.name == "one.LAG"
+    assert [p for p, _ in database.fetch(one)] == [path]
+    assert list(database.fetch(other)) == []
+    assert list(database.fetch(lag_problem())) == []
+
+
+def test_a_check_that_cannot_simulate_is_an_error() -> None:
+    with pytest.raises(SimulationError, match="all 10 simulations failed"):
+        check(lag_problem(function=never), engine="uniform")
+
+
+def test_the_formula_is_kept_as_text() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9 or u < -2)")
+    stored = to_store(problem, violation(problem), None)
+    assert parse(stored.formula) == problem.requirement.formula

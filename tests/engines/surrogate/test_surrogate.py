@@ -1,0 +1,136 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.space import Freedom, InputRange, SearchSpace
+from falsifier.engines import make_proposer
+from falsifier.engines.surrogate import Settings, Surrogate
+from falsifier.engines.surrogate.arms import choose_arm, quality
+from falsifier.engines.surrogate.opening import opening
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.problem import Problem, Requirement
+from falsifier.stl import parse
+from falsifier.testing import lag_problem
+
+Array = NDArray[np.float64]
+
+
+def simulations_until_violation(problem: Problem, *, seed: int, budget: int) -> int | None:
+    proposer = make_proposer("surrogate", problem, seed=seed)
+    for count in range(1, budget + 1):
+        (candidate,) = proposer.ask()
+        evaluation = evaluate(problem, candidate)
+        if evaluation.violated:
+            return count
+        proposer.tell([evaluation])
+    return None
+
+
+def oscillator_problem(formula: str) -> Problem:
+    """A weakly damped oscillator of period 2 s, driven by one input in [-1, 1]."""
+    info = ModelInfo(
+        "oscillator", variables=(Variable("u", causality="input"), Variable("x", causality="output"))
+    )
+    space = SearchSpace((InputRange("u", -1.0, 1.0, 5, free=Freedom(200, 0.05)),), (), 20.0)
+    experiment = Experiment(20.0, 0.02, ("x",))
+    return Problem(FunctionModel(_oscillator, info), Requirement("R", parse(formula)), space, experiment)
+
+
+def _oscillator(
+    times: Array,
+    inputs: dict[str, Array],
+    parameters: dict[str, float],
+) -> dict[str, Array]:
+    step, x, v = times[1] - times[0], 0.0, 0.0
+    column = np.empty_like(times)
+    for k, u in enumerate(inputs["u"]):
+        column[k] = x
+        v += step * (np.pi**2 * (u - x) - 0.1 * v)
+        x += step * v
+    return {"x": column}
+
+
+def test_finds_a_resonance_that_no_constant_excites() -> None:
+    # A constant overshoots to 2 at most; only inputs that switch with the period reach 4.
+    problem = oscillator_problem("G[0,20] (x <= 4)")
+    counts = [simulations_until_violation(problem, seed=seed, budget=20) for seed in range(3)]
+    assert all(count is not None for count in counts), counts
+
+
+def test_violates_a_condition_on_two_times_at_once() -> None:
+    # High by 2 s although below 0.2 at 1 s, and low again at the end: no extreme does that.
+    problem = lag_problem(
+        "(F[0,1] (y > 0.2)) or (G[2,4] (y < 1)) or (F[6,10] (y > -1))", free=True, parameters=0
+    )
+    counts = [simulations_until_violation(problem, seed=seed, budget=40) for seed in range(2)]
+    assert all(count is not None for count in counts), counts
+
+
+def test_parameters_alone_are_tried_at_their_corners_first() -> None:
+    problem = lag_problem("G[0,10] (y < 3.99)", inputs=0, parameters=2)
+    for seed in range(6):
+        count = simulations_until_violation(problem, seed=seed, budget=5)
+        assert count is not None and count <= 4
+
+
+def test_uses_the_budget_up_without_a_false_claim_where_nothing_can_be_violated() -> None:
+    problem = lag_problem("G[0,10] (y <= 2.5)", free=True, parameters=0)
+    assert simulations_until_violation(problem, seed=0, budget=12) is None
+
+
+def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
+    problem = lag_problem("G[0,7] (F[0,3] (mode == 0))", free=True, parameters=0)
+    engine = make_proposer("surrogate", problem, seed=0)
+    assert isinstance(engine, Surrogate)
+    (candidate,) = engine.ask()
+    engine.tell([evaluate(problem, candidate)])
+    assert engine.history.objective is not None and engine.history.objective.is_relaxed
+    assert simulations_until_violation(problem, seed=1, budget=20) is not None
+
+
+def test_opening_follows_the_form_of_the_requirement() -> None:
+    settings = Settings()
+    plain = opening(settings, has_inputs=True, windows=(), needs_several=False)
+    assert plain == ("constant", "constant")
+    nested = opening(settings, has_inputs=True, windows=(2.0,), needs_several=True)
+    assert nested == ("switching", "constant", "switching", "constant")
+    joint = opening(settings, has_inputs=True, windows=(), needs_several=True)
+    assert joint == ("stepping", "stepping")
+    assert opening(settings, has_inputs=False, windows=(), needs_several=True) == ()
+
+
+def test_arms_are_judged_by_their_latest_ranks() -> None:
+    arms = ["a", "a", "b", "b"]
+    costs = [4.0, 3.0, 1.0, 2.0]
+    assert quality("b", arms, costs, window=2) > 0.5 > quality("a", arms, costs, window=2)
+    assert quality("c", arms, costs, window=2) == 0.5
+    rng = np.random.default_rng(0)
+    drawn = [choose_arm({"a": 0.1, "b": 0.9}, rng, least=0.1) for _ in range(400)]
+    assert 0.05 < drawn.count("a") / 400 < 0.15
+
+
+def test_predictions_without_simulation_rank_inputs() -> None:
+    problem = lag_problem("G[0,10] (y <= 9)", free=True, parameters=0)
+    engine = Surrogate(problem, seed=0)
+    assert engine.foresee(engine.ask(2)) == []
+    for _ in range(6):
+        (candidate,) = engine.ask()
+        engine.tell([evaluate(problem, candidate)])
+    constants = [
+        engine.layout.candidate(engine.layout.constant([level]), origin="t", rationale="t")
+        for level in (0.0, 0.5, 1.0)
+    ]
+    predicted = [verdict.robustness for verdict in engine.foresee(constants)]
+    true = [evaluate(problem, c).robustness for c in constants]
+    assert predicted == pytest.approx(true, abs=1.0)
+    assert predicted == sorted(predicted, reverse=True)
+
+
+def test_parallel_candidates_differ() -> None:
+    problem = replace(lag_problem(free=True))
+    engine = Surrogate(problem, seed=0, settings=Settings(pool=60, children=30, generations=2))
+    engine.tell([evaluate(problem, c) for c in engine.ask(3)])
+    assert len({c.key for c in engine.ask(6)}) == 6

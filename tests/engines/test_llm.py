@@ -1,0 +1,382 @@
+"""The language model as a proposer, on scripted chats and against a server on this machine."""
+
+import json
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from falsifier.core.space import Freedom
+from falsifier.engines import make_proposer
+from falsifier.engines.llm import make_llm_proposer, preview
+from falsifier.engines.protocol import Proposer
+from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.connect import connect
+from falsifier.llm.failures import TransientChatError
+from falsifier.llm.ladder import LadderChat
+from falsifier.llm.messages import Chat, ChatRequest, Exchange
+from falsifier.llm.replay import RecordedChat
+from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.search.journal import ExchangeRecord, open_journal, read_journal
+from falsifier.search.loop import search
+from falsifier.search.result import Result
+from falsifier.testing import ProposerContract
+from tests.llm.server import Step, serving
+from tests.problems import lag_problem
+
+
+def reply(values: Sequence[float], rationale: str = "because") -> str:
+    return json.dumps({"rationale": rationale, "signals": [{"name": "u", "values": list(values)}]})
+
+
+def transmission_reply(throttle: list[float], brake: list[float]) -> str:
+    signals = [{"name": "throttle", "values": throttle}, {"name": "brake", "values": brake}]
+    return json.dumps({"rationale": "because", "signals": signals})
+
+
+@pytest.mark.parametrize("form", ["json", "point"])
+def test_transmission_in_two_simulations(form: str) -> None:
+    problem = load_problem("AT1")
+    first, second = [100.0] * 3 + [0.0] * 4, [100.0] * 7
+    answers = [
+        transmission_reply(t, [0.0] * 3)
+        if form == "json"
+        else f"<point>{', '.join(map(str, [*t, 0, 0, 0]))}</point>"
+        for t in (first, second)
+    ]
+    with serving(*(Step(a) for a in answers)) as server:
+        chat = LiteLLMChat("openai/gpt-5-mini", effort="high", api_base=server.url)
+        exchanges: list[Exchange] = []
+
+        def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Proposer:
+            def both(exchange: Exchange) -> None:
+                exchanges.append(exchange)
+                on_exchange(exchange)
+
+            return make_llm_proposer(problem, chat, variant="MP4", on_exchange=both)
+
+        result = search(problem, build, Budget(simulations=5))
+    assert result.status == "falsified"
+    assert [e.robustness for e in result.evaluations] == pytest.approx([0.419, -0.213], abs=1e-3)
+    assert result.evaluations[1].candidate.origin == "openai/gpt-5-mini MP4"
+    assert result.evaluations[1].candidate.rationale == ("because" if form == "json" else "")
+    assert [r.body["reasoning_effort"] for r in server.received] == ["high", "high"]
+    opening, following = (r.texts[-1] for r in server.received)
+    assert "Sample" not in opening
+    for told in ("+0.419", "82.5 at 8.3 s", "81.5 at 50.0 s", "t = 20.0 s with speed = 119.6"):
+        assert told in following
+    assert result.spent.calls == 2
+    assert result.spent.tokens == 240
+    assert result.spent.reasoning_tokens == 24
+    assert result.spent.cost is None
+    assert [e.reply.source for e in exchanges if e.reply] == ["model", "model"]
+
+
+def test_preview_is_what_is_sent() -> None:
+    problem = lag_problem()
+    for variant in ("MP1", "MP2", "MP5"):
+        chat = ScriptedChat(["<point>0 0 0 0</point>", "<point>0 0 0 1</point>"])
+        proposer = make_llm_proposer(problem, chat, variant=variant)
+        evaluation = evaluate(problem, *proposer.ask())
+        proposer.tell([evaluation])
+        proposer.ask()
+        assert chat.requests[0].messages == preview(problem, variant=variant)
+        assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
+
+
+def test_the_road_to_a_valid_reply() -> None:
+    """Rate limit, timeout, bad JSON, a point out of range, a repetition, then success."""
+    problem = lag_problem()
+    script = (
+        Step(reply([0.5, 0.5, 0.5, 0.5])),
+        Step(status=429, headers={"Retry-After": "0.05"}),
+        Step(reply([1, 1, 1, 1]), delay=0.8),
+        Step('{"signals": [{"name": "u", "values": [1, 1'),
+        Step(reply([0, 0, 0, 7])),
+        Step(reply([0.5, 0.5, 0.5, 0.5])),
+        Step(reply([1, 1, 1, 1])),
+    )
+    exchanges: list[Exchange] = []
+    with serving(*script) as server:
+        client = LiteLLMChat("openai/m", api_base=server.url, timeout=0.4)
+        chat = RetryingChat(LadderChat(client), Gate(), first_delay=0.01)
+        proposer = make_llm_proposer(problem, chat, variant="MP4", on_exchange=exchanges.append)
+        proposer.tell([evaluate(problem, *proposer.ask())])
+        with pytest.raises(ChatError, match="no valid reply in 3 tries"):
+            proposer.ask()
+        assert evaluate(problem, *proposer.ask()).violated
+        assert len(server.received) == 7
+    problems = [e.problem for e in exchanges]
+    assert problems[0] is None and problems[-1] is None
+    assert "neither a JSON object" in (problems[1] or "")
+    assert "'u' at t = 10 s: 7 is outside its range [-1, 1]" in (problems[2] or "")
+    assert problems[3] == "it repeats sample 1"
+    assert exchanges[1].reply is not None and exchanges[1].reply.attempts == 3
+
+
+def test_several_candidates_at_a_time() -> None:
+    problem = lag_problem()
+    both = json.dumps(
+        {
+            "candidates": [
+                {"rationale": "a", "signals": [{"name": "u", "values": [v] * 4}]} for v in (0.1, 0.1, 0.2)
+            ]
+        }
+    )
+    chat = ScriptedChat([both, reply([0.3] * 4)])
+    proposer = make_llm_proposer(problem, chat, variant="MP4")
+    candidates = proposer.ask(3)
+    assert [c.signals["u"].values[0] for c in candidates] == [0.1, 0.2, 0.3]
+    assert "Already proposed" in chat.requests[1].messages[-1].content
+    proposer.tell([evaluate(problem, c) for c in candidates])
+    assert "Already proposed" not in preview_of(chat, proposer)
+
+
+def preview_of(chat: ScriptedChat, proposer: Proposer) -> str:
+    with pytest.raises(ChatError):
+        proposer.ask()
+    return chat.requests[-1].messages[1].content
+
+
+def test_neutral_names_go_out_and_real_ones_come_back() -> None:
+    problem = lag_problem()
+    hidden = json.dumps({"rationale": "raise u1", "signals": [{"name": "u1", "values": [1] * 4}]})
+    chat = ScriptedChat([hidden, "", "", ""])
+    proposer = make_llm_proposer(problem, chat, variant="MP5", anonymous=True)
+    (candidate,) = proposer.ask()
+    assert candidate.signals["u"].values == (1, 1, 1, 1)
+    assert candidate.rationale == "raise u"
+    proposer.tell([evaluate(problem, candidate)])
+    sent = preview_of(chat, proposer)
+    assert "y1" in sent and "drive" not in sent
+    assert chat.requests[0].messages == preview(problem, variant="MP5", anonymous=True)
+
+
+def test_hands_over_for_good_when_allowed() -> None:
+    problem = lag_problem()
+    fallback = make_proposer("corners", problem, seed=0)
+    exchanges: list[Exchange] = []
+    chat = ScriptedChat([reply([0.1] * 4), ChatError("out of reach"), "never asked"])
+    proposer = make_llm_proposer(
+        problem, chat, variant="MP4", fallback=fallback, on_exchange=exchanges.append
+    )
+    asked = []
+    for _ in range(4):
+        asked += proposer.ask()
+        proposer.tell([evaluate(problem, asked[-1])])
+    assert [c.origin for c in asked] == ["scripted MP4", "corners", "corners", "corners"]
+    assert proposer.handed_over
+    assert [e.reply is None for e in exchanges] == [False, True]
+    assert exchanges[1].problem == "out of reach"
+    again = make_llm_proposer(
+        problem,
+        RecordedChat(exchanges, ScriptedChat(["never asked"])),
+        variant="MP4",
+        fallback=make_proposer("corners", problem, seed=0),
+    )
+    replayed = []
+    for candidate in asked:
+        replayed += again.ask()
+        again.tell([evaluate(problem, candidate)])
+    assert [c.key for c in replayed] == [c.key for c in asked]
+
+
+def test_without_permission_the_failure_ends_the_run_with_everything_kept(tmp_path: Path) -> None:
+    chat = ScriptedChat([reply([0.1] * 4), ChatError("out of reach")])
+    result = recorded_run(lag_problem(), chat, tmp_path)
+    assert result.status == "failed"
+    assert result.reason == "out of reach"
+    assert len(result.evaluations) == 1
+    resumed_chat = ScriptedChat([reply([1] * 4)])
+    resumed = recorded_run(lag_problem(), resumed_chat, tmp_path)
+    assert resumed.status == "falsified"
+    assert len(resumed.evaluations) == 2
+    assert len(resumed_chat.requests) == 1
+
+
+class Killed(BaseException):
+    """The process dies."""
+
+
+@pytest.mark.parametrize("last", range(1, 8))
+def test_killed_and_resumed_without_asking_twice(tmp_path: Path, last: int) -> None:
+    """Whenever the run dies, the two halves together send what one whole run sends."""
+    script = [
+        reply([0.1] * 4),
+        "no JSON at all",
+        reply([0.2] * 4),
+        reply([0.2] * 4),
+        reply([0.3, 0.3, 0.3, 9]),
+        reply([0.3] * 4),
+        reply([0.4] * 4),
+        reply([1.0] * 4),
+    ]
+    whole = ScriptedChat(list(script))
+    expected = recorded_run(lag_problem(), whole, tmp_path / "whole")
+
+    def dying() -> Iterator[str]:
+        yield from script[:last]
+        raise Killed
+
+    first = ScriptedChat(dying())
+    with pytest.raises(Killed):
+        recorded_run(lag_problem(), first, tmp_path / "halves")
+    second = ScriptedChat(script[last:])
+    result = recorded_run(lag_problem(), second, tmp_path / "halves")
+    assert [e.candidate.key for e in result.evaluations] == [e.candidate.key for e in expected.evaluations]
+    assert result.status == expected.status == "falsified"
+    assert [*first.requests[:last], *second.requests] == whole.requests
+    assert result.spent.calls == expected.spent.calls == len(script)
+    records = read_journal(tmp_path / "halves")
+    assert sum(isinstance(r, ExchangeRecord) for r in records) == len(script)
+
+
+def recorded_run(problem: Problem, chat: Chat, directory: Path) -> Result:
+    """Run, or resume where the directory holds a run already."""
+    records = read_journal(directory)
+    recorded = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
+
+    def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Proposer:
+        return make_llm_proposer(
+            problem, RecordedChat(recorded, chat), variant="MP5", on_exchange=on_exchange
+        )
+
+    with open_journal(directory) as journal:
+        return search(problem, build, Budget(simulations=20), journal=journal, records=records)
+
+
+def test_no_secret_reaches_the_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret-key")
+    with serving(Step(reply([1] * 4))) as server:
+        base = server.url.replace("http://", "http://user:password1@")
+        chat = connect("openai/m", api_base=base, options={"extra_headers": {"X-Key": "header-secret"}})
+        assert recorded_run(lag_problem(), chat, tmp_path).status == "falsified"
+        headers = {k.lower(): v for k, v in server.received[0].headers.items()}
+        assert headers["x-key"] == "header-secret"
+    text = "".join(p.read_text() for p in tmp_path.rglob("*.json*"))
+    assert "openai/m" in text
+    for secret in ("sk-very-secret-key", "password1", "header-secret"):
+        assert secret not in text
+
+
+def test_a_cache_answers_the_same_question_of_another_run(tmp_path: Path) -> None:
+    problem = lag_problem()
+
+    def first_candidate(chat: Chat, sample: int) -> Any:
+        return make_llm_proposer(problem, chat, variant="MP4", sample=sample).ask()[0].key
+
+    with serving(Step("bad"), Step(reply([0.1] * 4)), Step("bad"), Step(reply([0.2] * 4))) as server:
+        chat = connect("openai/m", api_base=server.url, cache=tmp_path)
+        asked = first_candidate(chat, 0)
+        assert len(server.received) == 2
+        assert first_candidate(chat, 1) != asked
+        assert len(server.received) == 4
+
+
+def test_runs_share_one_client() -> None:
+    problem = lag_problem()
+    with serving(*(Step(reply([0.01 * i] * 4), delay=0.02) for i in range(12))) as server:
+        chat = connect("openai/m", api_base=server.url, gate=Gate(concurrency=3))
+        found: list[Evaluation] = []
+
+        def run() -> None:
+            proposer = make_llm_proposer(problem, chat, variant="MP4")
+            for _ in range(3):
+                found.append(evaluate(problem, *proposer.ask()))
+                proposer.tell(found[-1:])
+
+        threads = [threading.Thread(target=run) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert len(found) == 12
+    assert server.most_at_once == 3
+
+
+def test_money_limit_with_unknown_price_is_an_error() -> None:
+    from falsifier.errors import SpecError
+
+    problem = lag_problem()
+    with serving(Step(reply([0.1] * 4)), Step(reply([0.2] * 4))) as server:
+        chat = LiteLLMChat("openai/m", api_base=server.url)
+        with pytest.raises(SpecError, match="price of this language model is unknown"):
+            search(
+                problem,
+                lambda problem, on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
+                Budget(simulations=5, cost=1.0),
+            )
+
+
+def test_token_budget_ends_a_run() -> None:
+    problem = lag_problem()
+    with serving(*(Step(reply([0.01 * i] * 4)) for i in range(9))) as server:
+        chat = LiteLLMChat("openai/m", api_base=server.url)
+        result = search(
+            problem,
+            lambda problem, on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
+            Budget(simulations=50, tokens=300),
+        )
+    assert result.status == "not falsified"
+    assert "300 tokens" in result.reason
+    assert result.spent.calls == 3
+
+
+def test_transient_failures_reach_the_proposer_only_when_patience_ends() -> None:
+    chat = RetryingChat(
+        ScriptedChat([TransientChatError("busy"), reply([0.1] * 4)]), Gate(sleep=lambda _: None)
+    )
+    assert len(make_llm_proposer(lag_problem(), chat, variant="MP4").ask()) == 1
+
+
+def test_free_parameterizations_come_from_mp5_only() -> None:
+    problem = lag_problem(free=Freedom(100, 0.1))
+    signal = {"name": "u", "interpolation": "constant", "times": [0, 2], "values": [0, 1]}
+    text = json.dumps({"rationale": "", "signals": [signal]})
+    (candidate,) = make_llm_proposer(problem, ScriptedChat([text]), variant="MP5").ask()
+    assert candidate.signals["u"].times == (0, 2)
+    with pytest.raises(ChatError, match="expected 4 evenly spaced"):
+        make_llm_proposer(problem, ScriptedChat([text] * 3), variant="MP4").ask()
+
+
+def counting_script(seed: int) -> Callable[[ChatRequest], str]:
+    """Play a model that fills every list of the asked form with numbers that it never gave before."""
+    count = 0
+
+    def answer(request: ChatRequest) -> str:
+        nonlocal count
+        count += 1
+        share = (0.37 * seed + 0.618033988749895 * count) % 1.0
+        schema = request.reply_schema
+        assert schema is not None
+        several = "candidates" in schema["properties"]
+        one = schema["properties"]["candidates"]["items"] if several else schema
+        found: dict[str, Any] = {"rationale": "the next one"}
+        for key in ("signals", "parameters"):
+            if key in one["properties"]:
+                names = one["properties"][key]["items"]["properties"]["name"]["enum"]
+                value = 4 * share - 2
+                found[key] = [
+                    {"name": n, "values": [value, -value, value, 0]}
+                    if key == "signals"
+                    else {"name": n, "value": value}
+                    for n in names
+                ]
+        return json.dumps({"candidates": [found]} if several else found)
+
+    return answer
+
+
+class TestContract(ProposerContract):
+    """It keeps what every engine keeps, with a scripted model."""
+
+    def make(self, problem: Problem, seed: int) -> Proposer:
+        return make_llm_proposer(problem, ScriptedChat(counting_script(seed)))

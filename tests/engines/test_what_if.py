@@ -1,0 +1,368 @@
+"""The hybrid engine's model calls the surrogate for predictions in its turn."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from falsifier.engines.hybrid import Hybrid, Settings
+from falsifier.engines.llm import make_llm_proposer, preview_tool
+from falsifier.engines.protocol import Proposer
+from falsifier.engines.surrogate import Surrogate
+from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.ladder import LadderChat
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
+from falsifier.llm.replay import RecordedChat
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.search.journal import open_journal, read_journal, recorded_exchanges
+from falsifier.search.loop import search
+from falsifier.search.result import Result
+from falsifier.testing import drive, lag_problem, simulated
+from tests.engines.test_hybrid import HASTY
+from tests.llm.server import Received, Step, serving
+
+# y follows u0 with a lag of 1 s, and the input's range ends at 2: never violated, and easy to predict.
+FORMULA = "G[0,10] (y <= 9)"
+EAGER = Settings(patience=2)
+Line = str | ChatReply | Exception
+OnExchange = Callable[[Exchange], None]
+
+
+def problem() -> Problem:
+    return lag_problem(FORMULA, free=True, parameters=0)
+
+
+def candidates(*levels: float, name: str = "u0", told: str = "a guess") -> str:
+    def one(level: float) -> dict[str, object]:
+        signal = {"name": name, "interpolation": "constant", "times": [0], "values": [level]}
+        return {"rationale": told, "signals": [signal]}
+
+    return json.dumps({"candidates": [one(level) for level in levels]})
+
+
+def call(*levels: float, name: str = "u0") -> ChatReply:
+    made = ToolCall(id="c", name="predict", arguments=candidates(*levels, name=name))
+    return ChatReply(
+        text="", tool_calls=(made,), usage=Usage(prompt_tokens=7, completion_tokens=3, cost=0.25)
+    )
+
+
+def opened(*later: Line, name: str = "u0") -> list[Line]:
+    return [candidates(-1.0, 0.5, name=name), *later]
+
+
+def hybrid(
+    chat: Chat,
+    *,
+    anonymous: bool = False,
+    settings: Settings = EAGER,
+    on_exchange: OnExchange = lambda _: None,
+) -> Hybrid:
+    adviser = make_llm_proposer(problem(), chat, anonymous=anonymous, on_exchange=on_exchange)
+    return Hybrid(problem(), seed=0, adviser=adviser, settings=settings, surrogate_settings=HASTY)
+
+
+def run(engine: Proposer, rounds: int = 14) -> list[str]:
+    """Rationales of the candidates in order."""
+    judge = simulated(problem(), lambda y: float(9 - y.max()))
+    return [c.rationale for c in drive(engine, judge, rounds=rounds)]
+
+
+def answers(request: ChatRequest) -> list[str]:
+    return [m.content for m in request.messages if m.role == "tool"]
+
+
+def first_offer(requests: list[ChatRequest]) -> int:
+    return next(i for i, request in enumerate(requests) if request.tools)
+
+
+def test_it_calls_twice_and_then_answers() -> None:
+    # Until forecasts have proved good, no tool is offered; from then on every question offers it.
+    def script(request: ChatRequest) -> Line:
+        if not request.tools:
+            return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+        told = answers(request)
+        return call(0.5, 1.5) if not told else call(1.75) if len(told) == 1 else candidates(1.75, told="best")
+
+    chat = ScriptedChat(script)
+    rationales = run(hybrid(chat))
+    at = first_offer(chat.requests)
+    first, second, third = (answers(r) for r in chat.requests[at : at + 3])
+    assert first == [] and len(second) == 1 and len(third) == 2
+    robustness = [float(v) for v in re.findall(r"predicted robustness \+([\d.]+)", "\n".join(third))]
+    # 9 minus what y reaches in ten seconds from 0.
+    assert robustness == pytest.approx([8.5, 7.5, 7.25], abs=0.3)
+    assert "by y <= 9" in third[0]
+    assert "2 more calls are answered" in third[0] and "1 more call is answered" in third[1]
+    assert any(re.fullmatch(r"best \[predicted robustness 7\.\d+\]", r) for r in rationales)
+    assert not any("was not simulated" in m.content for r in chat.requests for m in r.messages)
+
+
+def test_the_limit_of_calls() -> None:
+    def script(request: ChatRequest) -> Line:
+        if not request.tools:
+            return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+        return candidates(1.75) if "limit of 2 calls" in "".join(answers(request)) else call(1.0)
+
+    chat = ScriptedChat(script)
+    run(hybrid(chat, settings=Settings(patience=2, what_if_calls=2)))
+    at = first_offer(chat.requests)
+    assert "At most 2 calls" in chat.requests[at].tools[0].description
+    told = answers(chat.requests[at + 3])
+    assert ["last call" in t for t in told] == [False, True, False]
+    assert "limit of 2 calls is reached" in told[2]
+
+
+def test_wrong_arguments_are_told_and_can_be_corrected() -> None:
+    def script(request: ChatRequest) -> Line:
+        if not request.tools:
+            return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+        told = answers(request)
+        if not told:
+            return call(7.0)
+        return call(1.5, name="u9") if len(told) == 1 else candidates(1.75)
+
+    chat, exchanges = ScriptedChat(script), list[Exchange]()
+    run(hybrid(chat, on_exchange=exchanges.append))
+    told = answers(chat.requests[first_offer(chat.requests) + 2])
+    assert "7 is outside its range [-2, 2]" in told[0]
+    assert "unknown input 'u9'" in told[1]
+    assert [bool(e.problem) for e in exchanges if e.reply and e.reply.tool_calls][:2] == [True, True]
+    # It heard no prediction by itself, so it is told some.
+    assert any("was not simulated" in m.content for r in chat.requests for m in r.messages)
+
+
+def test_who_does_not_call_is_told_afterwards() -> None:
+    def script(request: ChatRequest) -> Line:
+        return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+
+    chat = ScriptedChat(script)
+    run(hybrid(chat))
+    at = first_offer(chat.requests)
+    assert "was not simulated; its predicted robustness is" in chat.requests[at + 1].messages[-1].content
+    assert not chat.requests[at + 1].tools
+
+
+def test_no_tool_where_no_call_is_allowed() -> None:
+    def script(request: ChatRequest) -> Line:
+        return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+
+    chat = ScriptedChat(script)
+    run(hybrid(chat, settings=Settings(patience=2, what_if_calls=0)))
+    assert not any(r.tools for r in chat.requests)
+    assert any("was not simulated" in m.content for r in chat.requests for m in r.messages)
+
+
+def test_a_server_that_refuses_tools_gets_the_second_round() -> None:
+    refusal = Step(status=400, message="this model does not support tools")
+    with serving() as server:
+        chat = LadderChat(LiteLLMChat("openai/mine", api_base=server.url))
+        engine = hybrid(chat)
+        judge = simulated(problem(), lambda y: float(9 - y.max()))
+        refused: list[Received] = []
+        for turn in range(20):
+            # The next request is refused where it offers tools; what follows is answered.
+            server.script[:] = [Step(candidates(0.011 * turn - 0.9, 0.013 * turn + 0.3))] * 3
+            if server.received and not refused and engine.surrogate.is_trusted:
+                server.script[:] = [refusal, *server.script]
+            before = len(server.received)
+            engine.tell([judge(c) for c in engine.ask()])
+            refused += [r for r in server.received[before:] if "tools" in r.body]
+    assert len(refused) == 1, "once refused, tools are not offered again"
+    later = server.received[server.received.index(refused[0]) + 1 :]
+    assert "was not simulated" in later[1].texts[-1]
+    assert "response_format" in later[0].body
+
+
+def test_calls_come_over_the_wire_beside_the_schema() -> None:
+    asking = Step(calls=(("predict", json.loads(candidates(1.25))),))
+    with serving() as server:
+        engine = hybrid(LadderChat(LiteLLMChat("openai/mine", api_base=server.url)))
+        judge = simulated(problem(), lambda y: float(9 - y.max()))
+        for turn in range(20):
+            server.script[:] = [Step(candidates(0.011 * turn - 0.9, 0.013 * turn + 0.3))] * 3
+            if engine.surrogate.is_trusted:
+                server.script[:0] = [asking]
+            engine.tell([judge(c) for c in engine.ask()])
+            if any("tools" in r.body for r in server.received):
+                break
+    first, second = (r.body for r in server.received[-2:])
+    assert first["response_format"] == second["response_format"]
+    assert first["tools"] == second["tools"]
+    assert [m["role"] for m in second["messages"]] == ["system", "user", "assistant", "tool"]
+    assert second["messages"][-1]["content"].startswith("Candidate 1: predicted robustness +7.")
+
+
+def test_neutral_names_hold_in_calls_and_answers() -> None:
+    def script(request: ChatRequest) -> Line:
+        if not request.tools:
+            levels = (-1.0, 0.5) if len(chat.requests) == 1 else (0.1 * len(chat.requests),)
+            return candidates(*levels, name="u1")
+        told = answers(request)
+        return call(1.5, name="u1") if not told else candidates(1.75, name="u1")
+
+    chat = ScriptedChat(script)
+    engine = hybrid(chat, anonymous=True)
+    judge = simulated(problem(), lambda y: float(9 - y.max()))
+    asked = drive(engine, judge, rounds=14)
+    sent = [r for r in chat.requests if r.tools]
+    assert "by y1 <= 9" in answers(sent[1])[0]
+    everything = "\n".join(m.content for r in sent for m in r.messages) + str([r.tools for r in sent])
+    assert not re.search(r"\bu0\b|\by\b|\blag\b", everything)
+    assert any(c.signals["u0"].values == (1.75,) for c in asked)
+    shown = preview_tool(problem(), calls=EAGER.what_if_calls, anonymous=True)
+    assert shown == sent[0].tools[0]
+
+
+def test_candidates_are_described_as_the_model_knows_them() -> None:
+    made = problem().space.decode([0.5, 1.0, -1.0, 2.0])
+    told = {
+        (variant, anonymous): make_llm_proposer(
+            problem(), ScriptedChat([]), variant=variant, anonymous=anonymous
+        ).describe(made)
+        for variant in ("MP1", "MP5")
+        for anonymous in (False, True)
+    }
+    assert told["MP5", False].startswith("u0 pchip: 0.5 from 0 s, 1 from 3.333 s")
+    assert told["MP5", True].startswith("u1 pchip: 0.5 from 0 s")
+    assert told["MP1", False] == told["MP1", True] == "point = [0.5, 1, -1, 2]"
+
+
+class TestResume:
+    """A run that was killed in the middle of a turn goes on with the same candidate."""
+
+    def script(self, request: ChatRequest) -> Line:
+        opening = "Propose the first" in request.messages[-1].content
+        if opening:
+            return candidates(-1.0, 0.5)
+        samples = len(set(re.findall(r"Sample (\d+)", request.messages[1].content)))
+        if not request.tools:
+            return candidates(0.01 * samples)
+        told = answers(request)
+        return call(1.0 + 0.01 * len(told)) if len(told) < 2 else candidates(1.5 + 0.01 * samples)
+
+    def search(self, directory: Path, chat: Chat, simulations: int, tokens: int | None = None) -> Result:
+        def build(_: Problem, on_exchange: OnExchange) -> Proposer:
+            return hybrid(chat, on_exchange=on_exchange)
+
+        records = read_journal(directory)
+        with open_journal(directory) as journal:
+            return search(
+                problem(),
+                build,
+                Budget(simulations=simulations, tokens=tokens),
+                journal=journal,
+                records=records,
+            )
+
+    def test_mid_turn(self, tmp_path: Path) -> None:
+        whole = self.search(tmp_path / "whole", ScriptedChat(self.script), 14)
+        assert whole.spent.cost == pytest.approx(0.25 * len(self.calls(tmp_path / "whole")))
+        lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
+        cuts = [i for i, line in enumerate(lines) if b'"tool_calls":[{' in line][:2]
+        for number, cut in enumerate(cuts, start=1):
+            directory = tmp_path / f"cut{number}"
+            directory.mkdir()
+            (directory / "journal.jsonl").write_bytes(b"".join(lines[: cut + 1]))
+            rest = ScriptedChat(self.script)
+            recorded = recorded_exchanges(read_journal(directory))
+            resumed = self.search(directory, RecordedChat(recorded, rest), 14)
+            assert [e.candidate.key for e in resumed.evaluations] == [
+                e.candidate.key for e in whole.evaluations
+            ]
+            assert resumed.spent.calls == whole.spent.calls
+            assert len(answers(rest.requests[0])) == number
+            assert len(rest.requests) + len(recorded) == whole.spent.calls
+
+    def test_a_journal_from_before_there_were_tools(self, tmp_path: Path) -> None:
+        def old(request: ChatRequest) -> Line:
+            return self.script(request.model_copy(update={"tools": ()}))
+
+        whole = self.search(tmp_path / "old", ScriptedChat(old), 14)
+        text = (tmp_path / "old" / "journal.jsonl").read_text()
+        assert "tool" not in text
+        again = ScriptedChat([ChatError("nobody is asked")])
+        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "old")), again)
+        resumed = self.search(tmp_path / "old", played, 14)
+        assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
+        assert again.requests == []
+
+    def test_a_turn_ends_where_the_budget_does(self, tmp_path: Path) -> None:
+        chat = ScriptedChat(self.script)
+        cut = self.search(tmp_path / "run", chat, 16, tokens=5)
+        assert cut.status == "not falsified" and "5 tokens is used up" in cut.reason
+        assert chat.requests[-1].tools and answers(chat.requests[-1]) == [], "the call was not answered"
+        assert cut.spent.tokens == 10
+        # With more to spend the run goes on, from the same candidates.
+        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "run")), ScriptedChat(self.script))
+        resumed = self.search(tmp_path / "run", played, 16)
+        assert len(resumed.evaluations) == 16 > len(cut.evaluations)
+        for before, after in zip(cut.evaluations, resumed.evaluations, strict=False):
+            assert before.candidate.key == after.candidate.key
+
+    def test_a_turn_that_failed_fails_again(self, tmp_path: Path) -> None:
+        """No answer in the second half of a turn: the surrogate goes on, and so it does when resumed."""
+
+        def breaking(request: ChatRequest) -> Line:
+            if len(answers(request)) == 1 and not chat_failed:
+                chat_failed.append(True)
+                return ChatError("the server is gone")
+            return self.script(request)
+
+        chat_failed: list[bool] = []
+        whole = self.search(tmp_path / "run", ScriptedChat(breaking), 16)
+        assert chat_failed
+        nobody = ScriptedChat([ChatError("nobody is asked")])
+        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "run")), nobody)
+        resumed = self.search(tmp_path / "run", played, 16)
+        assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
+        assert nobody.requests == []
+
+    def calls(self, directory: Path) -> list[Exchange]:
+        return [e for e in recorded_exchanges(read_journal(directory)) if e.reply and e.reply.tool_calls]
+
+
+class TestForesight:
+    """What the surrogate foretells."""
+
+    def trained(self, formula: str = FORMULA) -> tuple[Problem, Surrogate]:
+        made = lag_problem(formula, free=True, parameters=0)
+        engine = Surrogate(made, seed=1, settings=HASTY)
+        drive(engine, lambda c: evaluate(made, c), rounds=10)
+        return made, engine
+
+    @pytest.mark.parametrize(
+        "formula",
+        [
+            "G[0,10] (y <= 9)",
+            "F[2,8] (y >= 9)",
+            "G[0,10] (y <= 9 and u0 >= -9)",
+            "G[0,5] (F[0,2] (y <= 1.5)) or y > 20",
+            "not F[0,10] (y > 9)",
+        ],
+    )
+    def test_verdicts_are_those_of_the_simulation(self, formula: str) -> None:
+        made, engine = self.trained(formula)
+        found = [made.space.decode(point) for point in ([0.5, 1.5, 1.0, -1.0], [-1.5, 0.2, 1.9, 1.0])]
+        for foretold, candidate in zip(engine.foresee(found), found, strict=True):
+            true = evaluate(made, candidate).verdict
+            assert true is not None
+            assert foretold.robustness == pytest.approx(true.robustness, abs=0.4)
+            assert foretold.predicate == true.predicate
+            assert foretold.critical_time == pytest.approx(true.critical_time, abs=1.0)
+        assert 0 <= engine.recent_error < 1
+
+    def test_asking_changes_nothing(self) -> None:
+        (made, one), (_, other) = self.trained(), self.trained()
+        one.foresee([made.space.decode([1.0] * 4)])
+        assert [c.key for c in one.ask(3)] == [c.key for c in other.ask(3)]
+
+    def test_nothing_is_foretold_from_nothing(self) -> None:
+        made = problem()
+        assert Surrogate(made, seed=0, settings=HASTY).foresee([made.space.decode([0.0] * 4)]) == []

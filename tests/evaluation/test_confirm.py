@@ -1,0 +1,131 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from falsifier.engines import make_proposer
+from falsifier.errors import MonitorError, SpecError
+from falsifier.evaluation.confirm import confirm, half_step, other_interface
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.search.loop import falsify
+from falsifier.stl import reference
+from tests.problems import lag_problem
+from tests.stepped import euler_problem
+
+# x(1) of x' = 1 - x by explicit Euler: 1 - 0.9**10 with 0.1 s, 1 - 0.95**20 with 0.05 s.
+COARSE, FINE = 1 - 0.9**10, 1 - 0.95**20
+
+
+def highest(problem: Problem) -> Evaluation:
+    return evaluate(problem, problem.space.decode([1.0] * 4))
+
+
+def test_a_violation_that_stays_at_half_the_step_is_confirmed() -> None:
+    problem = euler_problem("G[1,1] (x <= 0.6)")
+    found = confirm(problem, highest(problem))
+    assert found.outcome == "confirmed"
+    assert found.robustness == found.reference == pytest.approx(0.6 - COARSE)
+    assert found.halved == pytest.approx(0.6 - FINE)
+    assert f"(0.05 s) gives {0.6 - FINE:+.6g}" in found.reason
+
+
+def test_a_violation_that_vanishes_at_half_the_step_is_fragile_and_says_by_how_much() -> None:
+    problem = euler_problem("G[1,1] (x <= 0.65)")
+    found = confirm(problem, highest(problem))
+    assert COARSE > 0.65 > FINE
+    assert found.outcome == "fragile"
+    assert found.halved == pytest.approx(0.65 - FINE)
+    assert f"does not violate: robustness {0.65 - FINE:+.6g}" in found.reason
+    assert f"a change of {COARSE - FINE:+.4g}" in found.reason
+
+
+def test_the_halved_step_starts_from_the_given_one_and_keeps_the_grid() -> None:
+    problem = euler_problem("G[1,1] (x <= 0.6)")
+    assert half_step(problem).experiment.step_size == pytest.approx(0.05)
+    stepped = replace(problem, experiment=replace(problem.experiment, step_size=0.02))
+    assert half_step(stepped).experiment.step_size == pytest.approx(0.01)
+    assert half_step(stepped).experiment.output_interval == problem.experiment.output_interval
+
+
+def test_fragile_violations_do_not_count_and_are_listed_apart() -> None:
+    problem = euler_problem("G[1,1] (x <= 0.65)")
+    result = falsify(problem, make_proposer("corners", problem, seed=0), budget=2)
+    assert result.status == "not falsified"
+    assert result.counterexample is None
+    assert result.refuted == ()
+    assert [c.evaluation.candidate.signals["u"].values for c in result.fragile] == [(1.0,) * 4]
+
+
+def test_a_model_without_a_communication_step_says_so() -> None:
+    problem = lag_problem()
+    found = confirm(problem, highest(problem))
+    assert found.outcome == "confirmed"
+    assert found.halved == found.robustness
+    assert "do not depend on the communication step" in found.reason
+
+
+def test_a_step_that_the_model_refuses_is_said_and_does_not_refute() -> None:
+    problem = euler_problem("G[1,1] (x <= 0.6)", smallest_step=0.08)
+    found = confirm(problem, highest(problem))
+    assert (found.outcome, found.halved) == ("confirmed", None)
+    assert "could not be judged: it gave no verdict: the step 0.05 s is too small" in found.reason
+
+
+def test_what_does_not_happen_again_is_refuted() -> None:
+    problem = lag_problem()
+    found = confirm(replace(problem, parameters={"gain": 0.5}), highest(problem))
+    assert (found.outcome, found.halved) == ("refuted", None)
+    assert found.robustness == pytest.approx(0.9 - 0.5 * (1 - 0.9**100))
+    assert "does not violate" in found.reason
+
+
+def test_robustness_zero_is_refuted() -> None:
+    problem = lag_problem("G[0,10] (x - x <= 0)")
+    found = confirm(problem, highest(problem))
+    assert (found.outcome, found.robustness) == ("refuted", 0.0)
+
+
+def test_monitors_that_disagree_refute(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = lag_problem()
+    monkeypatch.setattr(reference, "robustness", lambda formula, trajectory: 0.25)
+    found = confirm(problem, highest(problem))
+    assert (found.outcome, found.reference) == ("refuted", 0.25)
+    assert "divides the monitors" in found.reason
+
+
+def test_without_the_second_monitor_nothing_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(formula: object, trajectory: object) -> float:
+        raise MonitorError("out of order")
+
+    problem = lag_problem()
+    monkeypatch.setattr(reference, "robustness", fail)
+    found = confirm(problem, highest(problem))
+    assert (found.outcome, found.reference) == ("refuted", None)
+    assert "could not be judged by rtamt: out of order" in found.reason
+
+
+def test_a_function_has_no_second_interface() -> None:
+    with pytest.raises(SpecError, match="not an FMU"):
+        other_interface(lag_problem())
+
+
+def test_the_other_interface_of_an_fmu_confirms_too() -> None:
+    problem = load_problem("AT1")
+    other = other_interface(problem)
+    assert [getattr(p.model, "interface", None) for p in (problem, other)] == [
+        "co-simulation",
+        "model-exchange",
+    ]
+    vector = [100.0] * 7 + [0.0] * 3
+    here, there = (confirm(p, evaluate(p, p.space.decode(vector))) for p in (problem, other))
+    assert (here.outcome, there.outcome) == ("confirmed", "confirmed")
+    assert there.robustness == pytest.approx(here.robustness, abs=0.05)
+
+
+def test_euler_agrees_with_the_function() -> None:
+    one, other = (highest(p).trajectory for p in (euler_problem("G[0,10] (x <= 1)"), lag_problem()))
+    assert one is not None
+    assert other is not None
+    np.testing.assert_allclose(one["x"], other["x"], rtol=1e-12)

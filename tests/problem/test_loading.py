@@ -1,0 +1,238 @@
+import pickle
+import shutil
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.model import Variable
+from falsifier.errors import SpecError
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.fmu import read_info
+from falsifier.problem.loading import bundled, load_problem, load_problems
+from falsifier.problem.options import adhoc_problem, changes_from_options, starter_spec
+from falsifier.problem.problem import Problem
+from falsifier.problem.ranges import input_range
+from falsifier.problem.spec import InputSection
+from tests.fmu.fixtures import path as fmu_path
+
+AT = bundled("fmus") / "AT.fmu"
+GOOD = """
+[model]
+fmu = "AT.fmu"
+interface = "co-simulation"
+[inputs.throttle]
+control_points = 7
+[inputs.brake]
+value = 0
+[parameters]
+finalDrive = 3.0
+rollingLoad.range = [30, 50]
+[requirements.R]
+formula = "G[0,20] (speed <= 120)"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    shutil.copy(AT, tmp_path / "AT.fmu")
+    return tmp_path
+
+
+def spec(folder: Path, text: str) -> str:
+    (folder / "my.toml").write_text(text)
+    return str(folder / "my.toml")
+
+
+def test_at_is_bundled_with_its_ten_requirements() -> None:
+    problems = load_problems("AT")
+    assert [p.name for p in problems] == [
+        *("AT1", "AT2", "AT51", "AT52", "AT53", "AT54", "AT6a", "AT6b", "AT6c", "AT6abc")
+    ]
+    at1 = load_problem("AT1")
+    assert at1.requirement == problems[0].requirement
+    assert len(at1.space.dimensions) == 10
+    assert at1.experiment.stop_time == 50
+    assert at1.experiment.outputs == ("speed", "rpm", "gear")
+    assert (at1.space.inputs[0].unit, at1.space.inputs[1].high) == ("%", 325)
+
+
+def test_profiles_change_the_parameterization() -> None:
+    inputs = load_problem("AT1", profile="instance2").space.inputs
+    assert [(r.control_points, r.interpolation, r.free) for r in inputs] == [
+        (7, "constant", None),
+        (3, "constant", None),
+    ]
+
+
+def test_what_the_spec_leaves_out_comes_from_the_fmu(folder: Path) -> None:
+    problem = load_problem(spec(folder, GOOD))
+    (throttle,) = problem.space.inputs
+    assert (throttle.low, throttle.high, throttle.unit) == (0, 100, "%")
+    assert (problem.experiment.stop_time, problem.experiment.output_interval) == (50, 0.01)
+    assert problem.parameters == {"brake": 0, "finalDrive": 3}
+    assert (problem.space.parameters[0].name, problem.space.parameters[0].nominal) == ("rollingLoad", 40)
+
+
+def test_problems_travel_between_processes(folder: Path) -> None:
+    problem = load_problem(spec(folder, GOOD))
+    assert pickle.loads(pickle.dumps(problem)) == problem
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"AT.fmu"', '"gone.fmu"', r"model\.fmu: there is no FMU .*gone\.fmu"),
+        ("[inputs.throttle]", "[inputs.throtle]", r"inputs\.throtle: .*did you mean 'throttle'"),
+        ("speed <=", "sped <=", r"requirements\.R\.formula: unknown signal 'sped'; did you mean 'speed'"),
+        ("G[0,20]", "G[0,60]", r"requirements\.R\.formula: .*60 s"),
+        ("G[0,20]", "G[0,20", r"requirements\.R\.formula: "),
+        ("control_points = 7", "", r"inputs\.throttle\.control_points: this key is missing"),
+        (
+            "control_points = 7",
+            "control_points = 7\nrange = [0, 120]",
+            r"inputs\.throttle\.range: \[0, 120\] leaves",
+        ),
+        ("finalDrive", "finalDrve", r"parameters\.finalDrve: .*did you mean 'finalDrive'"),
+        ("[parameters]", "[parameters]\nspeed = 3", r"parameters\.speed: cannot be set: .*output"),
+        (
+            '"co-simulation"',
+            '"co-simulation"\noutput_interval = 0.03',
+            r"model\.output_interval: .*whole intervals",
+        ),
+        (
+            'interface = "co-simulation"',
+            "",
+            r"model\.interface: the FMU offers co-simulation and .*say which",
+        ),
+    ],
+)
+def test_errors_name_file_key_and_cure(folder: Path, old: str, new: str, message: str) -> None:
+    assert old in GOOD
+    with pytest.raises(SpecError, match=rf"my\.toml: {message}"):
+        load_problem(spec(folder, GOOD.replace(old, new)))
+
+
+def test_unknown_names_come_with_what_there_is() -> None:
+    with pytest.raises(SpecError, match="did you mean 'AT1'"):
+        load_problem("AT1x")
+    with pytest.raises(SpecError, match="no requirement 'AT3'; did you mean"):
+        load_problem("AT:AT3")
+    with pytest.raises(SpecError, match="has 10 requirements, name one"):
+        load_problem("AT")
+    with pytest.raises(SpecError, match="no profile 'instance3'; did you mean 'instance2'"):
+        load_problem("AT1", profile="instance3")
+
+
+def test_no_spec_is_needed(folder: Path) -> None:
+    changes = changes_from_options(
+        inputs=["throttle=0:100:4:linear", "brake=10"], parameters=["finalDrive=3:3.5"], stop_time=20.0
+    )
+    problem = adhoc_problem(folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes)
+    assert [d.name for d in problem.space.dimensions] == ["throttle"] * 4 + ["finalDrive"]
+    assert problem.parameters == {"brake": 10}
+    assert problem.experiment.stop_time == 20
+    named = adhoc_problem(
+        folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options(inputs=["brake"])
+    )
+    assert [(r.name, r.low, r.high) for r in named.space.inputs] == [("brake", 0, 325)]
+    every = adhoc_problem(folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
+    assert [r.name for r in every.space.inputs] == ["throttle", "brake"]
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("throttle=", "expected NAME="),
+        ("=0:1", "expected NAME="),
+        ("throttle=0:x", "'x' is not a number"),
+        ("throttle=0:1:many", "not a number of control points"),
+        ("throttle=0:1:3:cubic", "Known: pchip, linear, constant"),
+        ("throttle=1:0:3", "low < high"),
+    ],
+)
+def test_options_that_cannot_be_read_are_named(option: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        changes_from_options(inputs=[option])
+
+
+def test_an_input_by_its_name_alone_is_as_the_spec_says(folder: Path) -> None:
+    target, changes = spec(folder, GOOD), changes_from_options(inputs=["throttle"])
+    assert load_problem(target, changes=changes).space == load_problem(target).space
+
+
+def test_a_range_that_nobody_knows_must_be_given() -> None:
+    with pytest.raises(SpecError, match=r"say --input u=LOW:HIGH\[:POINTS\]"):
+        input_range(Variable("u"), InputSection(control_points=3), file="my.toml", key="inputs.u")
+
+
+def test_the_starter_spec_loads_as_it_is(folder: Path) -> None:
+    text = starter_spec(Path("AT.fmu"), read_info(folder / "AT.fmu"))
+    problem = load_problem(spec(folder, text))
+    assert problem.name == "R1"
+    assert {r.name for r in problem.space.inputs} == {"throttle", "brake"}
+
+
+def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) -> None:
+    text = starter_spec(fmu_path("Echo_3"), read_info(fmu_path("Echo_3")))
+    path = tmp_path / "echo.toml"
+    path.write_text(text)
+    ranges = {r.name: (r.low, r.high, r.kind) for r in load_problem(str(path)).space.inputs}
+    assert ranges["in_Enumeration"] == (1, 3, "enumeration")
+    assert ranges["in_Boolean"] == (0, 1, "boolean")
+    assert ranges["in_Int8"] == (0, 1, "integer")
+    assert "# 1 = first, 2 = second, 3 = third\n[inputs.in_Enumeration]\nrange = [1, 3]\n" in text
+    assert "[inputs.in_Boolean]\nrange = [0, 1]\n" in text
+    assert "[inputs.in_Int8]\nrange = [0, 1]  # the FMU gives no min and max: put" in text
+
+
+ECHO = """
+[model]
+fmu = "{fmu}"
+stop_time = 1.0
+output_interval = 0.1
+[inputs]
+{inputs}
+[requirements.R]
+formula = "G (out_Int8 <= 1000)"
+"""
+
+
+def echo(tmp_path: Path, inputs: str) -> Problem:
+    path = tmp_path / "echo.toml"
+    path.write_text(ECHO.format(fmu=fmu_path("Echo_3").as_posix(), inputs=inputs))
+    return load_problem(str(path))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ("in_Int8 = {range = [-200, 100], control_points = 1}",
+         r"echo.toml: inputs.in_Int8.range: \[-200, 100\] leaves .* type Int8 of 'in_Int8', \[-128, 127\]"),
+        ("in_UInt8 = {value = 256}", r"inputs.in_UInt8.value: 256 leaves .* UInt8 .* \[0, 255\]"),
+        ("in_Boolean = {range = [0, 2], control_points = 1}", r"in_Boolean.range: .* type Boolean"),
+        ("in_Enumeration = {range = [0, 3], control_points = 1}",
+         r"leaves the items .* 1 = first, 2 = second, 3 = third"),
+        ("in_Int8 = {value = 2.5}", r"in_Int8.value: 2.5: expected a whole number"),
+        ("in_Int8 = {range = [0.2, 0.8], control_points = 1}", r"holds no whole number: widen it"),
+    ],
+)  # fmt: skip
+def test_numbers_that_a_type_cannot_hold_are_refused_when_loaded(
+    tmp_path: Path, inputs: str, message: str
+) -> None:
+    with pytest.raises(SpecError, match=message):
+        echo(tmp_path, inputs)
+
+
+def test_whole_numbers_are_proposed_shown_and_simulated(tmp_path: Path) -> None:
+    problem = echo(
+        tmp_path,
+        "in_Int8 = {range = [-3, 3], control_points = 2}\nin_Boolean = {control_points = 2}\n"
+        "in_Enumeration = {control_points = 2}",
+    )
+    assert problem.space.bounds.tolist() == [[-3, 3]] * 2 + [[0, 1]] * 2 + [[1, 3]] * 2
+    evaluation = evaluate(problem, problem.space.decode([-2.6, 2.4, 0.4, 0.6, 1.2, 2.9]))
+    assert [s.values for s in evaluation.candidate.signals.values()] == [(-3, 2), (0, 1), (1, 3)]
+    assert evaluation.trajectory is not None
+    for name in ("Int8", "Boolean", "Enumeration"):
+        inside = evaluation.trajectory[f"out_{name}"][1:-1]
+        assert set(inside.tolist()) == set(evaluation.trajectory[f"in_{name}"][1:-1].tolist())

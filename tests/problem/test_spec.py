@@ -1,0 +1,99 @@
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.problem.spec import InputSection, ParameterSection, overlay, parse_spec, read_spec
+
+GOOD: dict[str, Any] = {
+    "model": {"fmu": "a.fmu"},
+    "inputs": {"u": {"range": [0, 1], "control_points": 3}},
+    "requirements": {"R": {"formula": "G[0,1] (y <= 1)"}},
+}
+
+
+def changed(path: str, value: object) -> dict[str, Any]:
+    data = copy.deepcopy(GOOD)
+    *parents, last = path.split(".")
+    section = data
+    for part in parents:
+        section = section.setdefault(part, {})
+    section[last] = value
+    return data
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("inputs.u.rnage", [0, 1], r"inputs\.u\.rnage: unknown key; did you mean 'range'\?"),
+        ("model.stoptime", 3, r"model\.stoptime: unknown key; did you mean 'stop_time'\?"),
+        ("requirement", {}, r"requirement: unknown key; did you mean 'requirements'\?"),
+        ("inputs.u.range", [1, 0], r"inputs\.u: expected \[low, high\] with low < high, got \[1, 0\]"),
+        ("inputs.u.range", [0], r"inputs\.u\.range"),
+        (
+            "inputs.u.interpolation",
+            "cubic",
+            r"inputs\.u\.interpolation: .*'pchip', 'linear' or 'constant', got 'cubic'$",
+        ),
+        ("inputs.u.control_points", 0, r"inputs\.u\.control_points: .*greater than or equal to 1, got 0$"),
+        ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
+        ("inputs.u.free", {"max_control_points": 3}, r"inputs\.u\.free\.min_interval: this key is missing"),
+        ("model.interface", "cs", r"model\.interface: .*'co-simulation' or 'model-exchange', got 'cs'$"),
+        ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected either range"),
+        ("requirements", {}, r"requirements: "),
+        ("requirements.R", {"formul": "x"}, r"requirements\.R\.formula: this key is missing"),
+        ("profiles.p.inputs.u.hodl", 1, r"profiles\.p\.inputs\.u\.hodl: unknown key; did you mean 'hold'"),
+    ],
+)
+def test_errors_name_file_key_and_cure(path: str, value: object, message: str) -> None:
+    with pytest.raises(SpecError, match=rf"my\.toml: {message}"):
+        parse_spec(changed(path, value), file="my.toml")
+
+
+def test_unreadable_files_are_named(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"gone\.toml: no such spec file"):
+        read_spec(tmp_path / "gone.toml")
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[model\n")
+    with pytest.raises(SpecError, match=r"bad\.toml: not valid TOML: .*line 1"):
+        read_spec(bad)
+
+
+def test_a_bare_number_fixes_a_parameter() -> None:
+    spec = parse_spec(changed("parameters.mass", 3), file="my.toml")
+    assert spec.parameters["mass"].value == 3
+
+
+def test_a_narrowed_range_keeps_the_parameterization() -> None:
+    base = InputSection.model_validate(
+        {"range": [0, 1], "control_points": 3, "free": {"max_control_points": 9, "min_interval": 0.1}}
+    )
+    narrowed = overlay(base, InputSection.model_validate({"range": [0.4, 0.6]}))
+    assert (narrowed.range, narrowed.control_points) == ((0.4, 0.6), 3)
+    assert narrowed.free == base.free
+
+
+def test_another_parameterization_is_fixed_unless_it_says_otherwise() -> None:
+    base = InputSection.model_validate(
+        {"range": [0, 1], "control_points": 3, "free": {"max_control_points": 9, "min_interval": 0.1}}
+    )
+    pieces = overlay(base, InputSection.model_validate({"control_points": 7, "interpolation": "constant"}))
+    assert (pieces.range, pieces.control_points, pieces.free) == ((0, 1), 7, None)
+
+
+def test_fixed_and_searched_replace_each_other() -> None:
+    searched = InputSection.model_validate({"range": [0, 1], "control_points": 3})
+    fixed = InputSection(value=0.5)
+    assert overlay(searched, fixed) == fixed
+    assert overlay(fixed, searched).value is None
+    assert overlay(ParameterSection(value=2.0), ParameterSection(range=(0, 1))).value is None
+
+
+def test_layers_go_from_requirement_to_profile_to_the_profiles_requirement() -> None:
+    data = changed("profiles.coarse", {"stop_time": 2.0, "requirements": {"R": {"stop_time": 3.0}}})
+    data["requirements"]["R"]["stop_time"] = 1.0
+    spec = parse_spec(data, file="my.toml")
+    assert [layer.stop_time for layer in spec.changes("R", "coarse")] == [1.0, 2.0, 3.0]
+    assert [layer.stop_time for layer in spec.changes("R", None)] == [1.0]

@@ -1,0 +1,42 @@
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.search.budget import Budget, Spent
+
+
+@pytest.mark.parametrize(
+    ("budget", "spent", "reason"),
+    [
+        (Budget(3), Spent(simulations=3), "3 simulations"),
+        (Budget(None, seconds=2), Spent(seconds=2.5), "2 s"),
+        (Budget(None, tokens=100), Spent(prompt_tokens=60, completion_tokens=50), "100 tokens"),
+        (Budget(None, cost=0.5), Spent(cost=0.51), "0.5 US dollars"),
+    ],
+)
+def test_the_first_limit_that_is_reached_is_named(budget: Budget, spent: Spent, reason: str) -> None:
+    assert budget.exceeded(Spent()) is None
+    exceeded = budget.exceeded(spent)
+    assert exceeded is not None
+    assert reason in exceeded
+
+
+def test_an_unknown_price_stays_unknown_and_forbids_a_limit_on_money() -> None:
+    known = Spent().plus_call(prompt=10, completion=5, reasoning=2, cost=0.01)
+    unknown = known.plus_call(prompt=10, completion=5, reasoning=0, cost=None)
+    assert known.cost == pytest.approx(0.01)
+    assert unknown.plus_call(prompt=1, completion=1, reasoning=0, cost=0.01).cost is None
+    assert unknown.tokens == 30
+    with pytest.raises(SpecError, match="price of this language model is unknown"):
+        Budget(None, cost=1.0).exceeded(unknown)
+
+
+def test_a_budget_needs_a_positive_limit() -> None:
+    with pytest.raises(SpecError, match="at least one limit"):
+        Budget(None)
+    with pytest.raises(SpecError, match="simulations must be positive, got 0"):
+        Budget(0)
+
+
+def test_remaining_cuts_a_batch() -> None:
+    assert Budget(10).remaining(Spent(simulations=8), 4) == 2
+    assert Budget(None, seconds=1).remaining(Spent(simulations=8), 4) == 4

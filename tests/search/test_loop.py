@@ -1,0 +1,238 @@
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.space import Candidate, ValueKind
+from falsifier.engines import make_proposer
+from falsifier.errors import ChatError, JournalError
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
+from falsifier.search.journal import (
+    AskedRecord,
+    EndedRecord,
+    EvaluatedRecord,
+    Journal,
+    open_journal,
+    read_journal,
+)
+from falsifier.search.loop import falsify, search
+from falsifier.search.result import Result
+from tests.problems import broken, lag_problem, never
+
+
+def run(
+    problem: Problem,
+    directory: Path | None = None,
+    *,
+    engine: str = "uniform",
+    budget: int = 20,
+    seed: int = 1,
+) -> Result:
+    def build(*_: object) -> object:
+        return make_proposer(engine, problem, seed=seed)
+
+    if directory is None:
+        return search(problem, build, Budget(budget))  # type: ignore[arg-type]
+    with open_journal(directory) as journal:
+        records = read_journal(directory)
+        return search(problem, build, Budget(budget), journal=journal, records=records)  # type: ignore[arg-type]
+
+
+def test_stops_at_the_first_confirmed_violation() -> None:
+    events: list[Event] = []
+    result = falsify(lag_problem(), "corners", budget=20, listeners=[events.append])
+    assert result.status == "falsified"
+    assert result.counterexample is not None
+    found = result.counterexample.evaluation
+    assert found.candidate.signals["u"].values == (1.0, 1.0, 1.0, 1.0)
+    # x(10) of x' = 1 - x by Euler with 0.1 s: 1 - 0.9**100
+    assert found.robustness == pytest.approx(0.9 - (1 - 0.9**100))
+    assert result.counterexample.reference == pytest.approx(found.robustness)
+    assert result.spent.simulations == len(result.evaluations) <= 2
+    assert isinstance(events[0], RunStarted)
+    assert isinstance(events[-1], RunEnded)
+    assert sum(isinstance(e, Evaluated) for e in events) == result.spent.simulations
+
+
+def test_uses_the_budget_up_and_says_so() -> None:
+    result = run(lag_problem("G[0,10] (x <= 2)"), budget=7)
+    assert result.status == "not falsified"
+    assert result.spent.simulations == 7
+    assert "7 simulations" in result.reason
+    assert result.best is not None
+    assert result.best.robustness == min(e.robustness for e in result.evaluations if e.robustness is not None)
+
+
+def test_robustness_zero_is_no_violation() -> None:
+    result = run(lag_problem("G[0,10] (x - x <= 0)"), budget=3)
+    assert result.status == "not falsified"
+    assert result.best is not None
+    assert result.best.robustness == 0
+
+
+def test_failed_simulations_are_evaluations_with_a_reason() -> None:
+    result = run(lag_problem("G[0,10] (x <= 2)", function=broken), budget=12)
+    failed = [e for e in result.evaluations if e.status == "failed"]
+    assert failed
+    assert len(failed) < 12
+    assert all(e.robustness is None and "'x' is nan at t = 0.5 s" in e.reason for e in failed)
+
+
+def test_a_model_that_always_fails_ends_the_run_early() -> None:
+    result = run(lag_problem(function=never), budget=1000)
+    assert result.status == "failed"
+    assert result.spent.simulations == 10
+    assert "RuntimeError: out of order" in result.reason
+
+
+def test_interruption_loses_nothing(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+
+    def interrupt(event: Event) -> None:
+        if isinstance(event, Evaluated) and event.index == 4:
+            raise KeyboardInterrupt
+
+    with open_journal(tmp_path) as journal:
+        result = search(
+            problem,
+            lambda *_: make_proposer("uniform", problem, seed=1),
+            Budget(20),
+            journal=journal,
+            listeners=[interrupt],
+        )
+    assert result.status == "interrupted"
+    assert sum(isinstance(r, EvaluatedRecord) for r in read_journal(tmp_path)) == 5
+    resumed = run(problem, tmp_path)
+    assert [e.candidate.key for e in resumed.evaluations] == [
+        e.candidate.key for e in run(problem).evaluations
+    ]
+
+
+@pytest.mark.parametrize("engine", ["uniform", "corners", "sobol"])
+@pytest.mark.parametrize("keep", [1, 8, 17])
+def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine: str, keep: int) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    whole = run(problem, tmp_path / "whole", engine=engine)
+    lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    cut = tmp_path / "cut"
+    cut.mkdir()
+    torn = lines[keep][: len(lines[keep]) // 2]
+    (cut / "journal.jsonl").write_bytes(b"".join(lines[:keep]) + torn)
+    resumed = run(problem, cut, engine=engine)
+    assert [(e.candidate.key, e.robustness) for e in resumed.evaluations] == [
+        (e.candidate.key, e.robustness) for e in whole.evaluations
+    ]
+    kinds = [r.kind for r in read_journal(cut)]
+    assert kinds.count("evaluated") == 20
+    assert kinds.count("asked") == 20
+
+
+def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    run(problem, tmp_path, budget=3)
+    with pytest.raises(JournalError, match="does not repeat its candidate 0"):
+        run(problem, tmp_path, seed=2)
+
+
+def test_one_writer_per_directory(tmp_path: Path) -> None:
+    with open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
+        Journal(tmp_path)
+
+
+def test_a_damaged_line_is_named(tmp_path: Path) -> None:
+    run(lag_problem("G[0,10] (x <= 2)"), tmp_path, budget=3)
+    path = tmp_path / "journal.jsonl"
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], "{broken", *lines[2:]]) + "\n")
+    with pytest.raises(JournalError, match="line 2 is damaged"):
+        read_journal(tmp_path)
+
+
+def test_batches_are_told_in_the_order_of_asking() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    with ThreadPoolExecutor(3) as executor:
+        parallel = search(
+            problem,
+            lambda *_: make_proposer("uniform", problem, seed=5),
+            Budget(10),
+            batch=4,
+            executor=executor,
+        )
+    alone = search(problem, lambda *_: make_proposer("uniform", problem, seed=5), Budget(10), batch=4)
+    assert len(parallel.evaluations) == 10
+    assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
+
+
+class Silent:
+    """A proposer whose language model gives up after two candidates."""
+
+    name = "silent"
+
+    def __init__(self, problem: Problem) -> None:
+        self.inner = make_proposer("uniform", problem, seed=0)
+        self.asked = 0
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        self.asked += 1
+        if self.asked > 2:
+            raise ChatError("no usable reply")
+        return self.inner.ask(n)
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        self.inner.tell(evaluations)
+
+
+def test_a_silent_language_model_ends_the_run_with_everything_kept(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    with open_journal(tmp_path) as journal:
+        result = search(problem, lambda *_: Silent(problem), Budget(20), journal=journal)
+    assert (result.status, result.reason) == ("failed", "no usable reply")
+    assert len(result.evaluations) == 2
+    records = read_journal(tmp_path)
+    assert [r.kind for r in records] == ["asked", "evaluated", "asked", "evaluated", "ended"]
+    assert isinstance(records[0], AskedRecord)
+    assert isinstance(records[-1], EndedRecord)
+    assert records[-1].status == "failed"
+
+
+def test_a_refuted_violation_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refute(problem: Problem, evaluation: Evaluation) -> Confirmation:
+        return Confirmation(evaluation, "refuted", 0.1, 0.1, "did not happen again")
+
+    monkeypatch.setattr("falsifier.search.loop.confirm", refute)
+    result = run(lag_problem(), engine="corners", budget=4)
+    assert result.status == "not falsified"
+    assert result.counterexample is None
+    assert [c.reason for c in result.refuted] == ["did not happen again"]
+
+
+def whole(problem: Problem, kind: ValueKind) -> Problem:
+    """Three candidates in all, where the kind is integer."""
+    (u,) = problem.space.inputs
+    inputs = (replace(u, control_points=1, interpolation="constant", kind=kind),)
+    return replace(problem, space=replace(problem.space, inputs=inputs))
+
+
+@pytest.mark.parametrize(
+    "engine", ["surrogate", "corners", "uniform", "sobol", "annealing", "cma", "bayesian"]
+)
+def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
+    problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
+    result = run(problem, engine=engine, budget=20)
+    assert result.spent.simulations == 20
+    assert {e.candidate.signals["u"].values for e in result.evaluations} <= {(-1.0,), (0.0,), (1.0,)}
+
+
+@pytest.mark.parametrize("engine", ["surrogate", "annealing", "cma"])
+def test_a_journal_with_numbers_from_before_rounding_is_continued(tmp_path: Path, engine: str) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    before = run(whole(problem, "real"), tmp_path, engine=engine, budget=8)
+    after = run(whole(problem, "integer"), tmp_path, engine=engine, budget=12)
+    assert [e.robustness for e in after.evaluations[:8]] == [e.robustness for e in before.evaluations]
+    assert all(e.candidate.signals["u"].values[0].is_integer() for e in after.evaluations[8:])

@@ -1,0 +1,34 @@
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from falsifier.campaigns.analysis import load
+from falsifier.views.plotting import plot_comparison, plot_history, plot_rates, save_figure
+
+
+def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path, tmp_path: Path) -> None:
+    found = next(run for run in load(campaign) if run.falsified)
+    figure = plot_history(found)
+    lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    assert np.array_equal(lines["robustness"].get_ydata(), found.robustness)
+    assert np.array_equal(lines["counterexample"].get_xdata(), [found.simulations])
+    save_figure(figure, tmp_path / "history.svg")
+    assert (tmp_path / "history.svg").stat().st_size > 1000
+
+
+def test_rates_end_at_the_share_of_falsified_runs(campaign: Path) -> None:
+    axes = plot_rates(load(campaign)).axes[0]
+    assert [line.get_label() for line in axes.get_lines()] == ["uniform (4 runs)", "corners (4 runs)"]
+    assert [np.asarray(line.get_ydata())[-1] for line in axes.get_lines()] == [0.5, 0.5]
+
+
+def test_a_comparison_has_a_bar_for_each_requirement_and_method(campaign: Path) -> None:
+    ax = Figure().subplots()
+    figure = plot_comparison(load(campaign), ax)
+    assert figure.axes[0] is ax
+    bars = [bar for bar in ax.patches if isinstance(bar, Rectangle)]
+    assert [bar.get_height() for bar in bars] == [1.5, 0.0, 1.5, 0.0]
+    assert [text.get_text() for text in ax.texts] == ["2/2", "0/2", "2/2", "0/2"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["HARD", "NEVER"]

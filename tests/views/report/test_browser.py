@@ -1,0 +1,110 @@
+"""The page in a real browser: it is laid out, scripts do not run, and nothing is asked of the network.
+
+Runs where a Chromium is installed (``CHROMIUM`` names it, or it is on the path); test_page.py checks the
+page's structure everywhere.
+"""
+
+import html
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from falsifier.views.report import html_report
+
+CHROMIUM = os.environ.get("CHROMIUM") or next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None
+)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed; CI installs one")
+
+# Runs in the browser after the page: what a person would see and could reach. The page itself has no script.
+PROBE = """
+<script>
+const focusable = [...document.querySelectorAll('a[href], summary, [tabindex="0"]')];
+const reached = focusable.filter(e => { e.focus(); return document.activeElement === e; });
+const charts = [...document.querySelectorAll('svg')].filter(e => e.checkVisibility());
+const drawn = charts.filter(e => e.getBoundingClientRect().height > 80 && e.getBBox().width > 400);
+const ink = getComputedStyle(document.body).color, page = getComputedStyle(document.body).backgroundColor;
+document.documentElement.setAttribute('data-probe', JSON.stringify({
+  focusable: focusable.length, reached: reached.length, charts: charts.length, drawn: drawn.length,
+  sideways: document.documentElement.scrollWidth - document.documentElement.clientWidth, ink, page,
+  resources: performance.getEntriesByType('resource').length,
+  rows: document.querySelectorAll('tbody tr').length,
+}));
+</script>
+"""
+
+
+def chromium(*arguments: str, profile: Path) -> str:
+    command = [
+        str(CHROMIUM),
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        f"--user-data-dir={profile}",
+        *arguments,
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout
+
+
+def probe(page: Path, folder: Path, *flags: str) -> dict[str, object]:
+    probed = folder / "probed.html"
+    probed.write_text(
+        page.read_text(encoding="utf-8").replace("</body>", f"{PROBE}</body>"), encoding="utf-8"
+    )
+    dom = chromium("--dump-dom", *flags, probed.as_uri(), profile=folder / "profile")
+    found = re.search(r'data-probe="([^"]*)"', dom)
+    assert found, "the probe did not run"
+    result: dict[str, object] = json.loads(html.unescape(found.group(1)))
+    return result
+
+
+@pytest.fixture(scope="module")
+def page(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(html_report(campaign), encoding="utf-8")
+    return path
+
+
+def test_everything_is_drawn_and_reached_by_keyboard(page: Path, tmp_path: Path) -> None:
+    seen = probe(page, tmp_path, "--window-size=1200,900")
+    assert seen["rows"] == 4
+    assert seen["charts"] == seen["drawn"]
+    # Two histories and a curve for each requirement; of its first simulation, which is open, x and u.
+    assert seen["charts"] == 2 * (3 + 2)
+    assert seen["reached"] == seen["focusable"]
+    assert seen["resources"] == 0
+    assert seen["sideways"] == 0
+    assert seen["ink"] == "rgb(27, 31, 36)"
+
+
+def test_a_telephone_is_wide_enough(page: Path, tmp_path: Path) -> None:
+    seen = probe(page, tmp_path, "--window-size=500,800")
+    assert seen["sideways"] == 0
+
+
+def test_dark_mode_turns_the_colours_round(page: Path, tmp_path: Path) -> None:
+    seen = probe(page, tmp_path, "--blink-settings=preferredColorScheme=0")
+    assert (seen["ink"], seen["page"]) == ("rgb(230, 233, 237)", "rgb(20, 24, 29)")
+
+
+def test_it_prints_with_all_counterexamples(page: Path, tmp_path: Path) -> None:
+    closed = tmp_path / "closed.html"
+    text = page.read_text(encoding="utf-8")
+    rule = "details:not([open])::details-content { content-visibility: visible; }"
+    assert rule in text
+    closed.write_text(text.replace(rule, ""), encoding="utf-8")
+    assert pages(page, tmp_path) > pages(closed, tmp_path) >= 2
+
+
+def pages(page: Path, folder: Path) -> int:
+    """Number of pages that a document is printed on."""
+    pdf = folder / f"{page.stem}.pdf"
+    chromium(f"--print-to-pdf={pdf}", page.as_uri(), profile=folder / "profile")
+    return len(re.findall(rb"/Type ?/Page\b", pdf.read_bytes()))
