@@ -17,8 +17,8 @@ from falsifier.campaigns import CampaignRequest, Method, cross, suite
 from falsifier.campaigns.analysis import load, load_run
 from falsifier.campaigns.directory import CampaignRecord, run_directory, write_campaign
 from falsifier.core.space import Candidate
-from falsifier.engines import make_proposer
-from falsifier.engines.protocol import Proposer
+from falsifier.engines import make_engine
+from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.search.budget import Budget
 from falsifier.search.journal import (
@@ -65,7 +65,7 @@ def overhead(target: str, directory: Path) -> str:
     problem = request.problem.load()
     falsify(problem, "uniform", budget=10)
     write_manifest(directory, manifest(request, problem).model_dump(mode="json"))
-    engine, executor = TimedEngine(make_proposer("uniform", problem, seed=0)), TimedExecutor()
+    engine, executor = TimedEngine(make_engine("uniform", problem, seed=0)), TimedExecutor()
     with open_journal(directory, keep=request.keep) as journal:
         started = perf_counter()
         result = search(problem, lambda *_: engine, request.budget, executor=executor, journal=journal)
@@ -81,19 +81,19 @@ def overhead(target: str, directory: Path) -> str:
 class TimedEngine:
     """An engine and the seconds that it took."""
 
-    def __init__(self, engine: Proposer) -> None:
+    def __init__(self, engine: Engine) -> None:
         self.engine, self.seconds = engine, 0.0
         self.name = engine.name
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Proposer.ask."""
+        """See Engine.ask."""
         started = perf_counter()
         candidates = self.engine.ask(n)
         self.seconds += perf_counter() - started
         return candidates
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Proposer.tell."""
+        """See Engine.tell."""
         started = perf_counter()
         self.engine.tell(evaluations)
         self.seconds += perf_counter() - started

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import monitor_for
 from falsifier.problem.loading import load_problem
 from falsifier.search.budget import Budget
@@ -25,7 +25,7 @@ def main() -> None:
     """Print the two times and their ratio, the best of some rounds."""
     # A bound that no input reaches: all evaluations are made.
     problem = load_problem("AT1", stl="G[0,20] (speed <= 1000)")
-    candidates = make_proposer("uniform", problem, seed=1).ask(COUNT)
+    candidates = make_engine("uniform", problem, seed=1).ask(COUNT)
     for candidate in candidates[:20]:  # compiles, and starts the worker
         trajectory = problem.model.simulate(candidate.signals, {}, problem.experiment)
     monitor_for(problem).evaluate(trajectory)
@@ -38,7 +38,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder, open_journal(Path(folder)) as journal:
             started = perf_counter()
             result = search(
-                problem, lambda p, _: make_proposer("uniform", p, seed=1), Budget(COUNT), journal=journal
+                problem, lambda p, _: make_engine("uniform", p, seed=1), Budget(COUNT), journal=journal
             )
             whole.append(perf_counter() - started)
         assert len(result.evaluations) == COUNT

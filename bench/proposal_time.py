@@ -16,7 +16,7 @@ from itertools import pairwise
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_proposer
+from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 
@@ -31,15 +31,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=100)
     options = parser.parse_args()
     problem = load_problem(options.requirement)
-    proposer = make_proposer(options.engine, problem, seed=options.seed)
+    engine = make_engine(options.engine, problem, seed=options.seed)
     seconds = []
     for _ in range(EDGES[-1]):
         started = time.process_time()
-        (candidate,) = proposer.ask(1)
+        (candidate,) = engine.ask(1)
         asking = time.process_time() - started
         evaluation = evaluate(problem, candidate)
         started = time.process_time()
-        proposer.tell([evaluation])
+        engine.tell([evaluation])
         seconds.append(asking + time.process_time() - started)
     print(f"`{options.engine}` on {options.requirement}, seed {options.seed}.\n")
     print("| earlier simulations | mean s | most s |\n|---|---|---|")

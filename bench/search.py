@@ -27,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from falsifier.core.space import Candidate
-from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_proposer
+from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -71,13 +71,13 @@ def problem_of(requirement: str, *, free: bool) -> Problem:
     return replace(problem, space=replace(problem.space, inputs=inputs))
 
 
-def run(problem: Problem, engine: str, seed: int, budget: int) -> Run:
+def run(problem: Problem, name: str, seed: int, budget: int) -> Run:
     """Search once."""
-    proposer = make_proposer(engine, problem, seed=seed)
+    engine = make_engine(name, problem, seed=seed)
     best, thinking = float("inf"), 0.0
     for count in range(1, budget + 1):
         started = time.perf_counter()
-        (candidate,) = proposer.ask(1)
+        (candidate,) = engine.ask(1)
         thinking += time.perf_counter() - started
         evaluation = evaluate(problem, candidate)
         if evaluation.robustness is not None:
@@ -85,7 +85,7 @@ def run(problem: Problem, engine: str, seed: int, budget: int) -> Run:
         if evaluation.violated:
             return Run(count, best, candidate, thinking / count)
         started = time.perf_counter()
-        proposer.tell([evaluation])
+        engine.tell([evaluation])
         thinking += time.perf_counter() - started
     return Run(None, best, None, thinking / budget)
 

@@ -1,8 +1,8 @@
-"""Contracts: what every proposer must keep, as tests to inherit from, and small systems to test on.
+"""Contracts: what every engine must keep, as tests to inherit from, and small systems to test on.
 
 A test module for an engine of your own::
 
-    class TestMine(ProposerContract):
+    class TestMine(EngineContract):
         def make(self, problem, seed):
             return Mine(problem, seed=seed)
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
-from falsifier.engines.protocol import Proposer
+from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, Requirement
 from falsifier.stl import Verdict, parse
@@ -76,22 +76,22 @@ def simulated(problem: Problem, margin: Callable[[NDArray[np.float64]], float]) 
     return judge
 
 
-def drive(proposer: Proposer, judge: Judge, *, rounds: int, n: int = 1) -> list[Candidate]:
+def drive(engine: Engine, judge: Judge, *, rounds: int, n: int = 1) -> list[Candidate]:
     """Ask and tell for some rounds of n candidates; return all candidates in order."""
     asked: list[Candidate] = []
     for _ in range(rounds):
-        candidates = proposer.ask(n)
+        candidates = engine.ask(n)
         asked += candidates
-        proposer.tell([judge(c) for c in candidates])
+        engine.tell([judge(c) for c in candidates])
     return asked
 
 
-class ProposerContract:
+class EngineContract:
     """Inherit and define ``make``; pytest then runs every ``test_`` method for your engine."""
 
     rounds = 12
 
-    def make(self, problem: Problem, seed: int) -> Proposer:
+    def make(self, problem: Problem, seed: int) -> Engine:
         """Return the engine under test."""
         raise NotImplementedError
 
@@ -107,8 +107,8 @@ class ProposerContract:
     def test_candidates_are_admitted_by_the_space(self) -> None:
         """All candidates lie in the box, within the allowed parameterization, and bear origin and reason."""
         for problem in self.problems():
-            proposer = self.make(problem, seed=1)
-            for candidate in drive(proposer, simulated(problem, _below_three), rounds=self.rounds):
+            engine = self.make(problem, seed=1)
+            for candidate in drive(engine, simulated(problem, _below_three), rounds=self.rounds):
                 admitted = problem.space.admit(candidate)
                 assert admitted.key == candidate.key
                 assert candidate.origin and candidate.rationale
@@ -125,14 +125,14 @@ class ProposerContract:
     def test_asks_for_as_many_as_wanted(self) -> None:
         """``ask(n)`` gives n candidates, also again before anything was told."""
         problem = lag_problem(free=True)
-        proposer = self.make(problem, seed=5)
+        engine = self.make(problem, seed=5)
         judge = simulated(problem, _below_three)
         for _ in range(3):
-            batch = proposer.ask(4)
+            batch = engine.ask(4)
             assert len(batch) == 4
-            proposer.tell([judge(c) for c in batch])
-        assert len(proposer.ask(3)) == 3
-        assert len(proposer.ask(2)) == 2
+            engine.tell([judge(c) for c in batch])
+        assert len(engine.ask(3)) == 3
+        assert len(engine.ask(2)) == 2
 
     def test_accepts_foreign_evaluations(self) -> None:
         """Candidates that it never proposed, with a parameterization of their own, may be told."""
@@ -142,9 +142,9 @@ class ProposerContract:
             Candidate({"u0": Signal((0.0, 2.5, 7.0), (1.0, -2.0, 0.5), "constant")}, {"p0": 0.5}, "somebody"),
             Candidate({"u0": Signal((0.0,), (2.0,), "pchip")}, {"p0": 2.0}, "somebody"),
         ]
-        proposer = self.make(problem, seed=6)
-        proposer.tell([judge(problem.space.admit(c)) for c in foreign])
-        assert len(drive(proposer, judge, rounds=self.rounds)) == self.rounds
+        engine = self.make(problem, seed=6)
+        engine.tell([judge(problem.space.admit(c)) for c in foreign])
+        assert len(drive(engine, judge, rounds=self.rounds)) == self.rounds
 
     def test_survives_failures(self) -> None:
         """Evaluations without verdict or trajectory are no reason to stop."""
@@ -158,14 +158,14 @@ class ProposerContract:
             return judge(candidate) if count % 2 else Evaluation(candidate, "failed", reason="diverged")
 
         for failing in (half_failing, lambda c: Evaluation(c, "timeout", reason="too slow")):
-            proposer = self.make(problem, seed=7)
-            assert len(drive(proposer, failing, rounds=self.rounds)) == self.rounds
+            engine = self.make(problem, seed=7)
+            assert len(drive(engine, failing, rounds=self.rounds)) == self.rounds
 
     def test_survives_a_plateau(self) -> None:
         """A robustness that is the same everywhere does not make it repeat one candidate."""
         problem = lag_problem()
-        proposer = self.make(problem, seed=8)
-        asked = drive(proposer, simulated(problem, lambda y: 0.5), rounds=self.rounds)
+        engine = self.make(problem, seed=8)
+        asked = drive(engine, simulated(problem, lambda y: 0.5), rounds=self.rounds)
         assert len({c.key for c in asked}) > self.rounds / 2
 
     def test_resumes_by_replay(self) -> None:

@@ -149,7 +149,7 @@ def _plus(a: Spent, b: Spent) -> Spent:
         a.simulations + b.simulations,
         a.seconds + b.seconds,
         a.simulation_seconds + b.simulation_seconds,
-        a.proposal_seconds + b.proposal_seconds,
+        a.engine_seconds + b.engine_seconds,
         a.calls + b.calls,
         a.prompt_tokens + b.prompt_tokens,
         a.completion_tokens + b.completion_tokens,

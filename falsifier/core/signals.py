@@ -1,6 +1,6 @@
 """Input signals: control points, an interpolation between them, optionally sampled and held.
 
-A :class:`Signal` is the one form in which every proposer, every file and every model speaks of an input::
+A :class:`Signal` is the one form in which every engine, every file and every model speaks of an input::
 
     full_throttle = Signal.evenly((100.0,) * 7, stop_time=50.0)
     full_throttle.sample(np.linspace(0, 50, 5001))

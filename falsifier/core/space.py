@@ -25,7 +25,7 @@ _ROUNDING_SHARE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """Limits within which proposers may choose an input's control points and interpolation themselves.
+    """Limits within which engines may choose an input's control points and interpolation themselves.
 
     Attributes:
         max_control_points: most control points.
@@ -119,7 +119,7 @@ class Candidate:
         signals: input signals by name.
         parameters: parameter values by name.
         origin: who proposed it.
-        rationale: why, in the proposer's words.
+        rationale: why, in the engine's words.
     """
 
     signals: Mapping[str, Signal] = field(default_factory=dict)

@@ -60,7 +60,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
 
 
 def is_fixed(problem: Problem, r: InputRange, signal: Signal) -> bool:
-    """Whether a signal has the control points of the spec, rather than some of a proposer's choice."""
+    """Whether a signal has the control points of the spec, rather than some of an engine's choice."""
     times = even_times(r.control_points, stop_time=problem.space.stop_time, interpolation=r.interpolation)
     return signal.interpolation == r.interpolation and signal.times == times
 

@@ -11,13 +11,13 @@ from threading import Thread
 import numpy as np
 from scipy.optimize import dual_annealing
 
-from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.problem.problem import Problem
 
 _NEVER = 10**9
 
 
-class Annealing(BoxProposer):
+class Annealing(BoxEngine):
     """Dual annealing without its local search, whose finite differences would cost d + 1 simulations each.
 
     It goes one step at a time: further candidates asked for meanwhile are uniform random ones.

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import qmc
 
-from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
 from falsifier.problem.problem import Problem
 
@@ -18,7 +18,7 @@ _STARTS = 3
 _SAMPLES = 512
 
 
-class ModelBased(BoxProposer):
+class ModelBased(BoxEngine):
     """Sobol points first, then what a model of the costs so far makes most promising."""
 
     def __init__(self, problem: Problem, *, seed: int) -> None:

@@ -3,17 +3,18 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.signals import even_times
 from falsifier.core.space import Candidate, SearchSpace
-from falsifier.engines.arrays import Array
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
+# Single precision where dynamics are rolled out, double elsewhere.
+Array = NDArray[np.floating[Any]]
 Vector = Array
 
 
@@ -70,7 +71,7 @@ class UnitBox:
         return np.clip((self.space.encode(candidate) - self.low) / span, 0.0, 1.0)
 
 
-class BoxProposer(ABC):
+class BoxEngine(ABC):
     """An engine on the unit box: subclasses propose points and learn costs.
 
     The cost is the robustness; a failed evaluation has none and is passed on as None.
@@ -84,7 +85,7 @@ class BoxProposer(ABC):
         self._asked = 0
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Proposer.ask."""
+        """See Engine.ask."""
         candidates = []
         for _ in range(max(n, 1)):
             proposal = self._propose(np.random.default_rng([self.seed, self._asked]))
@@ -95,7 +96,7 @@ class BoxProposer(ABC):
         return candidates
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Proposer.tell."""
+        """See Engine.tell."""
         for evaluation in evaluations:
             if self.box.represents(evaluation.candidate):
                 self._learn(self.box.point(evaluation.candidate), evaluation.robustness)

@@ -3,14 +3,14 @@
 import numpy as np
 from cma import CMAEvolutionStrategy
 
-from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.problem.problem import Problem
 
 # First standard deviation, as a share of the ranges: the usual third of the box.
 _FIRST_STEP = 0.3
 
 
-class CMA(BoxProposer):
+class CMA(BoxEngine):
     """CMA-ES from random starts; restarts where it has converged.
 
     A generation is complete when all its points were told; further candidates asked for before that are

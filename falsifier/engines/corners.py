@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.engines.corner_walk import CornerWalk, Levels
 from falsifier.problem.problem import Problem
 
 
-class Corners(BoxProposer):
+class Corners(BoxEngine):
     """All corners of the inputs' and parameters' ranges, then uniform random points."""
 
     name = "corners"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 
 
 def matern(distance: Array) -> Array:

@@ -86,7 +86,7 @@ class Hybrid:
         self._numeric: Candidate | None = None
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Proposer.ask.
+        """See Engine.ask.
 
         Raises:
             ChatError: when the first answer cannot be had; later the surrogate goes on without.
@@ -94,7 +94,7 @@ class Hybrid:
         return [self._ask_one() for _ in range(max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Proposer.tell."""
+        """See Engine.tell."""
         self.surrogate.tell(evaluations)
         self.adviser.tell(evaluations)
         for evaluation in evaluations:

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from falsifier.core.space import Candidate
 from falsifier.engines.adviser import Advice, in_few_words
-from falsifier.engines.protocol import Proposer
+from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
@@ -34,7 +34,7 @@ _KEPT_RECENT = 40
 _KEPT_BEST = 10
 
 
-class LLMProposer:
+class LLMEngine:
     """Asks a language model for the next candidates.
 
     Args:
@@ -59,7 +59,7 @@ class LLMProposer:
         sample: int = 0,
         prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
         anonymous: bool = False,
-        fallback: Proposer | None = None,
+        fallback: Engine | None = None,
     ) -> None:
         self._disguise = Disguise.of(view) if anonymous else None
         self._view = self._disguise.view if self._disguise else view
@@ -197,7 +197,7 @@ class LLMProposer:
         return list(new.values())
 
 
-def make_llm_proposer(
+def make_llm_engine(
     problem: Problem,
     chat: Chat,
     *,
@@ -206,14 +206,14 @@ def make_llm_proposer(
     sample: int = 0,
     prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
     anonymous: bool = False,
-    fallback: Proposer | None = None,
-) -> LLMProposer:
-    """Make the proposer for a problem; variant None means the default one. See LLMProposer.
+    fallback: Engine | None = None,
+) -> LLMEngine:
+    """Make the engine for a problem; variant None means the default one. See LLMEngine.
 
     Raises:
         SpecError: for an unknown variant.
     """
-    return LLMProposer(
+    return LLMEngine(
         View.of(problem),
         chat,
         variant_named(variant),

@@ -7,10 +7,10 @@ from falsifier.core.space import Candidate
 from falsifier.evaluation.evaluate import Evaluation
 
 
-class Proposer(Protocol):
+class Engine(Protocol):
     """Suggests the next candidates.
 
-    A proposer sees the search space, the requirement and evaluations, never the model. It is deterministic:
+    An engine sees the search space, the requirement and evaluations, never the model. It is deterministic:
     the same seed and the same sequence of calls give the same candidates, which is how runs resume.
     """
 

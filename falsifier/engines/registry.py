@@ -6,13 +6,13 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Any
 
-from falsifier.engines.protocol import Proposer
+from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.problem import Problem
 
 
 @dataclass(frozen=True, slots=True)
-class Engine:
+class Registered:
     """One registered engine.
 
     Attributes:
@@ -43,26 +43,26 @@ class Engine:
             ) from None
 
 
-ENGINES: Mapping[str, Engine] = MappingProxyType(
+ENGINES: Mapping[str, Registered] = MappingProxyType(
     {
-        "surrogate": Engine(
+        "surrogate": Registered(
             "falsifier.engines.surrogate:Surrogate", "learns the dynamics and searches on what it learnt"
         ),
-        "uniform": Engine("falsifier.engines.uniform:Uniform", "uniform random points of the box"),
-        "sobol": Engine("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence over the box"),
-        "corners": Engine("falsifier.engines.corners:Corners", "constant extremes first, then random"),
-        "annealing": Engine("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
-        "cma": Engine("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
-        "bayesian": Engine(
+        "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points of the box"),
+        "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence over the box"),
+        "corners": Registered("falsifier.engines.corners:Corners", "constant extremes first, then random"),
+        "annealing": Registered("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
+        "cma": Registered("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
+        "bayesian": Registered(
             "falsifier.engines.bayesian:Bayesian", "Gaussian process and expected improvement"
         ),
-        "optuna": Engine(
-            "falsifier.engines.tpe:TPE", "optuna's tree-structured Parzen estimators", extra="optuna"
+        "optuna": Registered(
+            "falsifier.engines.optuna_tpe:TPE", "optuna's tree-structured Parzen estimators", extra="optuna"
         ),
-        "botorch": Engine(
-            "falsifier.engines.torch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
+        "botorch": Registered(
+            "falsifier.engines.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
         ),
-        "hybrid": Engine("falsifier.engines.hybrid:Hybrid", "a language model and the surrogate together"),
+        "hybrid": Registered("falsifier.engines.hybrid:Hybrid", "a language model and the surrogate"),
     }
 )
 
@@ -79,7 +79,7 @@ def check_engine(name: str) -> None:
         raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
 
 
-def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> Proposer:
+def make_engine(name: str, problem: Problem, *, seed: int, **options: Any) -> Engine:
     """Make the engine of this name for a problem.
 
     Args:
@@ -95,5 +95,5 @@ def make_proposer(name: str, problem: Problem, *, seed: int, **options: Any) -> 
     check_engine(name)
     if not problem.space.names:
         raise SpecError("nothing may be varied: give at least one input or parameter a range")
-    proposer: Proposer = ENGINES[name].load()(problem, seed=seed, **options)
-    return proposer
+    engine: Engine = ENGINES[name].load()(problem, seed=seed, **options)
+    return engine

@@ -3,14 +3,14 @@
 import numpy as np
 from scipy.stats import qmc
 
-from falsifier.engines.box import BoxProposer, Proposal
+from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.problem.problem import Problem
 
 # scipy's table of direction numbers ends here; more coordinates are drawn at random.
 _MOST_DIMENSIONS = qmc.Sobol.MAXDIM
 
 
-class Sobol(BoxProposer):
+class Sobol(BoxEngine):
     """Successive points of one scrambled Sobol sequence."""
 
     name = "sobol"

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from falsifier.engines.box import BoxProposer, Proposal
+from falsifier.engines.box import BoxEngine, Proposal
 
 
-class Uniform(BoxProposer):
+class Uniform(BoxEngine):
     """Points drawn uniformly from the box."""
 
     name = "uniform"

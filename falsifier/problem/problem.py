@@ -27,7 +27,7 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Everything that evaluate and a proposer need to know; immutable and picklable.
+    """Everything that evaluate and an engine need to know; immutable and picklable.
 
     Attributes:
         model: what simulates.

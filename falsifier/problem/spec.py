@@ -30,7 +30,7 @@ class _Strict(BaseModel):
 class FreeSection(_Strict):
     """Limits of a free parameterization."""
 
-    max_control_points: int = Field(ge=1, description="Most control points a proposer may use.")
+    max_control_points: int = Field(ge=1, description="Most control points an engine may use.")
     min_interval: Seconds = Field(description="Shortest time between two control points, in s.")
 
 
@@ -52,9 +52,7 @@ class InputSection(_Strict):
         description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
     )
     hold: Seconds | None = Field(None, description="Sample-and-hold period in s.")
-    free: FreeSection | None = Field(
-        None, description="Proposers may choose the control points within limits."
-    )
+    free: FreeSection | None = Field(None, description="Engines may choose the control points within limits.")
     value: Number | None = Field(None, description="Keep this input at a constant value.")
 
     @model_validator(mode="after")

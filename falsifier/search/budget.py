@@ -13,7 +13,7 @@ class Spent:
         simulations: candidates that were simulated, failed ones included.
         seconds: wall-clock time of the run.
         simulation_seconds: of it inside the simulator.
-        proposal_seconds: of it inside the proposer, language model included.
+        engine_seconds: of it inside the engine, language model included.
         calls: requests to a language model that were answered.
         prompt_tokens: tokens sent.
         completion_tokens: tokens received, reasoning included.
@@ -24,7 +24,7 @@ class Spent:
     simulations: int = 0
     seconds: float = 0.0
     simulation_seconds: float = 0.0
-    proposal_seconds: float = 0.0
+    engine_seconds: float = 0.0
     calls: int = 0
     prompt_tokens: int = 0
     completion_tokens: int = 0

@@ -19,7 +19,7 @@ class RunStarted:
     """A run begins, or goes on after ``replayed`` evaluations from its journal."""
 
     problem: Problem
-    proposer: str
+    engine: str
     budget: Budget
     replayed: int = 0
 

@@ -45,7 +45,7 @@ class _Record(BaseModel):
 
 
 class AskedRecord(_Record):
-    """The proposer was asked for n candidates and gave these, as evaluations first, first + 1, ..."""
+    """The engine was asked for n candidates and gave these, as evaluations first, first + 1, ..."""
 
     kind: Literal["asked"] = "asked"
     first: int

@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from falsifier.core.space import Candidate
-from falsifier.engines.protocol import Proposer
+from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError, JournalError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate, judge
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from falsifier.llm.messages import Exchange
 
 OnExchange = Callable[["Exchange"], None]
-# Makes a problem's proposer, which calls what it is handed with every exchange with a language model.
-ProposerBuilder = Callable[[Problem, OnExchange], Proposer]
+# Makes a problem's engine, which calls what it is handed with every exchange with a language model.
+EngineBuilder = Callable[[Problem, OnExchange], Engine]
 
 # A model whose first simulations all fail is broken or wrongly set up; more of them would tell nothing new.
 _HOPELESS = 10
@@ -40,7 +40,7 @@ _HOPELESS = 10
 
 def falsify(
     problem: Problem,
-    engine: str | Proposer = "corners",
+    engine: str | Engine = "corners",
     *,
     budget: Budget | int = 100,
     seed: int = 0,
@@ -50,7 +50,7 @@ def falsify(
 
     Args:
         problem: what to falsify.
-        engine: name of a numerical engine, or any proposer.
+        engine: name of a numerical engine, or any engine.
         budget: limits; a number means simulations.
         seed: of the engine, where it is given by name.
         listeners: called with every event.
@@ -58,16 +58,16 @@ def falsify(
     >>> falsify(load_problem("AT1"), "corners", budget=20).status  # doctest: +SKIP
     'falsified'
     """
-    from falsifier.engines import make_proposer
+    from falsifier.engines import make_engine
 
-    proposer = make_proposer(engine, problem, seed=seed) if isinstance(engine, str) else engine
+    found = make_engine(engine, problem, seed=seed) if isinstance(engine, str) else engine
     limits = Budget(simulations=budget) if isinstance(budget, int) else budget
-    return search(problem, lambda *_: proposer, limits, listeners=listeners)
+    return search(problem, lambda *_: found, limits, listeners=listeners)
 
 
 def search(
     problem: Problem,
-    build: ProposerBuilder,
+    build: EngineBuilder,
     budget: Budget,
     *,
     batch: int = 1,
@@ -80,7 +80,7 @@ def search(
 
     Args:
         problem: what to falsify.
-        build: makes the proposer.
+        build: makes the engine.
         budget: limits.
         batch: how many candidates are asked for and simulated at a time.
         executor: where to simulate; None: in this process.
@@ -102,7 +102,7 @@ def search(
 
 def search_together(
     problems: Sequence[Problem],
-    build: ProposerBuilder,
+    build: EngineBuilder,
     budget: Budget,
     *,
     batch: int = 1,
@@ -113,7 +113,7 @@ def search_together(
 ) -> list[Result]:
     """Falsify several requirements of one system: every simulation is judged against all of them.
 
-    The requirements that still hold take turns in proposing; every proposer is told every simulation. A
+    The requirements that still hold take turns in proposing; every engine is told every simulation. A
     result counts the simulations until its requirement fell. Arguments are those of search; the problems
     differ in nothing but their requirement.
 
@@ -147,7 +147,7 @@ class _Target:
     """One requirement in a running search."""
 
     problem: Problem
-    proposer: Proposer
+    engine: Engine
     evaluations: list[Evaluation] = field(default_factory=list)
     doubtful: list[Confirmation] = field(default_factory=list)
     best: Evaluation | None = None
@@ -194,7 +194,7 @@ class _Loop:
     def run(self, batch: int, executor: Executor | None) -> str:
         """Search until nothing is left to falsify or to spend; return why it ended."""
         for target in self.targets:
-            self.emit(RunStarted(target.problem, target.proposer.name, self.budget, len(self.recorded)))
+            self.emit(RunStarted(target.problem, target.engine.name, self.budget, len(self.recorded)))
         turns = 0
         while standing := [t for t in self.targets if t.counterexample is None]:
             limit = self.budget.exceeded(self.clock())
@@ -213,7 +213,7 @@ class _Loop:
                     self.consider(target, seen)
             for target in standing:
                 if target.counterexample is None:
-                    target.proposer.tell(told[target.name])
+                    target.engine.tell(told[target.name])
         return "all requirements are falsified"
 
     def is_hopeless(self) -> bool:
@@ -229,7 +229,7 @@ class _Loop:
         wanted = max(1, self.budget.remaining(self.spent, batch))
         recorded = self.asked.pop(0) if self.asked else None
         started = perf_counter()
-        candidates = target.proposer.ask(wanted if recorded is None else recorded.n)
+        candidates = target.engine.ask(wanted if recorded is None else recorded.n)
         seconds = perf_counter() - started
         if recorded is None:
             self.write_asked(
@@ -248,10 +248,10 @@ class _Loop:
             known = [space.admit(Candidate.from_json(c)) for c in recorded.candidates]
             if [c.key for c in candidates] != [c.key for c in known]:
                 raise JournalError(
-                    f"the proposer {target.proposer.name!r} does not repeat its candidate {self.count}: the "
+                    f"the engine {target.engine.name!r} does not repeat its candidate {self.count}: the "
                     "journal was written with other settings or another version"
                 )
-        self.spent = replace(self.spent, proposal_seconds=self.spent.proposal_seconds + seconds)
+        self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
         return candidates
 
     def evaluate(

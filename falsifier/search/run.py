@@ -1,4 +1,4 @@
-"""Carry out a request: load its problem, make its proposer, open its record, run the loop."""
+"""Carry out a request: load its problem, make its engine, open its record, run the loop."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
@@ -20,7 +20,7 @@ from falsifier.search.loop import search_together
 from falsifier.search.manifest import Manifest, check_unchanged, manifest, recorded_request
 from falsifier.search.request import RunRequest
 from falsifier.search.result import Result
-from falsifier.search.wiring import proposer_builder
+from falsifier.search.wiring import engine_builder
 
 
 def execute(
@@ -91,7 +91,7 @@ def perform(
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
             check_unchanged(directory, read_manifest(directory)["hashes"], described.hashes)
             records = read_journal(directory)
-        build = proposer_builder(request, problems, records)
+        build = engine_builder(request, problems, records)
         if directory is not None and not begun:  # only now: a wrong engine or a missing key leaves no folder
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
             write_manifest(directory, described.model_dump(mode="json"))

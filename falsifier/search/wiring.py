@@ -1,15 +1,15 @@
-"""From what a user asked for to the proposer that does it."""
+"""From what a user asked for to the engine that does it."""
 
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from falsifier.engines import DEFAULT_ENGINE, check_engine, make_proposer
-from falsifier.engines.protocol import Proposer
+from falsifier.engines import DEFAULT_ENGINE, check_engine, make_engine
+from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError
 from falsifier.problem.problem import Problem
 from falsifier.search.journal import Record, recorded_exchanges
-from falsifier.search.loop import OnExchange, ProposerBuilder
+from falsifier.search.loop import EngineBuilder, OnExchange
 from falsifier.search.request import ModelRequest, RunRequest
 
 if TYPE_CHECKING:
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 # Engines that ask a language model.
 _MODEL_ENGINES = ("llm", "hybrid")
-# Between the seeds of the proposers of one search, which must not draw the same points; larger than any seed
+# Between the seeds of the engines of one search, which must not draw the same points; larger than any seed
 # that people count up by hand.
 _SEED_STRIDE = 1_000_003
 
 
-def proposer_builder(
+def engine_builder(
     request: RunRequest, problems: Sequence[Problem], records: Sequence[Record]
-) -> ProposerBuilder:
-    """Return what makes the request's proposers.
+) -> EngineBuilder:
+    """Return what makes the request's engines.
 
     Names of engines and models, and the model's key, are checked here, before any simulation.
 
@@ -43,7 +43,7 @@ def proposer_builder(
     if request.model is None:
         engine = request.engine or DEFAULT_ENGINE
         seeds = range(request.seed, request.seed + _SEED_STRIDE * len(problems), _SEED_STRIDE)
-        made = {p.name: make_proposer(engine, p, seed=s) for p, s in zip(problems, seeds, strict=True)}
+        made = {p.name: make_engine(engine, p, seed=s) for p, s in zip(problems, seeds, strict=True)}
         return lambda problem, _: made[problem.name]
     return _led_by_model(request, request.model, _chat(request, request.model, records))
 
@@ -72,12 +72,12 @@ def check_names(request: RunRequest) -> None:
     check_engine(model.fallback or DEFAULT_ENGINE)
 
 
-def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> ProposerBuilder:
-    from falsifier.engines.llm import make_llm_proposer
+def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> EngineBuilder:
+    from falsifier.engines.llm import make_llm_engine
 
-    def build(problem: Problem, on_exchange: OnExchange) -> Proposer:
-        fallback = make_proposer(model.fallback, problem, seed=request.seed) if model.fallback else None
-        led = make_llm_proposer(
+    def build(problem: Problem, on_exchange: OnExchange) -> Engine:
+        fallback = make_engine(model.fallback, problem, seed=request.seed) if model.fallback else None
+        led = make_llm_engine(
             problem,
             chat,
             variant=model.variant,
@@ -87,7 +87,7 @@ def _led_by_model(request: RunRequest, model: ModelRequest, chat: "Chat") -> Pro
             fallback=fallback,
         )
         if request.engine == "hybrid":
-            return make_proposer("hybrid", problem, seed=request.seed, adviser=led)
+            return make_engine("hybrid", problem, seed=request.seed, adviser=led)
         return led
 
     return build

@@ -1,7 +1,7 @@
 """Formulas of Signal Temporal Logic as immutable trees.
 
 ``falsifier.stl.parse`` makes them from text and ``str(formula)`` is a text that parses to the same tree.
-Proposers and prompts walk them: ``formula.walk()``, ``formula.children``, ``formula.predicates``.
+Engines and prompts walk them: ``formula.walk()``, ``formula.children``, ``formula.predicates``.
 """
 
 from collections.abc import Iterator

@@ -118,7 +118,7 @@ class _Line:
         """Show what an event tells."""
         match event:
             case RunStarted():
-                self._name = f"{event.problem.name}, {event.proposer}"
+                self._name = f"{event.problem.name}, {event.engine}"
                 self._handle, self._total = None, event.budget.simulations
                 self._show(0)
             case Evaluated():

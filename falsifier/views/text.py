@@ -56,7 +56,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
-                    progress.update(task, description=f"{event.problem.name} {event.proposer}", total=total)
+                    progress.update(task, description=f"{event.problem.name} {event.engine}", total=total)
                 case Evaluated():
                     progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
@@ -84,7 +84,7 @@ class PlainDisplay:
             case RunStarted():
                 replayed = f", {event.replayed} evaluations from the journal" if event.replayed else ""
                 self._line(f"{event.problem.name}: {event.problem.requirement.formula}")
-                self._line(f"engine {event.proposer}{replayed}")
+                self._line(f"engine {event.engine}{replayed}")
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
             case Evaluated(evaluation=evaluation, best=best) if (
@@ -246,7 +246,7 @@ def seconds_text(spent: Spent) -> str:
     """Seconds of a run and where they went."""
     return (
         f"{spent.seconds:.1f} s; simulator {spent.simulation_seconds:.2f} s, "
-        f"engine {spent.proposal_seconds:.2f} s"
+        f"engine {spent.engine_seconds:.2f} s"
     )
 
 

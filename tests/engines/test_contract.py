@@ -1,48 +1,48 @@
 import pytest
 
-from falsifier.engines import make_proposer
-from falsifier.engines.protocol import Proposer
+from falsifier.engines import make_engine
+from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
 from falsifier.problem.problem import Problem
-from falsifier.testing import ProposerContract
+from falsifier.testing import EngineContract
 
 
-class EngineContract(ProposerContract):
+class NamedEngine(EngineContract):
     engine: str
 
-    def make(self, problem: Problem, seed: int) -> Proposer:
-        return make_proposer(self.engine, problem, seed=seed)
+    def make(self, problem: Problem, seed: int) -> Engine:
+        return make_engine(self.engine, problem, seed=seed)
 
 
-class TestUniform(EngineContract):
+class TestUniform(NamedEngine):
     engine = "uniform"
 
 
-class TestCorners(EngineContract):
+class TestCorners(NamedEngine):
     engine = "corners"
 
 
-class TestSobol(EngineContract):
+class TestSobol(NamedEngine):
     engine = "sobol"
 
 
-class TestAnnealing(EngineContract):
+class TestAnnealing(NamedEngine):
     engine = "annealing"
 
 
-class TestCMA(EngineContract):
+class TestCMA(NamedEngine):
     engine = "cma"
 
 
-class TestBayesian(EngineContract):
+class TestBayesian(NamedEngine):
     engine = "bayesian"
 
 
-class TestOptuna(EngineContract):
+class TestOptuna(NamedEngine):
     engine = "optuna"
 
 
-class TestBoTorch(EngineContract):
+class TestBoTorch(NamedEngine):
     engine = "botorch"
     # Enough to get beyond the Sobol points, which are twice the coordinates and two.
     rounds = 15
@@ -58,6 +58,6 @@ HASTY = Settings(
 )
 
 
-class TestSurrogate(ProposerContract):
-    def make(self, problem: Problem, seed: int) -> Proposer:
-        return make_proposer("surrogate", problem, seed=seed, settings=HASTY)
+class TestSurrogate(NamedEngine):
+    def make(self, problem: Problem, seed: int) -> Engine:
+        return make_engine("surrogate", problem, seed=seed, settings=HASTY)

@@ -7,18 +7,18 @@ import pytest
 
 from falsifier.core.signals import Signal
 from falsifier.core.space import Candidate
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.engines.adviser import Advice
 from falsifier.engines.hybrid import Hybrid
-from falsifier.engines.llm import make_llm_proposer
-from falsifier.engines.protocol import Proposer
+from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
-from falsifier.testing import ProposerContract, drive, lag_problem, simulated
+from falsifier.testing import EngineContract, drive, lag_problem, simulated
 
 HASTY = Settings(
     cells=20,
@@ -77,13 +77,13 @@ def hybrid(problem: Problem, answers: list[list[float] | Exception], seed: int =
     return Hybrid(problem, seed=seed, adviser=script, surrogate_settings=HASTY), script
 
 
-class TestContract(ProposerContract):
-    def make(self, problem: Problem, seed: int) -> Proposer:
+class TestContract(EngineContract):
+    def make(self, problem: Problem, seed: int) -> Engine:
         if not all(r.free for r in problem.space.inputs):
             problem = lag_problem(inputs=0, parameters=2)
         rng = np.random.default_rng(seed)
         levels: list[list[float] | Exception] = [list(rng.uniform(-1.9, 1.9, 5)) for _ in range(9)]
-        return make_proposer(
+        return make_engine(
             "hybrid", problem, seed=seed, adviser=Script(levels, problem), surrogate_settings=HASTY
         )
 
@@ -162,7 +162,7 @@ def test_a_scripted_chat_leads_through_the_real_prompts() -> None:
         return json.dumps({"candidates": [{"rationale": "a guess", "signals": s} for s in signals]})
 
     chat = ScriptedChat([answer(0.1, 0.2), answer(0.3, 0.4, 0.5, 0.6, 0.7), answer(1.5)])
-    adviser = make_llm_proposer(problem, chat)
+    adviser = make_llm_engine(problem, chat)
     engine = Hybrid(problem, seed=0, adviser=adviser, surrogate_settings=HASTY)
     asked = drive(engine, simulated(problem, lambda y: float(9 - y.max())), rounds=10)
     assert [c.origin for c in asked[:2]] == [adviser.name] * 2

@@ -1,4 +1,4 @@
-"""The language model as a proposer, on scripted chats and against a server on this machine."""
+"""The language model as an engine, on scripted chats and against a server on this machine."""
 
 import json
 import threading
@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from falsifier.core.space import Freedom
-from falsifier.engines import make_proposer
-from falsifier.engines.llm import make_llm_proposer, preview
-from falsifier.engines.protocol import Proposer
+from falsifier.engines import make_engine
+from falsifier.engines.llm import make_llm_engine, preview
+from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.client import LiteLLMChat
@@ -28,7 +28,7 @@ from falsifier.search.budget import Budget
 from falsifier.search.journal import ExchangeRecord, open_journal, read_journal
 from falsifier.search.loop import search
 from falsifier.search.result import Result
-from falsifier.testing import ProposerContract
+from falsifier.testing import EngineContract
 from tests.llm.server import Step, serving
 from tests.problems import lag_problem
 
@@ -56,12 +56,12 @@ def test_transmission_in_two_simulations(form: str) -> None:
         chat = LiteLLMChat("openai/gpt-5-mini", effort="high", api_base=server.url)
         exchanges: list[Exchange] = []
 
-        def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Proposer:
+        def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Engine:
             def both(exchange: Exchange) -> None:
                 exchanges.append(exchange)
                 on_exchange(exchange)
 
-            return make_llm_proposer(problem, chat, variant="MP4", on_exchange=both)
+            return make_llm_engine(problem, chat, variant="MP4", on_exchange=both)
 
         result = search(problem, build, Budget(simulations=5))
     assert result.status == "falsified"
@@ -84,10 +84,10 @@ def test_preview_is_what_is_sent() -> None:
     problem = lag_problem()
     for variant in ("MP1", "MP2", "MP5"):
         chat = ScriptedChat(["<point>0 0 0 0</point>", "<point>0 0 0 1</point>"])
-        proposer = make_llm_proposer(problem, chat, variant=variant)
-        evaluation = evaluate(problem, *proposer.ask())
-        proposer.tell([evaluation])
-        proposer.ask()
+        engine = make_llm_engine(problem, chat, variant=variant)
+        evaluation = evaluate(problem, *engine.ask())
+        engine.tell([evaluation])
+        engine.ask()
         assert chat.requests[0].messages == preview(problem, variant=variant)
         assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
 
@@ -108,11 +108,11 @@ def test_the_road_to_a_valid_reply() -> None:
     with serving(*script) as server:
         client = LiteLLMChat("openai/m", api_base=server.url, timeout=0.4)
         chat = RetryingChat(LadderChat(client), Gate(), first_delay=0.01)
-        proposer = make_llm_proposer(problem, chat, variant="MP4", on_exchange=exchanges.append)
-        proposer.tell([evaluate(problem, *proposer.ask())])
+        engine = make_llm_engine(problem, chat, variant="MP4", on_exchange=exchanges.append)
+        engine.tell([evaluate(problem, *engine.ask())])
         with pytest.raises(ChatError, match="no valid reply in 3 tries"):
-            proposer.ask()
-        assert evaluate(problem, *proposer.ask()).violated
+            engine.ask()
+        assert evaluate(problem, *engine.ask()).violated
         assert len(server.received) == 7
     problems = [e.problem for e in exchanges]
     assert problems[0] is None and problems[-1] is None
@@ -132,17 +132,17 @@ def test_several_candidates_at_a_time() -> None:
         }
     )
     chat = ScriptedChat([both, reply([0.3] * 4)])
-    proposer = make_llm_proposer(problem, chat, variant="MP4")
-    candidates = proposer.ask(3)
+    engine = make_llm_engine(problem, chat, variant="MP4")
+    candidates = engine.ask(3)
     assert [c.signals["u"].values[0] for c in candidates] == [0.1, 0.2, 0.3]
     assert "Already proposed" in chat.requests[1].messages[-1].content
-    proposer.tell([evaluate(problem, c) for c in candidates])
-    assert "Already proposed" not in preview_of(chat, proposer)
+    engine.tell([evaluate(problem, c) for c in candidates])
+    assert "Already proposed" not in preview_of(chat, engine)
 
 
-def preview_of(chat: ScriptedChat, proposer: Proposer) -> str:
+def preview_of(chat: ScriptedChat, engine: Engine) -> str:
     with pytest.raises(ChatError):
-        proposer.ask()
+        engine.ask()
     return chat.requests[-1].messages[1].content
 
 
@@ -150,37 +150,35 @@ def test_neutral_names_go_out_and_real_ones_come_back() -> None:
     problem = lag_problem()
     hidden = json.dumps({"rationale": "raise u1", "signals": [{"name": "u1", "values": [1] * 4}]})
     chat = ScriptedChat([hidden, "", "", ""])
-    proposer = make_llm_proposer(problem, chat, variant="MP5", anonymous=True)
-    (candidate,) = proposer.ask()
+    engine = make_llm_engine(problem, chat, variant="MP5", anonymous=True)
+    (candidate,) = engine.ask()
     assert candidate.signals["u"].values == (1, 1, 1, 1)
     assert candidate.rationale == "raise u"
-    proposer.tell([evaluate(problem, candidate)])
-    sent = preview_of(chat, proposer)
+    engine.tell([evaluate(problem, candidate)])
+    sent = preview_of(chat, engine)
     assert "y1" in sent and "drive" not in sent
     assert chat.requests[0].messages == preview(problem, variant="MP5", anonymous=True)
 
 
 def test_hands_over_for_good_when_allowed() -> None:
     problem = lag_problem()
-    fallback = make_proposer("corners", problem, seed=0)
+    fallback = make_engine("corners", problem, seed=0)
     exchanges: list[Exchange] = []
     chat = ScriptedChat([reply([0.1] * 4), ChatError("out of reach"), "never asked"])
-    proposer = make_llm_proposer(
-        problem, chat, variant="MP4", fallback=fallback, on_exchange=exchanges.append
-    )
+    engine = make_llm_engine(problem, chat, variant="MP4", fallback=fallback, on_exchange=exchanges.append)
     asked = []
     for _ in range(4):
-        asked += proposer.ask()
-        proposer.tell([evaluate(problem, asked[-1])])
+        asked += engine.ask()
+        engine.tell([evaluate(problem, asked[-1])])
     assert [c.origin for c in asked] == ["scripted MP4", "corners", "corners", "corners"]
-    assert proposer.handed_over
+    assert engine.handed_over
     assert [e.reply is None for e in exchanges] == [False, True]
     assert exchanges[1].problem == "out of reach"
-    again = make_llm_proposer(
+    again = make_llm_engine(
         problem,
         RecordedChat(exchanges, ScriptedChat(["never asked"])),
         variant="MP4",
-        fallback=make_proposer("corners", problem, seed=0),
+        fallback=make_engine("corners", problem, seed=0),
     )
     replayed = []
     for candidate in asked:
@@ -244,10 +242,8 @@ def recorded_run(problem: Problem, chat: Chat, directory: Path) -> Result:
     records = read_journal(directory)
     recorded = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
 
-    def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Proposer:
-        return make_llm_proposer(
-            problem, RecordedChat(recorded, chat), variant="MP5", on_exchange=on_exchange
-        )
+    def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Engine:
+        return make_llm_engine(problem, RecordedChat(recorded, chat), variant="MP5", on_exchange=on_exchange)
 
     with open_journal(directory) as journal:
         return search(problem, build, Budget(simulations=20), journal=journal, records=records)
@@ -271,7 +267,7 @@ def test_a_cache_answers_the_same_question_of_another_run(tmp_path: Path) -> Non
     problem = lag_problem()
 
     def first_candidate(chat: Chat, sample: int) -> Any:
-        return make_llm_proposer(problem, chat, variant="MP4", sample=sample).ask()[0].key
+        return make_llm_engine(problem, chat, variant="MP4", sample=sample).ask()[0].key
 
     with serving(Step("bad"), Step(reply([0.1] * 4)), Step("bad"), Step(reply([0.2] * 4))) as server:
         chat = connect("openai/m", api_base=server.url, cache=tmp_path)
@@ -288,10 +284,10 @@ def test_runs_share_one_client() -> None:
         found: list[Evaluation] = []
 
         def run() -> None:
-            proposer = make_llm_proposer(problem, chat, variant="MP4")
+            engine = make_llm_engine(problem, chat, variant="MP4")
             for _ in range(3):
-                found.append(evaluate(problem, *proposer.ask()))
-                proposer.tell(found[-1:])
+                found.append(evaluate(problem, *engine.ask()))
+                engine.tell(found[-1:])
 
         threads = [threading.Thread(target=run) for _ in range(4)]
         for thread in threads:
@@ -311,7 +307,7 @@ def test_money_limit_with_unknown_price_is_an_error() -> None:
         with pytest.raises(SpecError, match="price of this language model is unknown"):
             search(
                 problem,
-                lambda problem, on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
+                lambda problem, on: make_llm_engine(problem, chat, variant="MP4", on_exchange=on),
                 Budget(simulations=5, cost=1.0),
             )
 
@@ -322,7 +318,7 @@ def test_token_budget_ends_a_run() -> None:
         chat = LiteLLMChat("openai/m", api_base=server.url)
         result = search(
             problem,
-            lambda problem, on: make_llm_proposer(problem, chat, variant="MP4", on_exchange=on),
+            lambda problem, on: make_llm_engine(problem, chat, variant="MP4", on_exchange=on),
             Budget(simulations=50, tokens=300),
         )
     assert result.status == "not falsified"
@@ -330,21 +326,21 @@ def test_token_budget_ends_a_run() -> None:
     assert result.spent.calls == 3
 
 
-def test_transient_failures_reach_the_proposer_only_when_patience_ends() -> None:
+def test_transient_failures_reach_the_engine_only_when_patience_ends() -> None:
     chat = RetryingChat(
         ScriptedChat([TransientChatError("busy"), reply([0.1] * 4)]), Gate(sleep=lambda _: None)
     )
-    assert len(make_llm_proposer(lag_problem(), chat, variant="MP4").ask()) == 1
+    assert len(make_llm_engine(lag_problem(), chat, variant="MP4").ask()) == 1
 
 
 def test_free_parameterizations_come_from_mp5_only() -> None:
     problem = lag_problem(free=Freedom(100, 0.1))
     signal = {"name": "u", "interpolation": "constant", "times": [0, 2], "values": [0, 1]}
     text = json.dumps({"rationale": "", "signals": [signal]})
-    (candidate,) = make_llm_proposer(problem, ScriptedChat([text]), variant="MP5").ask()
+    (candidate,) = make_llm_engine(problem, ScriptedChat([text]), variant="MP5").ask()
     assert candidate.signals["u"].times == (0, 2)
     with pytest.raises(ChatError, match="expected 4 evenly spaced"):
-        make_llm_proposer(problem, ScriptedChat([text] * 3), variant="MP4").ask()
+        make_llm_engine(problem, ScriptedChat([text] * 3), variant="MP4").ask()
 
 
 def counting_script(seed: int) -> Callable[[ChatRequest], str]:
@@ -375,8 +371,8 @@ def counting_script(seed: int) -> Callable[[ChatRequest], str]:
     return answer
 
 
-class TestContract(ProposerContract):
+class TestContract(EngineContract):
     """It keeps what every engine keeps, with a scripted model."""
 
-    def make(self, problem: Problem, seed: int) -> Proposer:
-        return make_llm_proposer(problem, ScriptedChat(counting_script(seed)))
+    def make(self, problem: Problem, seed: int) -> Engine:
+        return make_llm_engine(problem, ScriptedChat(counting_script(seed)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.space import Candidate
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.engines.bayesian import log_improvement
 from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
 from falsifier.problem.problem import Problem
@@ -17,15 +17,15 @@ def bowl(problem: Problem, candidate: Candidate) -> float:
     return 1.0 + float(((problem.space.encode(candidate) - TARGET) ** 2).sum())
 
 
-def best_of(engine: str, *, simulations: int) -> float:
+def best_of(name: str, *, simulations: int) -> float:
     problem = lag_problem()
-    proposer = make_proposer(engine, problem, seed=1)
+    engine = make_engine(name, problem, seed=1)
     costs = []
     for _ in range(simulations):
-        (candidate,) = proposer.ask()
+        (candidate,) = engine.ask()
         cost = bowl(problem, candidate)
         costs.append(cost)
-        proposer.tell([simulated(problem, lambda y, cost=cost: cost)(candidate)])  # type: ignore[misc]
+        engine.tell([simulated(problem, lambda y, cost=cost: cost)(candidate)])  # type: ignore[misc]
     return min(costs)
 
 
@@ -48,20 +48,20 @@ def test_annealing_is_scipys_and_ends_its_thread() -> None:
 @pytest.mark.parametrize("engine", ["annealing", "cma", "bayesian", "optuna", "botorch"])
 def test_parallel_candidates_of_a_generation_differ(engine: str) -> None:
     need(engine)
-    keys = {c.key for c in make_proposer(engine, lag_problem(), seed=3).ask(12)}
+    keys = {c.key for c in make_engine(engine, lag_problem(), seed=3).ask(12)}
     assert len(keys) == 12
 
 
-@pytest.mark.parametrize("engine", ["optuna", "botorch"])
-def test_a_batch_spreads_around_a_known_valley(engine: str) -> None:
-    need(engine)
+@pytest.mark.parametrize("name", ["optuna", "botorch"])
+def test_a_batch_spreads_around_a_known_valley(name: str) -> None:
+    need(name)
     problem = lag_problem()
-    proposer = make_proposer(engine, problem, seed=2)
+    engine = make_engine(name, problem, seed=2)
     for _ in range(20):
-        (candidate,) = proposer.ask()
+        (candidate,) = engine.ask()
         cost = bowl(problem, candidate)
-        proposer.tell([simulated(problem, lambda y, cost=cost: cost)(candidate)])  # type: ignore[misc]
-    batch = np.array([problem.space.encode(c) for c in proposer.ask(4)])
+        engine.tell([simulated(problem, lambda y, cost=cost: cost)(candidate)])  # type: ignore[misc]
+    batch = np.array([problem.space.encode(c) for c in engine.ask(4)])
     distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
     assert distances.min() > 1e-2
 

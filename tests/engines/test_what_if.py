@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.engines.hybrid import Hybrid, Settings
-from falsifier.engines.llm import make_llm_proposer, preview_tool
-from falsifier.engines.protocol import Proposer
+from falsifier.engines.llm import make_llm_engine, preview_tool
+from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import evaluate
@@ -64,11 +64,11 @@ def hybrid(
     settings: Settings = EAGER,
     on_exchange: OnExchange = lambda _: None,
 ) -> Hybrid:
-    adviser = make_llm_proposer(problem(), chat, anonymous=anonymous, on_exchange=on_exchange)
+    adviser = make_llm_engine(problem(), chat, anonymous=anonymous, on_exchange=on_exchange)
     return Hybrid(problem(), seed=0, adviser=adviser, settings=settings, surrogate_settings=HASTY)
 
 
-def run(engine: Proposer, rounds: int = 14) -> list[str]:
+def run(engine: Engine, rounds: int = 14) -> list[str]:
     """Rationales of the candidates in order."""
     judge = simulated(problem(), lambda y: float(9 - y.max()))
     return [c.rationale for c in drive(engine, judge, rounds=rounds)]
@@ -223,7 +223,7 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
 def test_candidates_are_described_as_the_model_knows_them() -> None:
     made = problem().space.decode([0.5, 1.0, -1.0, 2.0])
     told = {
-        (variant, anonymous): make_llm_proposer(
+        (variant, anonymous): make_llm_engine(
             problem(), ScriptedChat([]), variant=variant, anonymous=anonymous
         ).describe(made)
         for variant in ("MP1", "MP5")
@@ -248,7 +248,7 @@ class TestResume:
         return call(1.0 + 0.01 * len(told)) if len(told) < 2 else candidates(1.5 + 0.01 * samples)
 
     def search(self, directory: Path, chat: Chat, simulations: int, tokens: int | None = None) -> Result:
-        def build(_: Problem, on_exchange: OnExchange) -> Proposer:
+        def build(_: Problem, on_exchange: OnExchange) -> Engine:
             return hybrid(chat, on_exchange=on_exchange)
 
         records = read_journal(directory)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.errors import MonitorError, SpecError
 from falsifier.evaluation.confirm import confirm, half_step, other_interface
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -51,7 +51,7 @@ def test_the_halved_step_starts_from_the_given_one_and_keeps_the_grid() -> None:
 
 def test_fragile_violations_do_not_count_and_are_listed_apart() -> None:
     problem = euler_problem("G[1,1] (x <= 0.65)")
-    result = falsify(problem, make_proposer("corners", problem, seed=0), budget=2)
+    result = falsify(problem, make_engine("corners", problem, seed=0), budget=2)
     assert result.status == "not falsified"
     assert result.counterexample is None
     assert result.refuted == ()

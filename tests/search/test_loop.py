@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.space import Candidate, ValueKind
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.errors import ChatError, JournalError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -35,7 +35,7 @@ def run(
     seed: int = 1,
 ) -> Result:
     def build(*_: object) -> object:
-        return make_proposer(engine, problem, seed=seed)
+        return make_engine(engine, problem, seed=seed)
 
     if directory is None:
         return search(problem, build, Budget(budget))  # type: ignore[arg-type]
@@ -101,7 +101,7 @@ def test_interruption_loses_nothing(tmp_path: Path) -> None:
     with open_journal(tmp_path) as journal:
         result = search(
             problem,
-            lambda *_: make_proposer("uniform", problem, seed=1),
+            lambda *_: make_engine("uniform", problem, seed=1),
             Budget(20),
             journal=journal,
             listeners=[interrupt],
@@ -159,23 +159,23 @@ def test_batches_are_told_in_the_order_of_asking() -> None:
     with ThreadPoolExecutor(3) as executor:
         parallel = search(
             problem,
-            lambda *_: make_proposer("uniform", problem, seed=5),
+            lambda *_: make_engine("uniform", problem, seed=5),
             Budget(10),
             batch=4,
             executor=executor,
         )
-    alone = search(problem, lambda *_: make_proposer("uniform", problem, seed=5), Budget(10), batch=4)
+    alone = search(problem, lambda *_: make_engine("uniform", problem, seed=5), Budget(10), batch=4)
     assert len(parallel.evaluations) == 10
     assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
 
 
 class Silent:
-    """A proposer whose language model gives up after two candidates."""
+    """An engine whose language model gives up after two candidates."""
 
     name = "silent"
 
     def __init__(self, problem: Problem) -> None:
-        self.inner = make_proposer("uniform", problem, seed=0)
+        self.inner = make_engine("uniform", problem, seed=0)
         self.asked = 0
 
     def ask(self, n: int = 1) -> list[Candidate]:

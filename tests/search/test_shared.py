@@ -12,7 +12,7 @@ import pytest
 
 from falsifier.campaigns.analysis import Run, load, load_run, main_table, read_published
 from falsifier.campaigns.analysis.tables import comparable
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.search.budget import Budget
@@ -48,7 +48,7 @@ def search(directory: Path, *, stop_at: int | None = None) -> list[Result]:
         write_manifest(directory, manifest(request, *PROBLEMS).model_dump(mode="json"))
         return search_together(
             PROBLEMS,
-            lambda p, _: make_proposer("uniform", p, seed=PROBLEMS.index(p)),
+            lambda p, _: make_engine("uniform", p, seed=PROBLEMS.index(p)),
             request.budget,
             journal=journal,
             records=read_journal(directory),

@@ -199,7 +199,7 @@ def _row(run: Run) -> dict[str, Any]:
         "robustness": run.verdict.robustness if run.verdict else None,
         "critical_time": run.verdict.critical_time if run.verdict else None,
         "simulation_seconds": run.spent.simulation_seconds,
-        "proposal_seconds": run.spent.proposal_seconds,
+        "engine_seconds": run.spent.engine_seconds,
         "seconds": run.spent.seconds,
         "tokens": run.spent.tokens,
         "cost": run.spent.cost,

@@ -17,7 +17,7 @@ def quality(arm: str, arms: Sequence[str], costs: Sequence[float], *, window: in
         costs: of each simulation.
         window: how many of its last proposals count.
     """
-    own = [i for i, proposer in enumerate(arms) if proposer == arm][-window:]
+    own = [i for i, engine in enumerate(arms) if engine == arm][-window:]
     if not own:
         return 0.5
     values = np.asarray(costs)

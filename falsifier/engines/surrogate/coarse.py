@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.stl.formula import (
     Always,
     And,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import margin
 from falsifier.stl.formula import Formula
 

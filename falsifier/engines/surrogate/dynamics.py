@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.grid import Trace
 from falsifier.engines.surrogate.settings import Settings
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import Envelope
 from falsifier.engines.surrogate.dynamics import (
     DeviationDynamics,

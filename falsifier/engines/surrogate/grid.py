@@ -7,7 +7,7 @@ import numpy as np
 
 from falsifier.core.space import Candidate, SearchSpace
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import Leaf
 from falsifier.engines.surrogate.coordinates import Coordinates
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
 from falsifier.engines.surrogate.grid import Grid, Trace, trace_of
 from falsifier.engines.surrogate.layout import Layout

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.signals import Interpolation, Signal, even_times
 from falsifier.core.space import Candidate, Freedom, InputRange, SearchSpace
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.grid import Grid
 
 

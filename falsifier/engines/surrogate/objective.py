@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from falsifier.core.space import SearchSpace
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import CoarseFormula, Leaf, coarse_formula
 from falsifier.engines.surrogate.coordinates import Coordinates
 from falsifier.engines.surrogate.grid import Grid

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.space import Candidate
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.corner_walk import CornerWalk, Levels
 from falsifier.engines.surrogate.arms import choose_arm, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
@@ -83,11 +83,11 @@ class Surrogate:
         self._suggested: list[Array] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Proposer.ask."""
+        """See Engine.ask."""
         return [self._ask_one() for _ in range(max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Proposer.tell."""
+        """See Engine.tell."""
         for evaluation in evaluations:
             told = self.problem.space.admit(evaluation.candidate)
             pending = self._pending.pop(told.key, None)

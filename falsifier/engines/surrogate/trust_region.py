@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.gaussian_process import fit_lengths, standardised
 from falsifier.engines.surrogate.settings import Settings
 

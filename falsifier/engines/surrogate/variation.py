@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate.layout import Layout
 
 # Steps of small changes, as shares of a range: coarse, medium and fine, equally often.

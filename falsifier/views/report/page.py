@@ -152,7 +152,7 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
         el("summary", heading),
         *(el("figure", panel_chart(panel, critical)) for panel in shown.panels),
         _facts(facts),
-        el("blockquote", rationale, title="the proposer's own words") if rationale else Html(""),
+        el("blockquote", rationale, title="the engine's own words") if rationale else Html(""),
         el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),
         open="" if opened else None,
     )

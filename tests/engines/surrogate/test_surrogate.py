@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.engines.surrogate import Settings, Surrogate
 from falsifier.engines.surrogate.arms import choose_arm, quality
 from falsifier.engines.surrogate.opening import opening
@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 
 
 def simulations_until_violation(problem: Problem, *, seed: int, budget: int) -> int | None:
-    proposer = make_proposer("surrogate", problem, seed=seed)
+    engine = make_engine("surrogate", problem, seed=seed)
     for count in range(1, budget + 1):
-        (candidate,) = proposer.ask()
+        (candidate,) = engine.ask()
         evaluation = evaluate(problem, candidate)
         if evaluation.violated:
             return count
-        proposer.tell([evaluation])
+        engine.tell([evaluation])
     return None
 
 
@@ -83,7 +83,7 @@ def test_uses_the_budget_up_without_a_false_claim_where_nothing_can_be_violated(
 
 def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
     problem = lag_problem("G[0,7] (F[0,3] (mode == 0))", free=True, parameters=0)
-    engine = make_proposer("surrogate", problem, seed=0)
+    engine = make_engine("surrogate", problem, seed=0)
     assert isinstance(engine, Surrogate)
     (candidate,) = engine.ask()
     engine.tell([evaluate(problem, candidate)])

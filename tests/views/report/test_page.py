@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.space import Candidate
-from falsifier.engines import make_proposer
+from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search.budget import Budget
 from falsifier.search.journal import open_journal, write_manifest
@@ -91,7 +91,7 @@ class Talker:
     name = "talker"
 
     def __init__(self) -> None:
-        self.inner = make_proposer("corners", easy(), seed=0)
+        self.inner = make_engine("corners", easy(), seed=0)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         return [replace(c, rationale=EVIL) for c in self.inner.ask(n)]
@@ -102,7 +102,7 @@ class Talker:
 
 @pytest.fixture(scope="module")
 def talked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run whose proposer's rationale is an attack."""
+    """A run whose engine's rationale is an attack."""
     directory = tmp_path_factory.mktemp("talked")
     request = RunRequest(problem=ProblemRequest(target="python:tests.problems:easy"), engine="corners")
     with open_journal(directory) as journal:

@@ -5,11 +5,11 @@ import warnings
 import numpy as np
 import optuna
 
-from falsifier.engines.box import BoxProposer, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.problem.problem import Problem
 
 
-class TPE(BoxProposer):
+class TPE(BoxEngine):
     """Optuna's TPE over all coordinates jointly, on a study that is kept in memory.
 
     Points that nobody has judged yet count as bad ones, so that a batch spreads. Evaluations of others'

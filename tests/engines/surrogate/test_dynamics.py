@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.arrays import Array
+from falsifier.engines.box import Array
 from falsifier.engines.surrogate import Settings
 from falsifier.engines.surrogate.coordinates import choose_coordinates
 from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics, StartState
