@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
 from falsifier.search.budget import Budget
-from falsifier.search.request import ModelRequest, ProblemRequest, RunRequest
+from falsifier.search.request import LLMSettings, ProblemRequest, RunRequest
 
 _HASH_DIGITS = 10
 
@@ -23,18 +23,18 @@ class Method:
 
     Attributes:
         engine: name of the engine; empty when a language model leads the search.
-        model: name of the language model, or empty.
+        llm: name of the language model, or empty.
         effort: its reasoning effort, or empty.
         variant: its prompt variant, or empty.
         parameterization: ``free`` or ``fixed``.
         profile: of the specs, or empty.
-        anonymous: whether the model is told neutral names only.
-        fallback: engine that goes on when the model gives up, or empty.
+        anonymous: whether the LLM is told neutral names only.
+        fallback: engine that goes on when the LLM gives up, or empty.
         together: whether several requirements took turns in one search.
     """
 
     engine: str = ""
-    model: str = ""
+    llm: str = ""
     effort: str = ""
     variant: str = ""
     parameterization: str = "fixed"
@@ -46,8 +46,8 @@ class Method:
     @property
     def label(self) -> str:
         """Name for people, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
-        model = " ".join(p for p in (self.model.rpartition("/")[2], self.effort, self.variant) if p)
-        name = " + ".join(p for p in (self.engine, model) if p) or DEFAULT_ENGINE
+        llm = " ".join(p for p in (self.llm.rpartition("/")[2], self.effort, self.variant) if p)
+        name = " + ".join(p for p in (self.engine, llm) if p) or DEFAULT_ENGINE
         apart = {
             self.parameterization: self.parameterization != "fixed",
             self.profile: bool(self.profile),
@@ -96,7 +96,7 @@ def cross(
     *,
     seeds: Iterable[int],
     budget: Budget,
-    asking: ModelRequest | None = None,
+    asking: LLMSettings | None = None,
 ) -> tuple[RunRequest, ...]:
     """All runs of problems x methods x seeds, in this order.
 
@@ -114,7 +114,7 @@ def cross(
                 update={"parameterization": method.parameterization, "profile": method.profile or None}
             ),
             engine=method.engine or None,
-            model=_model_request(method, asking),
+            llm=_llm_settings(method, asking),
             seed=seed,
             budget=budget,
             keep="best",
@@ -127,16 +127,16 @@ def cross(
 
 def method_of(request: RunRequest) -> Method:
     """Method of a run."""
-    problem, model = request.problem, request.model or ModelRequest(name="")
+    problem, llm = request.problem, request.llm or LLMSettings(name="")
     return Method(
-        engine=request.engine or ("" if request.model else DEFAULT_ENGINE),
-        model=model.name,
-        effort=model.effort or "",
-        variant=model.variant or "",
+        engine=request.engine or ("" if request.llm else DEFAULT_ENGINE),
+        llm=llm.name,
+        effort=llm.effort or "",
+        variant=llm.variant or "",
         parameterization=problem.parameterization,
         profile=problem.profile or "",
-        anonymous=model.anonymous,
-        fallback=model.fallback or "",
+        anonymous=llm.anonymous,
+        fallback=llm.fallback or "",
         together=len(request.together) > 1,
     )
 
@@ -149,14 +149,14 @@ def run_name(request: RunRequest) -> str:
     return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable).strip('-.')}-{digest}"
 
 
-def _model_request(method: Method, asking: ModelRequest | None) -> ModelRequest | None:
-    if not method.model:
+def _llm_settings(method: Method, asking: LLMSettings | None) -> LLMSettings | None:
+    if not method.llm:
         return None
     decided = {
-        "name": method.model,
+        "name": method.llm,
         "effort": method.effort or None,
         "variant": method.variant or None,
         "anonymous": method.anonymous,
         "fallback": method.fallback or None,
     }
-    return ModelRequest.model_validate((asking.model_dump() if asking else {}) | decided)
+    return LLMSettings.model_validate((asking.model_dump() if asking else {}) | decided)

@@ -209,7 +209,7 @@ def _check(requests: Iterable[RunRequest], *, local: bool) -> None:
     if local:
         from falsifier.llm.connect import preflight
 
-        for name, api_base in {(r.model.name, r.model.api_base) for r in requests if r.model is not None}:
+        for name, api_base in {(r.llm.name, r.llm.api_base) for r in requests if r.llm is not None}:
             preflight(name, api_base=api_base)
 
 

@@ -63,9 +63,9 @@ class Schedule:
 
     def _next(self) -> Task | None:
         """First waiting run that the limit on language models allows."""
-        asking = sum(task.request.model is not None for task in self._running.values())
+        asking = sum(task.request.llm is not None for task in self._running.values())
         for task in self._waiting:
-            if task.request.model is None or asking < self._calls:
+            if task.request.llm is None or asking < self._calls:
                 self._waiting.remove(task)
                 return task
         return None

@@ -33,7 +33,7 @@ _COMMANDS = {
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
     "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
     "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model; send nothing."),
-    "models": ("falsifier.cli.llm", "Check a language model: its name, its key and one small round trip."),
+    "llm": ("falsifier.cli.llm", "Check a language model: its name, its key and one small round trip."),
 }
 
 

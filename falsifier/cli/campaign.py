@@ -27,7 +27,7 @@ from falsifier.cli.options import asking, asking_options, json_option, quiet_opt
 from falsifier.problem.loading import bundled, find_spec, load_problems
 from falsifier.search.budget import Budget
 from falsifier.search.journal import write_whole
-from falsifier.search.request import Effort, ModelRequest, ProblemRequest
+from falsifier.search.request import Effort, LLMSettings, ProblemRequest
 from falsifier.views.campaign_text import campaign_display, overall_line
 
 # Time in s between two looks of falsifier watch.
@@ -56,8 +56,8 @@ table_option = click.option(
     "--parameterization", multiple=True, type=click.Choice(["fixed", "free"]), help="Default: fixed."
 )
 @click.option("--engine", "engines", multiple=True, metavar="NAME", help="Search engine. Repeatable.")
-@click.option("--model", "models", multiple=True, metavar="NAME[@EFFORT]", help="Language model. Repeatable.")
-@click.option("--effort", type=click.Choice(get_args(Effort)), help="Of models without one of their own.")
+@click.option("--llm", "llms", multiple=True, metavar="NAME[@EFFORT]", help="Language model. Repeatable.")
+@click.option("--effort", type=click.Choice(get_args(Effort)), help="Of llms without one of their own.")
 @click.option("--variant", "variants", multiple=True, metavar="MP1..", help="Prompt variant. Repeatable.")
 @asking_options
 @click.option("--runs", type=click.IntRange(1), default=10, show_default=True, help="Runs of each.")
@@ -85,7 +85,7 @@ def bench(
     profile: str | None,
     parameterization: tuple[str, ...],
     engines: tuple[str, ...],
-    models: tuple[str, ...],
+    llms: tuple[str, ...],
     effort: str | None,
     variants: tuple[str, ...],
     runs: int,
@@ -113,7 +113,7 @@ def bench(
 
     \b
     falsifier bench --suite arch-comp --engine surrogate --runs 10 --budget 1500 --jobs 2
-    falsifier bench AT CC --model openai/gpt-5-nano@low --variant MP1 --variant MP4 --table ablation
+    falsifier bench AT CC --llm openai/gpt-5-nano@low --variant MP1 --variant MP4 --table ablation
 
     Exit code 0: all runs finished; 3: some failed or were stopped.
     """
@@ -124,8 +124,8 @@ def bench(
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("give requirements or specs, or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
-    how = ModelRequest(name="", **asking(options, named=bool(models)))
-    methods = _methods(engines, models, effort, variants, parameterization or ("fixed",), profile or "", how)
+    how = LLMSettings(name="", **asking(options, named=bool(llms)))
+    methods = _methods(engines, llms, effort, variants, parameterization or ("fixed",), profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)
     request = CampaignRequest(
         runs=cross(
@@ -213,26 +213,26 @@ def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemRequ
 
 def _methods(
     engines: tuple[str, ...],
-    models: tuple[str, ...],
+    llms: tuple[str, ...],
     effort: str | None,
     variants: tuple[str, ...],
     parameterizations: tuple[str, ...],
     profile: str,
-    how: ModelRequest,
+    how: LLMSettings,
 ) -> list[Method]:
-    """Engines alone, or engines x models x variants where a model is named; each in all parameterizations."""
-    if not models and (variants or effort):
-        raise click.UsageError("--variant and --effort need --model NAME")
-    named = [_model(model, effort) for model in models] or [("", "")]
+    """Engines alone, or engines x LLMs x variants if an LLM is named; each in all parameterizations."""
+    if not llms and (variants or effort):
+        raise click.UsageError("--variant and --effort need --llm NAME")
+    named = [_llm(llm, effort) for llm in llms] or [("", "")]
     return [
-        Method(engine, model, level, variant, parameterization, profile, how.anonymous, how.fallback or "")
-        for engine, (model, level), variant, parameterization in product(
+        Method(engine, llm, level, variant, parameterization, profile, how.anonymous, how.fallback or "")
+        for engine, (llm, level), variant, parameterization in product(
             engines or ("",), named, variants or ("",), parameterizations
         )
     ]
 
 
-def _model(text: str, effort: str | None) -> tuple[str, str]:
+def _llm(text: str, effort: str | None) -> tuple[str, str]:
     """Name and effort of ``NAME`` or ``NAME@EFFORT``; other texts behind an @ belong to the name."""
     name, _, level = text.rpartition("@")
     return (name, level) if name and level in get_args(Effort) else (text, effort or "")

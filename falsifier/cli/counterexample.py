@@ -108,11 +108,11 @@ def shrink(
 
 @click.command()
 @_run_argument
-@click.option("--model", metavar="NAME", help="Language model that tells it in its own words, too.")
-@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
+@click.option("--llm", metavar="NAME", help="Language model that tells it in its own words, too.")
+@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the LLM.")
 @click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
 @json_option
-def explain(*, run: Path, model: str | None, effort: str | None, api_base: str | None, as_json: bool) -> None:
+def explain(*, run: Path, llm: str | None, effort: str | None, api_base: str | None, as_json: bool) -> None:
     """Say in a paragraph why a counterexample violates and which inputs it takes.
 
     RUN is a run directory or a counterexample file.
@@ -120,26 +120,26 @@ def explain(*, run: Path, model: str | None, effort: str | None, api_base: str |
     from falsifier.counterexamples.explain import explain as explain_violation
     from falsifier.counterexamples.explain import narrate
 
-    if model is None and (effort is not None or api_base is not None):
-        raise click.UsageError("--effort and --api-base need --model NAME")
+    if llm is None and (effort is not None or api_base is not None):
+        raise click.UsageError("--effort and --api-base need --llm NAME")
     stored = load(run)
     chat = None
-    if model is not None:
+    if llm is not None:
         from falsifier.llm.connect import connect
 
-        chat = connect(model, effort=effort, api_base=api_base)
+        chat = connect(llm, effort=effort, api_base=api_base)
     with _problem(stored) as problem:
         explanation = explain_violation(problem, _simulated(stored, problem))
     words = narrate(explanation, chat) if chat else None
     if as_json:
         effects = [{**asdict(e), "needed": e.needed} for e in explanation.effects]
-        told = {"model": model, "words": words} if words else None
+        told = {"llm": llm, "words": words} if words else None
         content = {"text": explanation.text, "effects": effects, "told_by": told}
         click.echo(json.dumps(content, indent=2))
         return
     click.echo(explanation.text)
     if words is not None:
-        click.echo(f"\nIn the words of {model}, which may be wrong:\n{words}")
+        click.echo(f"\nIn the words of {llm}, which may be wrong:\n{words}")
 
 
 @click.command()

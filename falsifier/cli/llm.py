@@ -1,4 +1,4 @@
-"""``falsifier prompt`` and ``falsifier models``: what a language model is sent, and whether it answers."""
+"""``falsifier prompt`` and ``falsifier llm``: what a language model is sent, and whether it answers."""
 
 import json
 from collections.abc import Sequence
@@ -79,18 +79,23 @@ def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
     return "\n\n".join(parts)
 
 
-@click.command()
-@click.argument("model")
-@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
-@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the model.")
-def models(*, model: str, api_base: str | None, effort: str | None) -> None:
-    """Check MODEL: its name, its key and one small round trip, and say what it costs."""
-    from falsifier.llm.connect import check_model
+@click.group()
+def llm() -> None:
+    """Language models."""
 
-    found = check_model(model, api_base=api_base, effort=effort)
+
+@llm.command()
+@click.argument("name")
+@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
+@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the LLM.")
+def check(*, name: str, api_base: str | None, effort: str | None) -> None:
+    """Check the language model NAME: its name, its key and one small round trip, and say what it costs."""
+    from falsifier.llm.connect import check_llm
+
+    found = check_llm(name, api_base=api_base, effort=effort)
     price = "unknown" if found.price is None else str(found.price)
     key = f"key from {found.key}" if found.key else "no key needed"
     click.echo(
-        f"{found.model}: answers ({found.reply!r} after {found.seconds:.1f} s, {found.usage.tokens} tokens); "
+        f"{found.llm}: answers ({found.reply!r} after {found.seconds:.1f} s, {found.usage.tokens} tokens); "
         f"{key}; price {price}"
     )

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from falsifier.search.request import ModelRequest, ProblemRequest
+from falsifier.search.request import LLMSettings, ProblemRequest
 
 # Options of litellm that would carry a key.
 _SECRET_OPTIONS = ("api_key", "headers", "extra_headers", "extra_body")
@@ -65,12 +65,12 @@ def problem_request(options: dict[str, Any]) -> ProblemRequest:
     return ProblemRequest(**{name: options.pop(name) for name in ProblemRequest.model_fields})
 
 
-def model_options(command: F) -> F:
+def llm_options(command: F) -> F:
     """Add everything that says which language model is asked, and how."""
     for decorate in reversed(
         (
             click.option(
-                "--model",
+                "--llm",
                 metavar="NAME",
                 help="Language model, e.g. openai/gpt-5-mini, ollama_chat/gpt-oss:20b.",
             ),
@@ -91,8 +91,8 @@ def asking_options(command: F) -> F:
         (
             click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
             click.option(
-                "--model-option",
-                "model_options",
+                "--llm-option",
+                "llm_options",
                 multiple=True,
                 metavar="NAME=VALUE",
                 help="Passed to the provider as it is, e.g. max_tokens=4000. Repeatable.",
@@ -102,8 +102,8 @@ def asking_options(command: F) -> F:
                 metavar="SENT:RECEIVED",
                 help="US dollars for 1000 tokens, where the price is not known.",
             ),
-            click.option("--anonymous", is_flag=True, help="Tell the model neutral names only."),
-            click.option("--fallback", metavar="ENGINE", help="Engine that goes on when the model gives up."),
+            click.option("--anonymous", is_flag=True, help="Tell the LLM neutral names only."),
+            click.option("--fallback", metavar="ENGINE", help="Engine that goes on when the LLM gives up."),
             click.option("--no-cache", is_flag=True, help="Ask anew where the reply is already on disk."),
         )
     ):
@@ -111,35 +111,35 @@ def asking_options(command: F) -> F:
     return command
 
 
-def model_request(options: dict[str, Any]) -> ModelRequest | None:
-    """Take the model's options out of a command's keyword arguments; None where no model is named."""
-    name = options.pop("model")
+def llm_settings(options: dict[str, Any]) -> LLMSettings | None:
+    """Take the LLM's options out of a command's keyword arguments; None where no LLM is named."""
+    name = options.pop("llm")
     asked = {key: options.pop(key) for key in ("effort", "variant")}
     asked |= asking(options, named=name is not None)
     if name is None:
-        _refuse_without_model(asked)
+        _refuse_without_llm(asked)
         return None
-    return ModelRequest(name=name, **asked)
+    return LLMSettings(name=name, **asked)
 
 
 def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
-    """Take the values of asking_options out of a command's keyword arguments, as fields of ModelRequest.
+    """Take the values of asking_options out of a command's keyword arguments, as fields of LLMSettings.
 
     Raises:
         click.UsageError: where one cannot be read, or one is given and no model is named.
     """
     given = {key: options.pop(key) for key in ("api_base", "fallback", "anonymous")}
-    price, pairs = options.pop("price"), options.pop("model_options")
+    price, pairs = options.pop("price"), options.pop("llm_options")
     cache = not options.pop("no_cache")
     if not named:
-        _refuse_without_model(given | {"price": price, "model_option": pairs})
-    return given | {"price": _price(price), "options": dict(map(_model_option, pairs)), "cache": cache}
+        _refuse_without_llm(given | {"price": price, "llm_option": pairs})
+    return given | {"price": _price(price), "options": dict(map(_llm_option, pairs)), "cache": cache}
 
 
-def _refuse_without_model(given: dict[str, Any]) -> None:
+def _refuse_without_llm(given: dict[str, Any]) -> None:
     stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value and key != "cache"]
     if stray:
-        raise click.UsageError(f"{', '.join(stray)}: only a language model takes this; you need --model NAME")
+        raise click.UsageError(f"{', '.join(stray)}: only a language model takes this; you need --llm NAME")
 
 
 def _price(text: str | None) -> tuple[float, float] | None:
@@ -152,12 +152,12 @@ def _price(text: str | None) -> tuple[float, float] | None:
     return sent, received
 
 
-def _model_option(text: str) -> tuple[str, str | float]:
+def _llm_option(text: str) -> tuple[str, str | float]:
     name, equals, value = text.partition("=")
     if not equals or not name:
-        raise click.UsageError(f"--model-option {text}: expected NAME=VALUE, for example max_tokens=4000")
+        raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
     if name in _SECRET_OPTIONS:  # options stand in the run's manifest
-        raise click.UsageError(f"--model-option {name}: keys are read from the environment only")
+        raise click.UsageError(f"--llm-option {name}: keys are read from the environment only")
     try:
         return name, int(value) if value.isdigit() else float(value)
     except ValueError:

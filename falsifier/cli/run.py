@@ -12,8 +12,8 @@ from falsifier.campaigns.directory import is_campaign
 from falsifier.cli.campaign import executor_option, jobs_option, resume_campaign
 from falsifier.cli.options import (
     json_option,
-    model_options,
-    model_request,
+    llm_options,
+    llm_settings,
     out_option,
     problem_options,
     problem_request,
@@ -34,7 +34,7 @@ _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified":
 @click.command()
 @problem_options
 @click.option("--engine", metavar="NAME", help="Search engine; see the README for the list.")
-@model_options
+@llm_options
 @click.option("--budget", type=int, default=100, show_default=True, help="Most simulations.")
 @click.option("--seconds", type=float, help="Most wall-clock seconds.")
 @click.option("--max-tokens", type=int, help="Most tokens of the language model.")
@@ -67,7 +67,7 @@ def run(
     request = RunRequest(
         problem=problem_request(options),
         engine=engine,
-        model=model_request(options),
+        llm=llm_settings(options),
         seed=seed,
         budget=Budget(budget, seconds, max_tokens, max_cost),
         jobs=jobs,

@@ -143,7 +143,7 @@ def narrate(explanation: Explanation, chat: "Chat") -> str:
     """Have a language model tell an engineer what happens, from the findings and the trajectory alone.
 
     Raises:
-        ChatError: when the model gives no answer.
+        ChatError: when the LLM gives no answer.
     """
     from falsifier.llm.conversation import converse
     from falsifier.llm.messages import ChatRequest, Message

@@ -15,7 +15,7 @@ class Advice:
 
     Attributes:
         candidates: at least one, as many as were asked for at most.
-        foresaw: whether the model asked for predictions, and got some, before it answered.
+        foresaw: whether the LLM asked for predictions, and got some, before it answered.
     """
 
     candidates: list[Candidate]
@@ -31,7 +31,7 @@ class Adviser(Protocol):
         ...
 
     def describe(self, candidate: Candidate) -> str:
-        """A candidate in a few words and by the names that the model knows, for notes."""
+        """A candidate in a few words and by the names that the LLM knows, for notes."""
         ...
 
     def propose(
@@ -47,7 +47,7 @@ class Adviser(Protocol):
         Args:
             count: how many are wanted.
             notes: lines that the question carries beside problem and history.
-            what_if: leave to ask for predictions in between; a model that takes no tools goes without.
+            what_if: leave to ask for predictions in between; an LLM that takes no tools goes without.
             dispensable: the search goes on where no answer comes. That none came is put on record then, so
                 that a resumed run goes on in the same way.
 

@@ -19,7 +19,7 @@ _SAMPLES = 512
 
 
 class ModelBased(BoxEngine):
-    """Sobol points first, then what a model of the costs so far makes most promising."""
+    """Sobol points first, then the most promising point of a Gaussian process of the costs so far."""
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)

@@ -1,10 +1,10 @@
 """A language model and the surrogate engine on one history.
 
-The model opens, because its first guess is worth more than any corner. Later it is asked for several
-candidates at a time; the surrogate ranks them before one is simulated, and breeds from them. The model may
+The LLM opens, because its first guess is worth more than any corner. Later it is asked for several
+candidates at a time; the surrogate ranks them before one is simulated, and breeds from them. The LLM may
 call the surrogate for predictions in its turn; one that does not hears them afterwards and may answer them
 once. When its candidates stop helping, the surrogate goes on alone, near the critical time; when the
-surrogate stops helping or errs, the model is asked again and told why.
+surrogate stops helping or errs, the LLM is asked again and told why.
 """
 
 from collections.abc import Sequence
@@ -21,23 +21,23 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 
-# The model's first inputs stand for the constants; one switching or stepping input still teaches more.
+# The LLM's first inputs stand for the constants; one switching or stepping input still teaches more.
 ADVISED = SurrogateSettings(constants=0, bangs=1, probes=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """When the model is asked and how its answers are used.
+    """When the LLM is asked and how its answers are used.
 
     Attributes:
         opening: candidates of the first answer, simulated as they come.
         count: candidates of a later answer.
         tries: how many of a later answer are simulated at most, the best ranked first.
         patience: simulations without a new best after which the other side gets its turn.
-        patience_growth: factor of the patience after each answer that helped nothing, so that a model that
+        patience_growth: factor of the patience after each answer that helped nothing, so that an LLM that
             does not help costs little.
-        misses: predicted violations in a row that did not happen after which the model is told so.
-        what_if: whether the model hears predictions of its candidates before one is simulated.
+        misses: predicted violations in a row that did not happen after which the LLM is told so.
+        what_if: whether the LLM hears predictions of its candidates before one is simulated.
         what_if_calls: how often it may call for them in a turn. Each call sends the whole conversation once
             more, so a turn costs four requests, rejected replies apart: enough to compare, correct and check.
     """
@@ -122,7 +122,7 @@ class Hybrid:
         return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
 
     def _reason_to_ask(self) -> str:
-        """Why the model should be asked now, as it is told; empty when it should not."""
+        """Why the LLM should be asked now, as it is told; empty when it should not."""
         if self._since_best < self._patience:
             return ""
         if self.surrogate.misses >= self.settings.misses:
@@ -138,7 +138,7 @@ class Hybrid:
         )
 
     def _consult(self, reason: str) -> None:
-        """Ask the model, rank its candidates, and queue the most promising ones."""
+        """Ask the LLM, rank its candidates, and queue the most promising ones."""
         settings = self.settings
         notes = [reason, *self._prediction_notes()]
         try:
@@ -193,7 +193,7 @@ class Hybrid:
         return [verdict.robustness for verdict in self.surrogate.foresee(candidates)] or None
 
     def _prediction_notes(self) -> list[str]:
-        """What the surrogate would simulate next, for the model."""
+        """What the surrogate would simulate next, for the LLM."""
         self._numeric = self._numeric or self.surrogate.ask(1)[0]
         predictions = self._trusted_predictions([self._numeric])
         if predictions is None:
@@ -202,7 +202,7 @@ class Hybrid:
         return [f"The numerical model expects robustness {predictions[0]:.4g} of its own best input: {told}."]
 
     def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
-        """Predictions of the model's candidates, one line each."""
+        """Predictions of the LLM's candidates, one line each."""
         lines = [
             f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; its predicted robustness is "
             f"{p:.4g}."

@@ -39,13 +39,13 @@ class LLMEngine:
 
     Args:
         view: the problem, without what simulates it.
-        chat: the model.
+        chat: the LLM.
         variant: what its prompts tell.
         on_exchange: called with every question and answer.
         sample: which of several runs with equal questions this is.
         prompt_tokens: most tokens of a prompt, by estimate.
-        anonymous: whether the model is told neutral names only.
-        fallback: who goes on when the model cannot be reached or gives no valid reply; None: the error ends
+        anonymous: whether the LLM is told neutral names only.
+        fallback: who goes on when the LLM cannot be reached or gives no valid reply; None: the error ends
             the run.
     """
 
@@ -76,7 +76,7 @@ class LLMEngine:
     @property
     def name(self) -> str:
         """Model and prompt variant."""
-        return f"{self._chat.model} {self._variant.name}"
+        return f"{self._chat.llm} {self._variant.name}"
 
     @property
     def handed_over(self) -> bool:
@@ -87,7 +87,7 @@ class LLMEngine:
         """Return n new candidates.
 
         Raises:
-            ChatError: when the model cannot be reached or gives no valid reply, and there is no fallback.
+            ChatError: when the LLM cannot be reached or gives no valid reply, and there is no fallback.
         """
         candidates: list[Candidate] = []
         while len(candidates) < n:
@@ -115,7 +115,7 @@ class LLMEngine:
         """Return up to ``count`` new candidates, at least one, of a single question; see Adviser.propose.
 
         Raises:
-            ChatError: when the model cannot be reached or gives no valid reply.
+            ChatError: when the LLM cannot be reached or gives no valid reply.
         """
         tool = None if what_if is None else self._tool(what_if)
         found = self._ask_once(count, notes, tool, dispensable=dispensable)
@@ -269,7 +269,7 @@ def _unchanged(value: T) -> T:
 
 def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
     return Exchange(
-        model=chat.model,
+        llm=chat.llm,
         messages=request.messages,
         parameters=dict(chat.parameters),
         reply=None,

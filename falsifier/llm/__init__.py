@@ -1,6 +1,6 @@
 """Language models: typed prompts, typed replies, and one narrow door to every provider.
 
-A chat is anything with ``complete(request) -> reply``. ``connect`` makes one from a model's name out of small
+A chat is anything with ``complete(request) -> reply``. ``connect`` makes one from an LLM's name out of small
 wrappers, each with one concern::
 
     CachedChat      valid replies on disk                         cache

@@ -27,9 +27,9 @@ class CachedChat:
     directory: Path
 
     @property
-    def model(self) -> str:
+    def llm(self) -> str:
         """See Chat."""
-        return self.inner.model
+        return self.inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -57,7 +57,7 @@ class CachedChat:
 
     def _path(self, request: ChatRequest) -> Path:
         asked = {
-            "model": self.model,
+            "llm": self.llm,
             "parameters": dict(self.parameters),
             "request": request.model_dump(mode="json"),
         }

@@ -1,4 +1,4 @@
-"""One request to a model behind litellm: sent once, answered, or failed with one of our own errors."""
+"""One request to an LLM behind litellm: sent once, answered, or failed with one of our own errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,11 +20,11 @@ _SECRET_OPTIONS = frozenset({"api_key", "extra_headers", "headers"})
 
 @dataclass(frozen=True)
 class LiteLLMChat:
-    """A model behind any provider that litellm speaks to.
+    """An LLM behind any provider that litellm speaks to.
 
     Attributes:
-        model: litellm's name, e.g. ``openai/gpt-5-mini``.
-        effort: reasoning effort, ``low``, ``medium`` or ``high``; None: the model's own.
+        llm: litellm's name, e.g. ``openai/gpt-5-mini``.
+        effort: reasoning effort, ``low``, ``medium`` or ``high``; None: the LLM's own.
         api_base: address of the server; None: the provider's own.
         options: further parameters of litellm's ``completion``, passed as they are.
         timeout: seconds to wait for an answer.
@@ -32,7 +32,7 @@ class LiteLLMChat:
         mode: how replies of a schema are asked for.
     """
 
-    model: str
+    llm: str
     effort: str | None = None
     api_base: str | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -54,15 +54,15 @@ class LiteLLMChat:
             TransientChatError: for what may be gone the next time.
             FormatUnsupportedError: when the server refuses this way of asking for JSON.
             ToolsUnsupportedError: when the server refuses the tools that are offered.
-            ChatError: for everything else, naming the model and the key's variable.
+            ChatError: for everything else, naming the LLM and the key's variable.
         """
-        key = find_key(self.model, api_base=self.api_base)
+        key = find_key(self.llm, api_base=self.api_base)
         litellm = load_litellm()
         arguments = self._arguments(request)
         started = perf_counter()
         try:
             response = litellm.completion(
-                model=self.model,
+                model=self.llm,
                 messages=[sent_message(m) for m in request.messages],
                 api_base=self.api_base,
                 timeout=self.timeout,
@@ -73,9 +73,9 @@ class LiteLLMChat:
         except Exception as error:  # litellm raises its own, its clients' and bare built-in errors alike
             raise classify(
                 error,
-                model=self.model,
+                llm=self.llm,
                 api_base=self.api_base,
-                key_variables=known(self.model).keys,
+                key_variables=known(self.llm).keys,
                 secrets=(key or "", *self._secret_options()),
                 offers_tools=bool(request.tools),
             ) from None
@@ -84,7 +84,7 @@ class LiteLLMChat:
         """Keep nothing."""
 
     def _options(self) -> dict[str, Any]:
-        return {**known(self.model).defaults, **self.options}
+        return {**known(self.llm).defaults, **self.options}
 
     def _secret_options(self) -> list[str]:
         found: list[str] = []
@@ -94,7 +94,7 @@ class LiteLLMChat:
         return found
 
     def _arguments(self, request: ChatRequest) -> dict[str, Any]:
-        provider = known(self.model)
+        provider = known(self.llm)
         arguments = self._options()
         if provider.openai_client:
             arguments["max_retries"] = 0  # the client would retry twice without saying so
@@ -125,7 +125,7 @@ class LiteLLMChat:
         refusal = _refusal(choice.message)
         refused = bool(refusal) and not choice.message.content
         text = storable(choice.message.content or refusal)
-        echo = known(self.model).echo
+        echo = known(self.llm).echo
         calls = calls_in(choice.message, echo)
         reported = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         return ChatReply(
@@ -147,13 +147,13 @@ class LiteLLMChat:
 
     def _believed(self, cost: float | None) -> float | None:
         """Reported cost where it can be true: another server under a known name has prices of its own."""
-        if known(self.model).local:
+        if known(self.llm).local:
             return cost
         return cost if cost and self.api_base is None else None
 
     def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """What was sent beside the messages; ``dropped`` names what this model does not take."""
-        dropped = dropped_parameters(self.model, arguments)
+        """What was sent beside the messages; ``dropped`` names what this LLM does not take."""
+        dropped = dropped_parameters(self.llm, arguments)
         own_names = {"reasoning_effort": "effort"}
         omitted = {own_names.get(name, name) for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
@@ -166,6 +166,6 @@ class LiteLLMChat:
 
 
 def _refusal(message: Any) -> str:
-    """Why the model declines, where it says so in a field of its own."""
+    """Why the LLM declines, where it says so in a field of its own."""
     fields = getattr(message, "provider_specific_fields", None) or {}
     return str(getattr(message, "refusal", None) or fields.get("refusal") or "")

@@ -1,4 +1,4 @@
-"""From a model's name to a chat that is patient, adapts to the server and never pays twice."""
+"""From an LLM's name to a chat that is patient, adapts to the server and never pays twice."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from falsifier.llm.usage import Price
 _HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word ready."),))
 
 
-def preflight(model: str, *, api_base: str | None = None) -> None:
-    """Check a model's name and key without sending anything.
+def preflight(llm: str, *, api_base: str | None = None) -> None:
+    """Check an LLM's name and key without sending anything.
 
     Raises:
         ChatError: naming what to set or to change.
     """
-    check_name(model)
-    find_key(model, api_base=api_base)
+    check_name(llm)
+    find_key(llm, api_base=api_base)
 
 
 def connect(
-    model: str,
+    llm: str,
     *,
     effort: str | None = None,
     api_base: str | None = None,
@@ -41,14 +41,14 @@ def connect(
     attempts: int = DEFAULT_ATTEMPTS,
     cache: Path | None = None,
 ) -> Chat:
-    """Chat with a model; nothing is sent yet.
+    """Chat with an LLM; nothing is sent yet.
 
     Args:
-        model: PROVIDER/MODEL as litellm names it.
+        llm: PROVIDER/MODEL as litellm names it.
         effort: reasoning effort, ``low``, ``medium`` or ``high``.
         api_base: address of the server, where it is not the provider's own.
         options: further parameters of litellm's ``completion``.
-        price: what the model costs; None: litellm's table.
+        price: what the LLM costs; None: litellm's table.
         timeout: seconds to wait for one answer.
         mode: how to ask for JSON at first; None: what the provider is known to take.
         gate: shared by all runs on the same account; None: one of its own.
@@ -58,26 +58,26 @@ def connect(
     Raises:
         ChatError: for an unknown provider or a missing key.
     """
-    preflight(model, api_base=api_base)
+    preflight(llm, api_base=api_base)
     client = LiteLLMChat(
-        model=model,
+        llm=llm,
         effort=effort,
         api_base=api_base,
         options=dict(options or {}),
         timeout=timeout,
         price=price,
-        mode=mode or first_mode(model),
+        mode=mode or first_mode(llm),
     )
     chat: Chat = RetryingChat(LadderChat(client), gate or Gate(), attempts=attempts)
     return chat if cache is None else CachedChat(chat, cache)
 
 
 @dataclass(frozen=True, slots=True)
-class ModelCheck:
+class LLMCheck:
     """What one small round trip showed.
 
     Attributes:
-        model: its name.
+        llm: its name.
         key: environment variable that held the key; empty where none is needed.
         price: what it costs; None where that is unknown.
         reply: what it answered.
@@ -85,7 +85,7 @@ class ModelCheck:
         seconds: how long it took.
     """
 
-    model: str
+    llm: str
     key: str
     price: Price | None
     reply: str
@@ -93,25 +93,25 @@ class ModelCheck:
     seconds: float
 
 
-def check_model(
-    model: str,
+def check_llm(
+    llm: str,
     *,
     effort: str | None = None,
     api_base: str | None = None,
     price: Price | None = None,
     timeout: float = 60.0,
-) -> ModelCheck:
-    """Check name and key, and ask the model for one word.
+) -> LLMCheck:
+    """Check name and key, and ask the LLM for one word.
 
     Raises:
         ChatError: naming what is wrong.
     """
-    chat = connect(model, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
+    chat = connect(llm, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
     reply = chat.complete(_HELLO)
-    listed = listed_price(model) if api_base is None else None
-    return ModelCheck(
-        model=model,
-        key=key_variable(model),
+    listed = listed_price(llm) if api_base is None else None
+    return LLMCheck(
+        llm=llm,
+        key=key_variable(llm),
         price=price or listed,
         reply=reply.text.strip(),
         usage=reply.usage,

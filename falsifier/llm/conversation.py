@@ -20,7 +20,7 @@ class RejectedReplyError(FalsifierError):
 
 
 class NoValidReplyError(ChatError):
-    """The model answered, but never validly."""
+    """The LLM answered, but never validly."""
 
 
 def converse(
@@ -32,7 +32,7 @@ def converse(
     reasks: int = MAX_REASKS,
     respond: Respond | None = None,
 ) -> T:
-    """Ask, answer what the model asks in its turn, and ask again with what was wrong.
+    """Ask, answer what the LLM asks in its turn, and ask again with what was wrong.
 
     Args:
         chat: who is asked.
@@ -63,7 +63,7 @@ def converse(
             following = _asked_again(request, reply, problem or "")
         on_exchange(
             Exchange(
-                model=chat.model,
+                llm=chat.llm,
                 messages=request.messages,
                 parameters=reply.parameters or dict(chat.parameters),
                 reply=reply,
@@ -78,7 +78,7 @@ def converse(
             problems.append(problem)
         request = following
     raise NoValidReplyError(
-        f"{chat.model} gave no valid reply in {reasks + 1} tries; what was wrong: {' | '.join(problems)}"
+        f"{chat.llm} gave no valid reply in {reasks + 1} tries; what was wrong: {' | '.join(problems)}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Neutral names: what a model is told says nothing of whose system it is."""
+"""Neutral names: what an LLM is told says nothing of whose system it is."""
 
 import re
 from collections.abc import Mapping

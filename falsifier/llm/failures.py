@@ -66,7 +66,7 @@ class FormatUnsupportedError(ChatError):
 
 
 class ToolsUnsupportedError(ChatError):
-    """The server, or the model behind it, takes no tools."""
+    """The server, or the LLM behind it, takes no tools."""
 
 
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
@@ -83,7 +83,7 @@ def redact(text: str, secrets: Iterable[str] = ()) -> str:
 def classify(
     error: Exception,
     *,
-    model: str,
+    llm: str,
     api_base: str | None,
     key_variables: tuple[str, ...],
     secrets: Iterable[str],
@@ -95,16 +95,16 @@ def classify(
     lowered = detail.lower()
     where = f" at {redact(api_base, secrets)}" if api_base else ""
     keys = " or ".join(key_variables) or "the API key"
-    address = server_address(model, api_base)
+    address = server_address(llm, api_base)
     if _is_refused(error) and _is_this_machine(address):
-        command = known(model).start
-        start = f"the server with '{command}'" if command else "the model's server"
+        command = known(llm).start
+        start = f"the server with '{command}'" if command else "the LLM's server"
         return TransientChatError(
-            f"{model}: nothing listens at {redact(address, secrets)}: start {start}, or correct --api-base",
+            f"{llm}: nothing listens at {redact(address, secrets)}: start {start}, or correct --api-base",
             patience=_LOCAL_PATIENCE,
         )
     if status in (401, 403):
-        return ChatError(f"{model}{where}: the provider refused the key; check {keys}. {detail}")
+        return ChatError(f"{llm}{where}: the provider refused the key; check {keys}. {detail}")
     speaks_of_format = any(word in lowered for word in _FORMAT_WORDS)
     # Some servers say so by 404 (no route with tools) or 500 (not started with them).
     if (
@@ -113,28 +113,28 @@ def classify(
         and any(word in lowered for word in _TOOL_WORDS)
         and not speaks_of_format
     ):
-        return ToolsUnsupportedError(f"{model}{where}: {detail}")
+        return ToolsUnsupportedError(f"{llm}{where}: {detail}")
     if status == 404:
         return ChatError(
-            f"{model}{where}: there is no such model or address; check the model's name, --api-base and "
+            f"{llm}{where}: there is no such LLM or address; check the LLM's name, --api-base and "
             f"whether the account behind {keys} may use it. {detail}"
         )
     if "contentpolicy" in lowered or "content_policy" in lowered or "content management policy" in lowered:
         return ChatError(
-            f"{model}{where}: the provider's content filter refused the prompt; try another model or "
+            f"{llm}{where}: the provider's content filter refused the prompt; try another LLM or "
             f"--anonymous. {detail}"
         )
     if "contextwindow" in lowered or "context_length" in lowered or "maximum context" in lowered:
-        return ChatError(f"{model}{where}: the prompt is too long; lower its token limit. {detail}")
+        return ChatError(f"{llm}{where}: the prompt is too long; lower its token limit. {detail}")
     if status == 429 and any(word in lowered for word in _QUOTA_WORDS):
-        return ChatError(f"{model}{where}: the account behind {keys} has no quota left. {detail}")
+        return ChatError(f"{llm}{where}: the account behind {keys} has no quota left. {detail}")
     if status in (400, 422, 501) and speaks_of_format:
-        return FormatUnsupportedError(f"{model}{where}: {detail}")
+        return FormatUnsupportedError(f"{llm}{where}: {detail}")
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or _is_connection(error):
         return TransientChatError(
-            f"{model}{where}: {detail}", retry_after=_retry_after(error), for_all=status == 429
+            f"{llm}{where}: {detail}", retry_after=_retry_after(error), for_all=status == 429
         )
-    return ChatError(f"{model}{where}: {detail}")
+    return ChatError(f"{llm}{where}: {detail}")
 
 
 def _first_lines(text: str) -> str:

@@ -32,9 +32,9 @@ class LadderChat:
         self._mode = self._mode_with_tools = self.inner.mode
 
     @property
-    def model(self) -> str:
+    def llm(self) -> str:
         """See Chat."""
-        return self.inner.model
+        return self.inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -73,13 +73,13 @@ class LadderChat:
 
     def _may_offer_tools(self) -> bool:
         if self._takes_tools is None:
-            self._takes_tools = may_take_tools(self.model, api_base=self.inner.api_base)
+            self._takes_tools = may_take_tools(self.llm, api_base=self.inner.api_base)
         return self._takes_tools
 
     def _refused_with_tools(self, request: ChatRequest) -> ChatRequest:
         """Remember that tools are refused; return the question without them."""
         if any(message.role == "tool" for message in request.messages):
-            raise ChatError(f"{self.model}: the server took a tool first and refused it in the same turn")
+            raise ChatError(f"{self.llm}: the server took a tool first and refused it in the same turn")
         self._takes_tools = False
         return _without_tools(request)
 

@@ -6,7 +6,7 @@ from typing import Any, Literal, Protocol
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 Role = Literal["system", "user", "assistant", "tool"]
-Source = Literal["model", "script", "recording", "cache"]
+Source = Literal["llm", "script", "recording", "cache"]
 
 
 class _Value(BaseModel):
@@ -25,7 +25,7 @@ _FIELDS_OF_TOOLS = frozenset({"tools", "tool_calls", "tool_call_id", "echo"})
 
 
 class Tool(_Value):
-    """Something that a model may call before it answers."""
+    """Something that an LLM may call before it answers."""
 
     name: str
     description: str
@@ -33,7 +33,7 @@ class Tool(_Value):
 
 
 class ToolCall(_MayUseTools):
-    """One call of a tool, as the model made it."""
+    """One call of a tool, as the LLM made it."""
 
     id: str
     name: str
@@ -99,19 +99,19 @@ class ChatReply(_MayUseTools):
     echo: dict[str, Any] = Field(
         default_factory=dict, description="What the provider wants back with the calls, such as thoughts."
     )
-    reasoning: str = Field(default="", description="What the provider shows of the model's reasoning.")
+    reasoning: str = Field(default="", description="What the provider shows of the LLM's reasoning.")
     finish_reason: str = "stop"
     usage: Usage = Usage()
     seconds: float = 0.0
     attempts: int = 1
     parameters: dict[str, Any] = Field(default_factory=dict, description="What was sent beside the messages.")
-    source: Source = "model"
+    source: Source = "llm"
 
 
 class Exchange(_Value):
     """One question, its answer, and what was wrong with it if it was rejected."""
 
-    model: str
+    llm: str
     messages: tuple[Message, ...]
     parameters: dict[str, Any] = Field(default_factory=dict)
     reply: ChatReply | None = Field(description="None when no answer came.")
@@ -132,8 +132,8 @@ class Chat(Protocol):
     """A language model, or something that wraps or plays one."""
 
     @property
-    def model(self) -> str:
-        """Name of the model, such as ``openai/gpt-5-mini``."""
+    def llm(self) -> str:
+        """Name of the LLM, such as ``openai/gpt-5-mini``."""
         ...
 
     @property

@@ -12,7 +12,7 @@ from falsifier.llm.modes import MODES, Mode
 
 @dataclass(frozen=True, slots=True)
 class Provider:
-    """One provider, by the first part of a model's name.
+    """One provider, by the first part of an LLM's name.
 
     Attributes:
         keys: environment variables that may hold its key, the usual one first; empty: none is needed.
@@ -82,18 +82,18 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
 NO_KEY = "none"
 
 
-def provider_of(model: str) -> str:
-    """First part of a model's name."""
-    return model.split("/", 1)[0]
+def provider_of(llm: str) -> str:
+    """First part of an LLM's name."""
+    return llm.split("/", 1)[0]
 
 
-def known(model: str) -> Provider:
-    """What is known of a model's provider; nothing special for an unlisted one."""
-    return PROVIDERS.get(provider_of(model), Provider())
+def known(llm: str) -> Provider:
+    """What is known of an LLM's provider; nothing special for an unlisted one."""
+    return PROVIDERS.get(provider_of(llm), Provider())
 
 
-def find_key(model: str, *, api_base: str | None = None) -> str | None:
-    """Key for a model from the environment.
+def find_key(llm: str, *, api_base: str | None = None) -> str | None:
+    """Key for an LLM from the environment.
 
     Returns:
         The key; a placeholder for the user's own server without one; None where none is needed.
@@ -101,36 +101,36 @@ def find_key(model: str, *, api_base: str | None = None) -> str | None:
     Raises:
         ChatSetupError: naming the variable to set.
     """
-    provider = known(model)
-    if variable := key_variable(model):
+    provider = known(llm)
+    if variable := key_variable(llm):
         return os.environ[variable].strip()
     if provider.openai_client and (api_base is not None or provider.local):
         return NO_KEY
     if provider.keys and api_base is None:
         variables = " or ".join(provider.keys)
-        raise ChatSetupError(f"{model}: no key: set {variables} in the environment")
+        raise ChatSetupError(f"{llm}: no key: set {variables} in the environment")
     return None
 
 
-def key_variable(model: str) -> str:
-    """Environment variable that holds a key for this model; empty where none does."""
-    return next((name for name in known(model).keys if os.environ.get(name, "").strip()), "")
+def key_variable(llm: str) -> str:
+    """Environment variable that holds a key for this LLM; empty where none does."""
+    return next((name for name in known(llm).keys if os.environ.get(name, "").strip()), "")
 
 
-def server_address(model: str, api_base: str | None) -> str:
-    """Where a model's server is: as stated, as the environment says, or its provider's usual place.
+def server_address(llm: str, api_base: str | None) -> str:
+    """Where an LLM's server is: as stated, as the environment says, or its provider's usual place.
 
     Empty where only the client library knows.
     """
-    variable = "OLLAMA" if known(model) is _OLLAMA else provider_of(model).upper()
-    return api_base or os.environ.get(f"{variable}_API_BASE", "") or known(model).address
+    variable = "OLLAMA" if known(llm) is _OLLAMA else provider_of(llm).upper()
+    return api_base or os.environ.get(f"{variable}_API_BASE", "") or known(llm).address
 
 
-def first_mode(model: str) -> Mode:
-    """How to ask this model for JSON at first.
+def first_mode(llm: str) -> Mode:
+    """How to ask this LLM for JSON at first.
 
     gpt-oss under Ollama and LM Studio answers with nothing or with garbled text when it is held to a grammar
     (ollama#11691, ollama#12470, lmstudio-bug-tracker#1555).
     """
-    grammar_is_broken = provider_of(model) in ("ollama", "ollama_chat", "lm_studio") and "gpt-oss" in model
+    grammar_is_broken = provider_of(llm) in ("ollama", "ollama_chat", "lm_studio") and "gpt-oss" in llm
     return "prompt" if grammar_is_broken else MODES[0]

@@ -44,11 +44,11 @@ class RecordedChat:
         self._lock = threading.Lock()
 
     @property
-    def model(self) -> str:
-        """Name of the model that is asked; without one, that this is a recording, and of what."""
+    def llm(self) -> str:
+        """Name of the LLM that is asked; without one, that this is a recording, and of what."""
         if self._inner is not None:
-            return self._inner.model
-        return f"recording of {self._exchanges[0].model}" if self._exchanges else "empty recording"
+            return self._inner.llm
+        return f"recording of {self._exchanges[0].llm}" if self._exchanges else "empty recording"
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -74,7 +74,7 @@ class RecordedChat:
                 raise ChatError(recorded.problem or "no answer came")
             return recorded.reply.model_copy(update={"source": "recording"})
         if self._inner is None:
-            raise ChatError(f"the {self.model} ends after {len(self._exchanges)} replies")
+            raise ChatError(f"the {self.llm} ends after {len(self._exchanges)} replies")
         return self._inner.complete(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:

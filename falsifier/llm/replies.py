@@ -172,7 +172,7 @@ class _Reply(BaseModel):
 
 
 class SignalReply(_Reply):
-    """One signal, as a model writes it."""
+    """One signal, as an LLM writes it."""
 
     name: str
     values: list[float | str]
@@ -181,7 +181,7 @@ class SignalReply(_Reply):
 
 
 class ParameterReply(_Reply):
-    """One parameter, as a model writes it."""
+    """One parameter, as an LLM writes it."""
 
     name: str
     value: float
@@ -216,7 +216,7 @@ def _storable(text: str) -> str:
 
 
 class CandidateReply(BaseModel):
-    """One candidate, as a model writes it; a superfluous remark is no reason to pay for another reply."""
+    """One candidate, as an LLM writes it; a superfluous remark is no reason to pay for another reply."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 

@@ -73,9 +73,9 @@ class RetryingChat:
     longest_delay: float = 120.0
 
     @property
-    def model(self) -> str:
+    def llm(self) -> str:
         """See Chat."""
-        return self.inner.model
+        return self.inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:

@@ -1,4 +1,4 @@
-"""A model that plays a script, for tests, tutorials and dry runs."""
+"""An LLM that plays a script, for tests, tutorials and dry runs."""
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -18,12 +18,12 @@ class ScriptedChat:
 
     Attributes:
         script: replies in order, or a function of the request.
-        model: the name that it bears.
+        llm: the name that it bears.
         requests: what it was asked, in order.
     """
 
     script: Script
-    model: str = "scripted"
+    llm: str = "scripted"
     requests: list[ChatRequest] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -62,5 +62,5 @@ class ScriptedChat:
         except StopIteration:
             asked = len(self.requests)
             raise ChatError(
-                f"the script of {self.model!r} has {asked - 1} replies, {asked} are asked for"
+                f"the script of {self.llm!r} has {asked - 1} replies, {asked} are asked for"
             ) from None

@@ -1,4 +1,4 @@
-"""What a model may call before it answers: predictions of candidates, without a simulation."""
+"""What an LLM may call before it answers: predictions of candidates, without a simulation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -50,8 +50,8 @@ class PredictionTool:
         what_if: whom to ask, and how often.
         form: of the candidates that are asked about.
         variant: what is told.
-        reveal: from a candidate as the model writes it to the real one.
-        hide: from a real verdict to one that the model may know.
+        reveal: from a candidate as the LLM writes it to the real one.
+        hide: from a real verdict to one that the LLM may know.
         answered: how many calls were answered.
     """
 
@@ -64,7 +64,7 @@ class PredictionTool:
 
     @property
     def offer(self) -> Tool:
-        """What the model is told of it."""
+        """What the LLM is told of it."""
         return what_if_tool(self.form.schema(), calls=self.what_if.calls)
 
     def respond(self, call: ToolCall) -> str:

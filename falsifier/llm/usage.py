@@ -12,7 +12,7 @@ _CHARACTERS_PER_TOKEN = 4
 
 @dataclass(frozen=True, slots=True)
 class Price:
-    """What a model costs.
+    """What an LLM costs.
 
     Attributes:
         prompt: US dollars for 1000 tokens sent.

@@ -331,7 +331,7 @@ class _Loop:
         """Count, record and announce an exchange with a language model.
 
         Raises:
-            ChatError: when the budget is used up while the model is in the middle of its turn.
+            ChatError: when the budget is used up while the LLM is in the middle of its turn.
         """
         usage = exchange.usage
         self.spent = self.spent.plus_call(
@@ -348,7 +348,7 @@ class _Loop:
         self.emit(Exchanged(exchange, self.clock()))
         goes_on = exchange.reply is not None and bool(exchange.reply.tool_calls)
         if goes_on and not replayed and (limit := self.budget.exceeded(self.clock())):
-            raise ChatError(f"the model's turn was cut short: {limit}")
+            raise ChatError(f"the LLM's turn was cut short: {limit}")
 
     def clock(self) -> Spent:
         """What is spent by now."""

@@ -89,7 +89,7 @@ class ProblemRequest(_Strict):
         return problem if self.parameterization == "free" else fixed_parameterization(problem)
 
 
-class ModelRequest(_Strict):
+class LLMSettings(_Strict):
     """Which language model, and how it is asked."""
 
     name: str
@@ -102,20 +102,20 @@ class ModelRequest(_Strict):
     price: tuple[float, float] | None = Field(
         default=None, description="US dollars for 1000 tokens sent and received; default: litellm's table."
     )
-    anonymous: bool = Field(default=False, description="The model is told neutral names only.")
-    fallback: str | None = Field(default=None, description="Engine that goes on when the model gives up.")
+    anonymous: bool = Field(default=False, description="The LLM is told neutral names only.")
+    fallback: str | None = Field(default=None, description="Engine that goes on when the LLM gives up.")
     cache: bool = Field(default=True, description="Equal questions are answered from disk.")
 
 
 class RunRequest(_Strict):
-    """One run. Naming a language model without an engine means that the model leads the search."""
+    """One run. Naming a language model without an engine means that it leads the search."""
 
     problem: ProblemRequest
     together: tuple[str, ...] = Field(
         default=(), description="Requirements that are falsified in one search."
     )
     engine: str | None = None
-    model: ModelRequest | None = None
+    llm: LLMSettings | None = None
     seed: int = Field(default=0, ge=0)
     budget: Budget = Budget()
     jobs: int = Field(default=1, ge=1)

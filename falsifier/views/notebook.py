@@ -125,7 +125,7 @@ class _Line:
                 self._note = note(event)
                 self._show(event.spent.simulations)
             case Exchanged():
-                self._note = f"model answered, {event.spent.tokens} tokens so far"
+                self._note = f"LLM answered, {event.spent.tokens} tokens so far"
                 self._show(event.spent.simulations)
             case Confirmed():
                 self._note = f"violation {event.confirmation.outcome}"

@@ -60,7 +60,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                 case Evaluated():
                     progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
-                    progress.update(task, note=f"model answered, {event.spent.tokens} tokens so far")
+                    progress.update(task, note=f"LLM answered, {event.spent.tokens} tokens so far")
                 case Confirmed():
                     c = event.confirmation
                     progress.console.print(

@@ -12,7 +12,7 @@ import pytest
 
 from falsifier.campaigns import CampaignRequest, Method, cross, run_campaign
 from falsifier.search.budget import Budget
-from falsifier.search.request import ModelRequest, ProblemRequest
+from falsifier.search.request import LLMSettings, ProblemRequest
 from tests.llm.server import Step, serving
 
 # Seconds that the server takes for an answer, and those that it asks to wait.
@@ -62,10 +62,10 @@ def campaign(server: str, *, runs: int, calls: int) -> CampaignRequest:
     return CampaignRequest(
         runs=cross(
             [ProblemRequest(target="python:tests.problems:impossible")],
-            [Method(model="openai/m", variant="MP4")],
+            [Method(llm="openai/m", variant="MP4")],
             seeds=range(runs),
             budget=Budget(1),
-            asking=ModelRequest(name="", api_base=server, cache=False),
+            asking=LLMSettings(name="", api_base=server, cache=False),
         ),
         calls=calls,
     )

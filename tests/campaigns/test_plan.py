@@ -3,24 +3,24 @@ import pytest
 from falsifier.campaigns import CampaignRequest, Method, cross, method_of, run_name, suite
 from falsifier.errors import SpecError
 from falsifier.search.budget import Budget
-from falsifier.search.request import ModelRequest, ProblemRequest
+from falsifier.search.request import LLMSettings, ProblemRequest
 
 AT1 = ProblemRequest(target="AT1")
 
 
 def test_a_campaign_is_requirements_times_methods_times_seeds() -> None:
-    methods = [Method("uniform"), Method(model="openai/gpt-5-nano", effort="low", variant="MP4")]
+    methods = [Method("uniform"), Method(llm="openai/gpt-5-nano", effort="low", variant="MP4")]
     runs = cross(
         [AT1, ProblemRequest(target="my.toml:R")],
         methods,
         seeds=range(3),
         budget=Budget(7),
-        asking=ModelRequest(name="", api_base="http://x", options={"top_p": 0.5}, cache=False),
+        asking=LLMSettings(name="", api_base="http://x", options={"top_p": 0.5}, cache=False),
     )
     assert len(runs) == 12
     assert [r.seed for r in runs[:3]] == [0, 1, 2]
     assert [method_of(r) for r in runs] == [m for _ in range(2) for m in methods for _ in range(3)]
-    assert runs[3].model == ModelRequest(
+    assert runs[3].llm == LLMSettings(
         name="openai/gpt-5-nano",
         effort="low",
         api_base="http://x",
@@ -49,7 +49,7 @@ def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     }
     assert len(others | {base}) == 7
     assert name(Method("uniform")) == base
-    unsafe = name(Method(model="ollama_chat/gpt-oss:20b", variant="MP4"))
+    unsafe = name(Method(llm="ollama_chat/gpt-oss:20b", variant="MP4"))
     assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
 
 
@@ -60,7 +60,7 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
         "hybrid + gpt-5-mini high MP4, instance2"
     )
-    named = Method(model="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
+    named = Method(llm="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
     assert named.label == "gpt-5-mini, neutral names, then surrogate"
     assert method_of(cross([AT1], [named], seeds=[0], budget=Budget(1))[0]) == named
 

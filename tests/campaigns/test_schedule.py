@@ -13,7 +13,7 @@ from falsifier.campaigns.work import Done, Missing, Task
 from falsifier.evaluation.workers import Workers
 from falsifier.search.budget import Budget
 from falsifier.search.manifest import manifest
-from falsifier.search.request import ModelRequest, ProblemRequest, RunRequest
+from falsifier.search.request import LLMSettings, ProblemRequest, RunRequest
 from tests.problems import easy
 
 PROBLEM = easy()
@@ -22,7 +22,7 @@ PROBLEM = easy()
 def task(name: str, model: str | None = None) -> Task:
     request = RunRequest(
         problem=ProblemRequest(target="python:tests.problems:easy"),
-        model=ModelRequest(name=model) if model else None,
+        llm=LLMSettings(name=model) if model else None,
         budget=Budget(1),
     )
     return Task(name, request, PROBLEM, manifest(request, PROBLEM), Path("unused"), "")
@@ -74,7 +74,7 @@ def test_runs_with_a_language_model_have_a_limit_of_their_own(monkeypatch: pytes
     together = Gauge()
 
     def work(task: Task, files: object) -> Done:
-        return asking(task, files) if task.request.model else together(task, files)
+        return asking(task, files) if task.request.llm else together(task, files)
 
     tasks = [task(f"m{i}", "openai/any") for i in range(6)] + [task(f"n{i}") for i in range(6)]
     done = run(tasks, threads(5), monkeypatch, work, calls=2)

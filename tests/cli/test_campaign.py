@@ -95,20 +95,18 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
             "--calls",
             "3",
         ),
-        *("--model", "openai/gpt-5-nano@low", "--model", "x/y@2024", "--effort", "high", "--price", "1:2"),
+        *("--llm", "openai/gpt-5-nano@low", "--llm", "x/y@2024", "--effort", "high", "--price", "1:2"),
         *("--variant", "MP1", "--variant", "MP4", "--anonymous"),
         *("--parameterization", "fixed", "--parameterization", "free"),
     )
     (request,) = seen
-    asked = {
-        (r.model.name, r.model.effort, r.model.variant, r.problem.parameterization) for r in request.runs
-    }
+    asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problem.parameterization) for r in request.runs}
     assert len(asked) == len(request.runs) == 8
     assert ("openai/gpt-5-nano", "low", "MP1", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 1500)}
     assert (request.limits.cost, request.calls) == (9.0, 3)
-    assert {(r.model.price, r.model.anonymous) for r in request.runs} == {((1.0, 2.0), True)}
+    assert {(r.llm.price, r.llm.anonymous) for r in request.runs} == {((1.0, 2.0), True)}
 
 
 def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,7 +132,7 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
         (["bench"], "give requirements or specs, or --suite"),
         (["bench", HARD, "--suite", "arch-comp"], "give requirements or specs, or --suite"),
         (["bench", HARD, "--instance", "2"], "--instance belongs to --suite"),
-        (["bench", HARD, "--variant", "MP1"], "--variant and --effort need --model"),
+        (["bench", HARD, "--variant", "MP1"], "--variant and --effort need --llm"),
         (["bench", HARD, "--anonymous"], "--anonymous: only a language model takes this"),
     ],
 )

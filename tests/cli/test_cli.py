@@ -64,7 +64,7 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
         (["run", "AT1", "--input", "throtle=0:100:7"], "did you mean 'throttle'"),
         (["run", "AT1", "--budget", "0"], "simulations must be positive"),
         (["run", "AT1", "--budget", "many"], "many"),
-        (["run", "AT1", "--effort", "low"], "need --model"),
+        (["run", "AT1", "--effort", "low"], "need --llm"),
         (["run", "gone.toml"], "no such spec file"),
         (["run", "gone.fmu", "--stl", "G (x >= 0)"], "there is no file gone.fmu"),
         (["run", "gone.fmu"], "--stl"),
@@ -75,13 +75,13 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
             ["run", "AT9"],
             "CC5, CCx, NNb, NNx\n",
         ),
-        (["run", "AT1", "--model", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
-        (["run", "AT1", "--model", "opnai/x", "--variant", "MP9"], "unknown prompt variant 'MP9'"),
-        (["run", "AT1", "--model", "opnai/x", "--fallback", "corner"], "did you mean 'corners'"),
-        (["run", "AT1", "--model", "opnai/x", "--fallback", "hybrid"], "asks no language model"),
-        (["run", "AT1", "--model", "gpt-5-mini"], "expected PROVIDER/MODEL"),
-        (["models", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
-        (["bench", "AT1", "--model", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
+        (["run", "AT1", "--llm", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
+        (["run", "AT1", "--llm", "opnai/x", "--variant", "MP9"], "unknown prompt variant 'MP9'"),
+        (["run", "AT1", "--llm", "opnai/x", "--fallback", "corner"], "did you mean 'corners'"),
+        (["run", "AT1", "--llm", "opnai/x", "--fallback", "hybrid"], "asks no language model"),
+        (["run", "AT1", "--llm", "gpt-5-mini"], "expected PROVIDER/MODEL"),
+        (["llm", "check", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
+        (["bench", "AT1", "--llm", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
         (["bench", "AT1", "--engine", "corner"], "did you mean 'corners'"),
     ],
 )
@@ -101,11 +101,11 @@ def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path)
     path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     wrong = {"--variant": "MP9", "--fallback": "corner", "--engine": "uniform"}
     for option, value in wrong.items():
-        done = falsifier("run", "AT1", "--model", "nobody/x", option, value, cwd=tmp_path, env=path)
+        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path)
         assert (done.code, "imported" in done.err) == (2, False), done.err
-    done = falsifier("run", "AT1", "--model", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path)
+    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path)
     assert (done.code, "OPENAI_API_KEY" in done.err) == (2, True), done.err
-    done = falsifier("run", "AT1", "--model", "nobody/x", cwd=tmp_path, env=path)
+    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path)
     assert (done.code, "imported" in done.err) == (3, True), done.err
 
 

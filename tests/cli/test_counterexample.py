@@ -67,7 +67,7 @@ def test_explain_names_what_it_takes(folder: Path) -> None:
 
 def test_a_language_models_words_are_marked_as_its_own(folder: Path) -> None:
     with serving(Step(content="Full throttle for 20 s.")) as server:
-        done = run(folder, "explain", "run", "--model", "openai/any", "--api-base", server.url)
+        done = run(folder, "explain", "run", "--llm", "openai/any", "--api-base", server.url)
     assert done.code == 0, done.err
     assert "It takes throttle" in done.out
     assert done.out.endswith("In the words of openai/any, which may be wrong:\nFull throttle for 20 s.\n")

@@ -77,7 +77,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
     assert result.spent.tokens == 240
     assert result.spent.reasoning_tokens == 24
     assert result.spent.cost is None
-    assert [e.reply.source for e in exchanges if e.reply] == ["model", "model"]
+    assert [e.reply.source for e in exchanges if e.reply] == ["llm", "llm"]
 
 
 def test_preview_is_what_is_sent() -> None:

@@ -30,7 +30,7 @@ def test_rejected_replies_are_not_kept(tmp_path: Path) -> None:
 
 
 def test_everything_that_is_sent_is_part_of_the_question(tmp_path: Path) -> None:
-    kept = CachedChat(ScriptedChat(["one"], model="a"), tmp_path)
+    kept = CachedChat(ScriptedChat(["one"], llm="a"), tmp_path)
     kept.accepted(QUESTION, kept.complete(QUESTION))
     others = [
         QUESTION.model_copy(update={"sample": 1}),
@@ -38,8 +38,8 @@ def test_everything_that_is_sent_is_part_of_the_question(tmp_path: Path) -> None
         QUESTION.model_copy(update={"messages": (Message(role="system", content="?"),)}),
     ]
     for other in others:
-        assert CachedChat(ScriptedChat(["two"], model="a"), tmp_path).complete(other).text == "two"
-    assert CachedChat(ScriptedChat(["two"], model="b"), tmp_path).complete(QUESTION).text == "two"
+        assert CachedChat(ScriptedChat(["two"], llm="a"), tmp_path).complete(other).text == "two"
+    assert CachedChat(ScriptedChat(["two"], llm="b"), tmp_path).complete(QUESTION).text == "two"
 
 
 def test_a_damaged_file_is_asked_for_again(tmp_path: Path) -> None:

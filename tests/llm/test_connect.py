@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.cache import CachedChat
-from falsifier.llm.connect import check_model, connect, preflight
+from falsifier.llm.connect import check_llm, connect, preflight
 from falsifier.llm.litellm_import import listed_price
 from falsifier.llm.providers import first_mode
 from falsifier.llm.retry import RetryingChat
@@ -77,7 +77,7 @@ def test_prices() -> None:
 
 def test_check_of_a_model() -> None:
     with serving(Step("ready")) as server:
-        found = check_model("openai/mine", api_base=server.url)
+        found = check_llm("openai/mine", api_base=server.url)
         assert found.reply == "ready"
         assert found.price is None
         assert found.key == ""
@@ -86,7 +86,7 @@ def test_check_of_a_model() -> None:
         assert "response_format" not in server.received[0].body
     with serving(Step("ready")) as server:
         price = Price(prompt=1.0, completion=2.0)
-        found = check_model("openai/mine", api_base=server.url, price=price)
+        found = check_llm("openai/mine", api_base=server.url, price=price)
         assert found.price == price
         assert found.usage.cost == pytest.approx(0.14)
 
@@ -95,6 +95,6 @@ def test_check_of_a_model_with_a_wrong_key(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setenv("OPENAI_API_KEY", "sk-wrong-key-wrong")
     with serving(Step(status=401, message="wrong key sk-wrong-key-wrong")) as server:
         with pytest.raises(ChatError, match="check OPENAI_API_KEY") as caught:
-            check_model("openai/mine", api_base=server.url)
+            check_llm("openai/mine", api_base=server.url)
         assert "sk-wrong" not in str(caught.value)
         assert len(server.received) == 1

@@ -41,7 +41,7 @@ def test_ordinary_words_stay() -> None:
 def test_no_secret_survives_classification() -> None:
     error = classify(
         RuntimeError("it was my-secret-key. Traceback (most recent call last): lots"),
-        model="openai/x",
+        llm="openai/x",
         api_base="http://me:my-secret-key@host/v1",
         key_variables=("OPENAI_API_KEY",),
         secrets=("my-secret-key",),
@@ -53,7 +53,7 @@ def test_no_secret_survives_classification() -> None:
 
 def test_content_filter_and_long_prompts_say_what_to_do() -> None:
     def told(text: str) -> str:
-        return str(classify(RuntimeError(text), model="m", api_base=None, key_variables=(), secrets=()))
+        return str(classify(RuntimeError(text), llm="m", api_base=None, key_variables=(), secrets=()))
 
     assert "--anonymous" in told("content_policy_violation")
     assert "too long" in told("this model's maximum context length is 8192 tokens")
@@ -83,7 +83,7 @@ def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: py
     def refused() -> str:
         told = classify(
             ConnectionRefusedError(111, "Connection refused"),
-            model="ollama_chat/m",
+            llm="ollama_chat/m",
             api_base=None,
             key_variables=(),
             secrets=(),
@@ -98,7 +98,7 @@ def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: py
 def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
     error = classify(
         ConnectionRefusedError(111, "Connection refused"),
-        model="openai/m",
+        llm="openai/m",
         api_base="http://elsewhere.example/v1",
         key_variables=(),
         secrets=(),

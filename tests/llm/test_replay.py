@@ -12,7 +12,7 @@ QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 
 def exchange(text: str | None) -> Exchange:
     return Exchange(
-        model="openai/m",
+        llm="openai/m",
         messages=QUESTION.messages,
         reply=None if text is None else ChatReply(text=text),
         problem="nobody there" if text is None else None,
@@ -20,7 +20,7 @@ def exchange(text: str | None) -> Exchange:
 
 
 def test_plays_what_was_recorded_and_then_asks() -> None:
-    inner = ScriptedChat(["three"], model="openai/m")
+    inner = ScriptedChat(["three"], llm="openai/m")
     chat = RecordedChat([exchange("one"), exchange("two")], inner)
     replies = [chat.complete(QUESTION) for _ in range(3)]
     assert [r.text for r in replies] == ["one", "two", "three"]
@@ -30,7 +30,7 @@ def test_plays_what_was_recorded_and_then_asks() -> None:
 
 def test_a_recording_alone_ends() -> None:
     chat = RecordedChat([exchange("one")])
-    assert chat.model == "recording of openai/m"
+    assert chat.llm == "recording of openai/m"
     chat.complete(QUESTION)
     with pytest.raises(ChatError, match="ends after 1 repl"):
         chat.complete(QUESTION)
@@ -57,7 +57,7 @@ def test_recordings_are_read_from_journals_and_from_plain_lines(tmp_path: Path) 
     assert read_recording(path) == [first, second]
 
 
-@pytest.mark.parametrize("content", ["{", '{"exchange": {"model": 3}}', None])
+@pytest.mark.parametrize("content", ["{", '{"exchange": {"llm": 3}}', None])
 def test_an_unreadable_recording_names_its_file(tmp_path: Path, content: str | None) -> None:
     path = tmp_path / "talk.jsonl"
     if content is not None:

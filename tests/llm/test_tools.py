@@ -108,7 +108,7 @@ class TestRecords:
     """Nothing changes for those that know no tools."""
 
     def test_without_tools_no_field_of_theirs_is_written(self) -> None:
-        exchange = Exchange(model="m", messages=PLAIN.messages, reply=ChatReply(text="3"))
+        exchange = Exchange(llm="m", messages=PLAIN.messages, reply=ChatReply(text="3"))
         assert "tool" not in exchange.model_dump_json() + PLAIN.model_dump_json()
         assert "echo" not in exchange.model_dump_json()
 
@@ -116,17 +116,6 @@ class TestRecords:
         _, _, exchanges = asked(calling(1, 2), "3")
         for exchange in exchanges:
             assert Exchange.model_validate_json(exchange.model_dump_json()) == exchange
-
-    def test_an_older_exchange_is_read(self) -> None:
-        old = {
-            "model": "m",
-            "messages": [{"role": "user", "content": "?"}],
-            "parameters": {},
-            "reply": {"text": "3", "usage": {"prompt_tokens": 1}, "source": "model"},
-            "problem": None,
-        }
-        reply = Exchange.model_validate(old).reply
-        assert reply is not None and reply.tool_calls == ()
 
 
 class TestWire:

@@ -22,7 +22,7 @@ def reply(
 
 
 def at1(server: str, *more: str) -> list[str]:
-    return ["run", "AT1", "--model", "openai/gpt-5-mini", "--variant", "MP4", "--api-base", server, *more]
+    return ["run", "AT1", "--llm", "openai/gpt-5-mini", "--variant", "MP4", "--api-base", server, *more]
 
 
 def test_two_replies_falsify_at1(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
         assert "OPENAI_API_KEY" in broken.out
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     with serving(reply(FULL)) as server:
-        manifest["request"]["model"]["api_base"] = server.url
+        manifest["request"]["llm"]["api_base"] = server.url
         (tmp_path / "run" / "manifest.json").write_text(json.dumps(manifest))
         resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
         assert len(server.received) == 1
@@ -100,7 +100,7 @@ def test_equal_questions_are_answered_from_disk(tmp_path: Path) -> None:
 
 
 def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> None:
-    done = falsifier("run", "AT1", "--model", "openai/gpt-5-mini", cwd=tmp_path)
+    done = falsifier("run", "AT1", "--llm", "openai/gpt-5-mini", cwd=tmp_path)
     assert done.code == 2
     assert "set OPENAI_API_KEY" in done.err
     assert not (tmp_path / "runs").exists()

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from falsifier.cli import cli
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "run-directory.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "run-directory.md"
 
 
 def schema(what: str) -> dict[str, object]:

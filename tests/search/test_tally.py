@@ -55,7 +55,7 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     tally = Tally()
     usage = Usage(prompt_tokens=100, completion_tokens=20, reasoning_tokens=5, cost=0.25)
     exchange = Exchange(
-        model="openai/any",
+        llm="openai/any",
         messages=(Message(role="user", content="?"),),
         reply=ChatReply(text="!", usage=usage),
     )

@@ -11,7 +11,7 @@
 from falsifier.campaigns.analysis.published import Published, Score, read_published
 from falsifier.campaigns.analysis.runs import Run, columns, frame, histories, load, load_run
 from falsifier.campaigns.analysis.statistics import Statistics, group, statistics
-from falsifier.campaigns.analysis.tables import Table, ablation_table, main_table, models_table
+from falsifier.campaigns.analysis.tables import Table, ablation_table, llms_table, main_table
 
 __all__ = [
     "Published",
@@ -24,10 +24,10 @@ __all__ = [
     "frame",
     "group",
     "histories",
+    "llms_table",
     "load",
     "load_run",
     "main_table",
-    "models_table",
     "read_published",
     "statistics",
 ]

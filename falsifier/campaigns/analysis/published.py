@@ -44,13 +44,13 @@ class Published:
     Attributes:
         columns: scores by requirement, by column: ``best``, ``uniform``, ``llm_falsifier``.
         ablation: the same by prompt variant.
-        models: the same by language model and effort, e.g. ``gpt-5-mini-high``.
+        llms: the same by language model and effort, e.g. ``gpt-5-mini-high``.
         sources: where each of them comes from, by column.
     """
 
     columns: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
     ablation: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
-    models: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
+    llms: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def scores(self, requirement: str) -> dict[str, Score]:
@@ -82,7 +82,7 @@ def read_published(path: Path | None = None) -> Published:
         return Published(
             {name: _scores(data[name], runs) for name in COLUMNS},
             {name: _scores(column, runs) for name, column in data.get("ablation", {}).items()},
-            {name: _scores(column, runs) for name, column in data.get("models", {}).items()},
+            {name: _scores(column, runs) for name, column in data.get("llms", {}).items()},
             {name: data[name].get("source", "") for name in COLUMNS},
         )
     except (OSError, tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:

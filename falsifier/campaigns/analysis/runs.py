@@ -187,7 +187,7 @@ def _row(run: Run) -> dict[str, Any]:
         "requirement": run.requirement,
         "method": run.method.label,
         "engine": run.method.engine,
-        "model": run.method.model,
+        "llm": run.method.llm,
         "effort": run.method.effort,
         "variant": run.method.variant,
         "parameterization": run.method.parameterization,

@@ -106,17 +106,17 @@ def ablation_table(runs: Iterable[Run], published: Published) -> Table:
     return _side_by_side("Prompt variants: FR / S", ours, theirs)
 
 
-def models_table(runs: Iterable[Run], published: Published) -> Table:
+def llms_table(runs: Iterable[Run], published: Published) -> Table:
     """Language models side by side, with the published columns."""
-    ours = _by_column(runs, lambda m: m.label if m.model else "")
-    theirs = {f"{name} published": scores for name, scores in published.models.items()}
+    ours = _by_column(runs, lambda m: m.label if m.llm else "")
+    theirs = {f"{name} published": scores for name, scores in published.llms.items()}
     return _side_by_side("Language models: FR / S", ours, theirs)
 
 
 TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
     "main": main_table,
     "ablation": ablation_table,
-    "models": models_table,
+    "llms": llms_table,
 }
 
 

@@ -1,4 +1,4 @@
-"""What the models predict: the outputs, or their differences where only those matter.
+"""What the learnt dynamics predict: the outputs, or their differences where only those matter.
 
 Positions of vehicles, levels of tanks, voltages against ground: a formula that compares such outputs only
 with each other does not care about a common shift, and neither does their dynamics, as a rule. Differences

@@ -1,4 +1,4 @@
-"""Models of the dynamics, learnt from whole trajectories.
+"""Dynamics learnt from whole trajectories.
 
 Both predict, cell by cell, the next state and the excess of each leaf's envelope from the present state and
 input (see ``grid.Trace``). The nonlinear one knows no history; the linear one follows deviations from the
@@ -33,7 +33,7 @@ class Prediction:
 
 
 class Dynamics(Protocol):
-    """A fitted model."""
+    """Fitted dynamics."""
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
         """Predict traces from inputs, shape (m, cells, inputs), and start states, shape (m, dimension)."""
@@ -130,7 +130,7 @@ class FourierDynamics:
 
 
 class DeviationDynamics:
-    """Linear model of deviations from the best trajectory, with lags."""
+    """Linear dynamics of deviations from the best trajectory, with lags."""
 
     def __init__(
         self, traces: Sequence[Trace], best: Sequence[int], settings: Settings, rng: np.random.Generator

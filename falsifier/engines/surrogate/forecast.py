@@ -1,4 +1,4 @@
-"""Both models together: which of them to plan on, and what their errors teach."""
+"""Both learnt dynamics together: which of them to plan on, and what their errors teach."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from falsifier.engines.surrogate.objective import LeafValues, Objective
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.stl import Verdict
 
-_MODELS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
+_KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
     "nonlinear": FourierDynamics,
     "linear": DeviationDynamics,
 }
@@ -27,11 +27,11 @@ _MODELS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forecast:
-    """What the models predicted of one point.
+    """What the dynamics predicted of one point.
 
     Attributes:
-        values: of the objective's leaves, by model name.
-        chosen: name of the model that was planned on.
+        values: of the objective's leaves, by name of the dynamics.
+        chosen: name of the dynamics that was planned on.
         cost: scaled robustness that it predicted.
     """
 
@@ -41,14 +41,14 @@ class Forecast:
 
 
 class Ensemble:
-    """Fits both models, prefers the one that erred less of late, and corrects each leaf by its recent errors.
+    """Fits both dynamics, prefers the ones that erred less recently, and corrects each leaf by its errors.
 
     The errors are honest ones: each prediction was made before the simulation.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._errors: dict[str, list[float]] = {name: [] for name in _MODELS}
+        self._errors: dict[str, list[float]] = {name: [] for name in _KINDS}
         self._deltas: list[list[float]] = []
         self._missed: list[bool] = []
         self._fitted: dict[str, Dynamics] = {}
@@ -57,13 +57,13 @@ class Ensemble:
 
     @property
     def is_trusted(self) -> bool:
-        """Whether the better model's recent predictions were good."""
+        """Whether the better dynamics' recent predictions were good."""
         errors = self._recent_errors()
         return bool(errors) and min(errors.values()) < self._settings.trusted_error
 
     @property
     def recent_error(self) -> float:
-        """Recent error of the model that was chosen last, as a share of the margins' spread; inf: unknown."""
+        """Recent error of the dynamics chosen last, as a share of the margins' spread; inf: unknown."""
         return self._recent_errors().get(self.chosen, float("inf"))
 
     @property
@@ -77,17 +77,17 @@ class Ensemble:
         return count
 
     def fit(self, traces: Sequence[Trace], best: Sequence[int], rng: np.random.Generator) -> None:
-        """Fit to traces, of which ``best`` are the least robust, and choose the model to plan on."""
-        self._fitted = {name: model(traces, best, self._settings, rng) for name, model in _MODELS.items()}
+        """Fit to traces, of which ``best`` are the least robust, and choose the dynamics to plan on."""
+        self._fitted = {name: kind(traces, best, self._settings, rng) for name, kind in _KINDS.items()}
         self._start = StartState(traces)
         errors = self._recent_errors()
         if errors and rng.random() >= self._settings.exploration:
             self.chosen = min(errors, key=lambda name: errors[name])
         else:
-            self.chosen = str(rng.choice(list(_MODELS)))
+            self.chosen = str(rng.choice(list(_KINDS)))
 
     def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
-        """Return what maps points, shape (m, d), to the costs that the chosen model predicts, shape (m,)."""
+        """Return what maps points, shape (m, d), to the costs that the dynamics predict, shape (m,)."""
         corrected = self._corrected(objective)
 
         def predict(points: Array) -> Array:
@@ -96,13 +96,13 @@ class Ensemble:
         return predict
 
     def verdicts(self, layout: Layout, objective: Objective, points: Array) -> list[Verdict]:
-        """Verdicts in the requirement's own unit that the chosen model predicts for points, shape (m, d)."""
+        """Verdicts in the requirement's own unit that the dynamics predict for points, shape (m, d)."""
         corrected = self._corrected(objective).plain()
         return corrected.verdicts(self._values(self.chosen, layout, corrected, points))
 
     def forecast(self, layout: Layout, objective: Objective, point: Array) -> Forecast:
-        """Predictions of both models for one point, to be judged when it was simulated."""
-        values = {name: self._values(name, layout, objective, point[None]) for name in _MODELS}
+        """Predictions of both dynamics for one point, to be judged when it was simulated."""
+        values = {name: self._values(name, layout, objective, point[None]) for name in _KINDS}
         cost = float(self._corrected(objective).cost(values[self.chosen])[0])
         return Forecast(values, self.chosen, cost)
 

@@ -1,4 +1,4 @@
-"""What was simulated so far, as the models and the planner need it."""
+"""What was simulated so far, as the dynamics and the planner need it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -104,7 +104,7 @@ class History:
         return np.array([s.point for s in self.samples]).reshape(-1, self.layout.dimension)
 
     def direct_costs(self) -> list[float]:
-        """What search without a model minimises: the robustness, or a relaxation that has a slope."""
+        """What the search without dynamics minimises: the robustness, or a relaxation that has a slope."""
         return [self.direct_cost(s) for s in self.samples]
 
     def direct_cost(self, sample: Sample) -> float:

@@ -123,7 +123,7 @@ def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
 
 
 def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tuple[Layout, ...]:
-    """Layouts of few coordinates for search without a model, to be taken in turn.
+    """Layouts of few coordinates for the search without dynamics, to be taken in turn.
 
     Args:
         space: what is searched.

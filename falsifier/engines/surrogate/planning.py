@@ -1,4 +1,4 @@
-"""Optimising predicted traces: evolution on the model, steps towards bounds, and a liking for extremes."""
+"""Optimising predicted traces: evolution, steps towards bounds, and a liking for extremes."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How the engine models, plans and chooses.
+    """How the engine learns, plans and chooses.
 
     Attributes:
         cells: grid cells over the formula's horizon, on which traces are predicted and free inputs are
@@ -14,17 +14,17 @@ class Settings:
         bangs: switching signals among the first simulations of a formula with nested windows.
         most_bangs: switching signals in all; when so many drawn at random did not violate, more will not.
         probes: stepping signals instead, where a violation needs several things at once: no extreme alone
-            can bring it about, and a model of the dynamics is worth more than two steady states.
+            can bring it about, and knowing the dynamics is worth more than two steady states.
         probe_pieces: levels that a stepping signal goes through.
-        features: random Fourier features of the nonlinear model; more changed nothing.
-        ridge: relative regularisation of the nonlinear model.
-        lags: of the linear model; hidden states need a few.
-        linear_ridge: relative regularisation of the linear model, small because deviations are small.
+        features: random Fourier features of the nonlinear dynamics; more changed nothing.
+        ridge: relative regularisation of the nonlinear dynamics.
+        lags: of the linear dynamics; hidden states need a few.
+        linear_ridge: relative regularisation of the linear dynamics, small because deviations are small.
         best_weight: extra weight of the best trajectories in the fits: accuracy is needed near them.
         best_count: how many trajectories count as the best.
         most_rows: rows of a regression at most; bounds the time of a proposal.
-        exploration: probability of taking the model with the larger recent error.
-        recent_errors: prediction errors that a model is judged by.
+        exploration: probability of taking the dynamics with the larger recent error.
+        recent_errors: prediction errors that dynamics are judged by.
         offset_window: last errors whose median corrects each predicate's margin.
         offset_limit: largest correction in standard deviations of the margin; without a limit early,
             wild errors lead the search away.
@@ -39,10 +39,10 @@ class Settings:
         stretches: factors of inner windows that a formula over discrete signals is relaxed with, because
             its robustness alone has no slope.
         bandit_window: proposals by which an arm is judged.
-        trial: proposals of the model during which it is preferred, so that it can learn.
-        trial_share: probability of the model during its trial.
-        trusted_error: recent prediction error in scaled units below which the model is trusted.
-        trusted_share: probability of a trusted model that no other arm outranks.
+        trial: proposals of the dynamics during which they are preferred, so that they can learn.
+        trial_share: probability of the dynamics during their trial.
+        trusted_error: recent prediction error in scaled units below which the dynamics are trusted.
+        trusted_share: probability of trusted dynamics that no other arm outranks.
         least_share: probability below which no arm falls.
         region_pieces: held pieces of a free input, region by region: most starts are coarse, for those end
             soon, and what needs more switches has its turn too.

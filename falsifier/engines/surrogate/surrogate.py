@@ -1,4 +1,4 @@
-"""The surrogate engine: learn the dynamics, plan on the model, simulate, refit."""
+"""The surrogate engine: learn the dynamics, plan on them, simulate, refit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Pending:
         why: rationale of the candidate.
         levels: of a constant extreme.
         region: which trust region proposed it.
-        forecast: what the models predicted.
+        forecast: what the dynamics predicted.
     """
 
     arm: str
@@ -51,7 +51,7 @@ class Pending:
 class Surrogate:
     """Learns the dynamics from whole trajectories and simulates what it predicts to be least robust.
 
-    Beside the model it searches directly, in a trust region, and gives whoever does better more turns.
+    Beside the dynamics it searches directly, in a trust region, and gives whoever does better more turns.
     """
 
     name = "surrogate"
@@ -65,7 +65,7 @@ class Surrogate:
         )
         self.layout = planning_layout(space, self.grid)
         self.history = History(problem, self.grid, self.layout, self.settings)
-        self.models = Ensemble(self.settings)
+        self.dynamics = Ensemble(self.settings)
         windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
         self._windows = windows
         self._opening = opening(
@@ -96,7 +96,7 @@ class Surrogate:
                 self._settle(pending, sample)
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
-        """Verdicts that the better model predicts for candidates, without a simulation.
+        """Verdicts that the better dynamics predict for candidates, without a simulation.
 
         Empty before two simulations are known. The values are in the requirement's own unit.
         """
@@ -105,12 +105,12 @@ class Surrogate:
         rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
         self._fit(rng)
         points = np.array([self.layout.point(c) for c in candidates])
-        return self.models.verdicts(self.layout, self.history.scaled_objective(), points)
+        return self.dynamics.verdicts(self.layout, self.history.scaled_objective(), points)
 
     @property
     def recent_error(self) -> float:
         """Error of recent predictions, as a share of the spread of the margins; inf while there are none."""
-        return self.models.recent_error
+        return self.dynamics.recent_error
 
     def suggest(self, candidates: Sequence[Candidate]) -> None:
         """Let the next plan breed from these candidates, too."""
@@ -119,12 +119,12 @@ class Surrogate:
     @property
     def is_trusted(self) -> bool:
         """Whether recent predictions were good."""
-        return self.models.is_trusted
+        return self.dynamics.is_trusted
 
     @property
     def misses(self) -> int:
         """How many of the last planned inputs in a row were predicted to violate and did not."""
-        return self.models.misses
+        return self.dynamics.misses
 
     def _settle(self, pending: Pending, sample: Sample | None) -> None:
         """Learn from the evaluation of a candidate of its own."""
@@ -138,7 +138,7 @@ class Surrogate:
             pending.region.tell(pending.point, cost)
         if pending.forecast is not None and sample is not None:
             objective = self.history.scaled_objective()
-            self.models.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
+            self.dynamics.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
@@ -165,21 +165,21 @@ class Surrogate:
             point = random_points(self.layout, rng, 1)[0]
             return Pending("random", self.layout, point, "random: too little is known yet")
         arm = self._choose_arm(rng)
-        if arm == "model":
+        if arm == "dynamics":
             return self._plan(rng)
         return self._switch(rng) if arm == "switching" else self._search(rng)
 
     def _choose_arm(self, rng: np.random.Generator) -> str:
         settings = self.settings
         if self._planned < settings.trial and rng.random() < settings.trial_share:
-            return "model"
+            return "dynamics"
         costs = self.history.direct_costs()
         arms = [s.arm for s in self.history.samples]
         may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
-        names = ("model", "region", "switching") if may_switch else ("model", "region")
+        names = ("dynamics", "region", "switching") if may_switch else ("dynamics", "region")
         qualities = {name: quality(name, arms, costs, window=settings.bandit_window) for name in names}
-        if self.models.is_trusted and qualities["model"] == max(qualities.values()):
-            return "model" if rng.random() < settings.trusted_share else "region"
+        if self.dynamics.is_trusted and qualities["dynamics"] == max(qualities.values()):
+            return "dynamics" if rng.random() < settings.trusted_share else "region"
         if self._region is None or self._region.is_starting:
             qualities["region"] = max(0.5, qualities["region"])
         return choose_arm(qualities, rng, least=settings.least_share)
@@ -198,7 +198,7 @@ class Surrogate:
         self._suggested = []
         asked = [p.point for p in self._pending.values() if p.layout is self.layout]
         result = plan(
-            self.models.predictor(self.layout, objective),
+            self.dynamics.predictor(self.layout, objective),
             self.layout,
             elites=np.concatenate([suggested, points[elites]]),
             critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
@@ -210,18 +210,18 @@ class Surrogate:
         self._planned += 1
         self._simple += result.is_simple
         why = (
-            f"the {self.models.chosen} model predicts a scaled robustness of {result.cost:.3g}"
+            f"the {self.dynamics.chosen} dynamics predict a scaled robustness of {result.cost:.3g}"
             f"{', preferred for its simple shape' if result.is_simple else ''}"
         )
-        forecast = self.models.forecast(self.layout, objective, result.point)
-        return Pending("model", self.layout, result.point, why, forecast=forecast)
+        forecast = self.dynamics.forecast(self.layout, objective, result.point)
+        return Pending("dynamics", self.layout, result.point, why, forecast=forecast)
 
     def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
-        """Fit the models; return the indices of the samples, the least robust first."""
+        """Fit the dynamics; return the indices of the samples, the least robust first."""
         samples = self.history.samples
         order = np.argsort(scaled_costs(samples, self.history.scaled_objective()), kind="stable")
         best = [int(i) for i in order[: self.settings.best_count]]
-        self.models.fit([s.trace for s in samples], best, rng)
+        self.dynamics.fit([s.trace for s in samples], best, rng)
         return order
 
     def _search(self, rng: np.random.Generator) -> Pending:

@@ -1,4 +1,4 @@
-"""Search without a model of the dynamics: Bayesian optimisation in a box that follows the best point."""
+"""Search without dynamics: Bayesian optimisation in a box that follows the best point."""
 
 import numpy as np
 

@@ -133,7 +133,7 @@ class ReplyBlock(_Block):
 
 
 class Prompt(_Block):
-    """Everything that one request tells a model."""
+    """Everything that one request tells an LLM."""
 
     variant: str
     task: TaskBlock

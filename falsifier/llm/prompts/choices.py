@@ -1,4 +1,4 @@
-"""What was chosen in a sample, as a model would write it itself."""
+"""What was chosen in a sample, as an LLM would write it itself."""
 
 from collections.abc import Iterator
 

@@ -7,7 +7,7 @@ from falsifier.llm.prompts.blocks import HistoryBlock, Prompt, SampleLines
 from falsifier.llm.prompts.render import render
 from falsifier.llm.usage import estimate_tokens
 
-# Fits models with a context of 32k tokens and leaves them room to think.
+# Fits LLMs with a context of 32k tokens and leaves them room to think.
 DEFAULT_PROMPT_TOKENS = 16_000
 
 _Change = Callable[[SampleLines], SampleLines | None]

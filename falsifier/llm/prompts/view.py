@@ -1,4 +1,4 @@
-"""What a language model may know of a problem: everything but the model itself."""
+"""What an LLM may know of a problem: everything but the model itself."""
 
 from dataclasses import dataclass
 

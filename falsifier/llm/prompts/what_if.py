@@ -1,4 +1,4 @@
-"""The tool by which a model asks what a candidate would give: what it is told of it, and the answers."""
+"""The tool by which an LLM asks what a candidate would give: what it is told of it, and the answers."""
 
 from collections.abc import Sequence
 from typing import Any

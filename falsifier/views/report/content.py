@@ -8,7 +8,7 @@ from pathlib import Path
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.core.space import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.search.request import ModelRequest, RunRequest
+from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.tally import read_candidate
 from falsifier.stl import parse
 from falsifier.views.panels import Panel, panels
@@ -121,7 +121,7 @@ def run_command(request: RunRequest) -> str:
         ("--stop-time", problem.stop_time),
         ("--output-interval", problem.output_interval),
         ("--engine", request.engine),
-        *(_model_options(request.model) if request.model else ()),
+        *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
         ("--seconds", budget.seconds),
         ("--max-tokens", budget.tokens),
@@ -135,16 +135,16 @@ def run_command(request: RunRequest) -> str:
     return shlex.join(words)
 
 
-def _model_options(model: ModelRequest) -> list[tuple[str, object]]:
+def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
     return [
-        ("--model", model.name),
-        ("--effort", model.effort),
-        ("--api-base", model.api_base),
-        ("--variant", model.variant),
-        *(("--model-option", f"{name}={value}") for name, value in model.options.items()),
-        ("--price", None if model.price is None else f"{model.price[0]:g}:{model.price[1]:g}"),
-        ("--anonymous", True if model.anonymous else None),
-        ("--fallback", model.fallback),
+        ("--llm", llm.name),
+        ("--effort", llm.effort),
+        ("--api-base", llm.api_base),
+        ("--variant", llm.variant),
+        *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
+        ("--price", None if llm.price is None else f"{llm.price[0]:g}:{llm.price[1]:g}"),
+        ("--anonymous", True if llm.anonymous else None),
+        ("--fallback", llm.fallback),
     ]
 
 

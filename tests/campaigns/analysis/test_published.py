@@ -32,7 +32,7 @@ def test_the_bundled_table_has_all_columns() -> None:
     assert published.scores("AT1")["best"] == Score(10, 10, 4.8, "FReaK")
     assert published.scores("AT1")["uniform"] == Score(0, 10, None)
     assert set(published.ablation) == {"MP1", "MP2", "MP3", "MP4"}
-    assert published.models["gpt-5-mini-high"]["NN"] == Score(1, 10, 97.0)
+    assert published.llms["gpt-5-mini-high"]["NN"] == Score(1, 10, 97.0)
     assert published.scores("my own") == {}
 
 

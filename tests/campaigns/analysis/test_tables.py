@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.campaigns import Method
-from falsifier.campaigns.analysis import Published, Run, Score, ablation_table, load, main_table, models_table
+from falsifier.campaigns.analysis import Published, Run, Score, ablation_table, llms_table, load, main_table
 from falsifier.campaigns.analysis.tables import Table, statistics_json
 
 PUBLISHED = Published(
@@ -63,7 +63,7 @@ def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
 
 
 def asked(run: Run, variant: str) -> Run:
-    return replace(run, method=Method(model="openai/gpt-5-nano", effort="low", variant=variant))
+    return replace(run, method=Method(llm="openai/gpt-5-nano", effort="low", variant=variant))
 
 
 def test_the_ablation_table_has_a_column_a_variant(runs: list[Run]) -> None:
@@ -75,7 +75,7 @@ def test_the_ablation_table_has_a_column_a_variant(runs: list[Run]) -> None:
 
 def test_the_models_table_has_a_column_a_model(runs: list[Run]) -> None:
     hard = [run for run in runs if run.requirement == "HARD"]
-    table = models_table([*(asked(run, variant="MP4") for run in hard[:2]), *hard[2:]], PUBLISHED)
+    table = llms_table([*(asked(run, variant="MP4") for run in hard[:2]), *hard[2:]], PUBLISHED)
     assert table.header == ("requirement", "gpt-5-nano low MP4", "gpt-5-mini-high published")
     assert table.rows == (("HARD", "2/2 / 1.5", "10/10 / 1.0"),)
 

@@ -33,13 +33,13 @@ def history_of(problem: Problem, *, simulations: int, seed: int = 0) -> History:
     return history
 
 
-@pytest.mark.parametrize("model", [FourierDynamics, DeviationDynamics])
-def test_models_predict_an_unseen_input_from_a_few_trajectories(
-    model: type[FourierDynamics] | type[DeviationDynamics],
+@pytest.mark.parametrize("dynamics", [FourierDynamics, DeviationDynamics])
+def test_dynamics_predict_an_unseen_input_from_a_few_trajectories(
+    dynamics: type[FourierDynamics] | type[DeviationDynamics],
 ) -> None:
     history = history_of(lag_problem(free=True, inputs=2), simulations=12)
     traces = [s.trace for s in history.samples]
-    fitted = model(traces[:-2], [0, 1, 2], SETTINGS, np.random.default_rng(0))
+    fitted = dynamics(traces[:-2], [0, 1, 2], SETTINGS, np.random.default_rng(0))
     start = StartState(traces[:-2])
     for trace in traces[-2:]:
         inputs = trace.inputs[None, :50]

@@ -16,7 +16,7 @@ from falsifier.search.budget import Budget
 from falsifier.search.journal import open_journal, write_manifest
 from falsifier.search.loop import search
 from falsifier.search.manifest import manifest
-from falsifier.search.request import ModelRequest, ProblemRequest, RunRequest
+from falsifier.search.request import LLMSettings, ProblemRequest, RunRequest
 from falsifier.views.report import html_report
 from falsifier.views.report.content import run_command
 from tests.problems import easy
@@ -211,11 +211,11 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
 
 
 def test_a_models_search_can_be_repeated_too() -> None:
-    model = ModelRequest(
+    model = LLMSettings(
         name="openai/gpt-5-mini", effort="high", variant="MP4", price=(0.25, 2), anonymous=True
     )
-    request = RunRequest(problem=ProblemRequest(target="AT1"), model=model)
+    request = RunRequest(problem=ProblemRequest(target="AT1"), llm=model)
     assert run_command(request) == (
-        "falsifier run AT1 --model openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
+        "falsifier run AT1 --llm openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
         "--budget 100 --seed 0"
     )
