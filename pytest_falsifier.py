@@ -162,9 +162,9 @@ def _setting(config: pytest.Config, name: str) -> Any:
 
 def _message(item: pytest.Item, checked: "Checked") -> str:
     """Counterexample, its picture and the command that runs it again."""
+    from falsifier.core.words import candidate_lines
     from falsifier.counterexamples.explain import explain
     from falsifier.views.plotting import plot_evaluation, save_figure
-    from falsifier.views.text import candidate_lines
 
     problem, found = checked.problem, checked.counterexample
     assert found is not None
@@ -178,7 +178,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
         f"{problem.name} is violated: {how}",
         f"  requirement    {problem.requirement.formula}",
         f"  confirmed      {found.reason}",
-        *(f"  {line}" for line in candidate_lines(problem, found.evaluation.candidate)),
+        *(f"  {line}" for line in candidate_lines(found.evaluation.candidate, problem.space)),
         f"  picture        {_short(picture)}",
     ]
     if checked.file is not None:

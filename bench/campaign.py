@@ -16,7 +16,7 @@ from typing import Any
 from falsifier.campaigns import CampaignRequest, Method, cross, suite
 from falsifier.campaigns.analysis import load, load_run
 from falsifier.campaigns.directory import CampaignRecord, run_directory, write_campaign
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate

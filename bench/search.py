@@ -26,7 +26,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem

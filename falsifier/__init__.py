@@ -24,6 +24,7 @@ The house has twelve rooms. Each imports from itself and from those above it, ne
     cli/              the command line
 """
 
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -31,7 +32,7 @@ __version__ = "0.1.0"
 
 _EXPORTS = {
     "Budget": "falsifier.search.budget",
-    "Candidate": "falsifier.core.space",
+    "Candidate": "falsifier.core.candidate",
     "Evaluation": "falsifier.evaluation.evaluate",
     "FalsifierError": "falsifier.errors",
     "FunctionModel": "falsifier.core.model",
@@ -46,6 +47,17 @@ _EXPORTS = {
 }
 
 __all__ = [*_EXPORTS, "__version__"]
+
+
+def _register_formatters() -> None:
+    """Have a notebook show the values of this package."""
+    from falsifier.views.notebook import register
+
+    register()
+
+
+if "IPython" in sys.modules:
+    _register_formatters()
 
 
 def __getattr__(name: str) -> Any:

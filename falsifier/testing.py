@@ -12,9 +12,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, Requirement

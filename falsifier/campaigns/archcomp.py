@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import Run, load
 from falsifier.campaigns.suites import bundled_target
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem

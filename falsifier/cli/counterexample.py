@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 import click
 
 from falsifier.cli.options import json_option
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
+from falsifier.core.words import candidate_lines, in_one_line
 from falsifier.counterexamples.store import (
     Database,
     Replayed,
@@ -28,7 +29,7 @@ from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm, other_interface
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.views.text import candidate_lines, signal_text, warn
+from falsifier.views.text import warn
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -73,7 +74,7 @@ def shrink(
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.counterexamples.export import write_counterexample
+    from falsifier.cli.files import write_counterexample
     from falsifier.counterexamples.shrink import shrink as shrink_violation
 
     stored = load(run)
@@ -101,7 +102,7 @@ def shrink(
         return
     click.echo(f"{problem.name}: shrunk with {shrunk.simulations} simulations, {end}")
     click.echo(f"  {confirmation.outcome:<13}  {confirmation.reason}")
-    for line in candidate_lines(problem, confirmation.evaluation.candidate):
+    for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
         click.echo(f"  {line}")
     click.echo(f"  files          {', '.join(map(str, written))}")
 
@@ -234,10 +235,7 @@ def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
 
 
 def _inputs_line(evaluation: Evaluation) -> str:
-    candidate = evaluation.candidate
-    parts = [f"{name} {signal_text(signal)}" for name, signal in candidate.signals.items()]
-    parts += [f"{name} = {value:.10g}" for name, value in candidate.parameters.items()]
-    return f"{'; '.join(parts)}; robustness {evaluation.robustness:+.6g}"
+    return f"{in_one_line(evaluation.candidate)}; robustness {evaluation.robustness:+.6g}"
 
 
 def _replayed_json(replayed: Replayed) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import click
 
 from falsifier.campaigns.directory import is_campaign
 from falsifier.cli.campaign import executor_option, jobs_option, resume_campaign
+from falsifier.cli.files import write_counterexample
 from falsifier.cli.options import (
     json_option,
     llm_options,
@@ -19,13 +20,13 @@ from falsifier.cli.options import (
     problem_request,
     quiet_option,
 )
-from falsifier.counterexamples.export import write_counterexample
 from falsifier.search.budget import Budget
 from falsifier.search.manifest import recorded_request
 from falsifier.search.request import RunRequest
 from falsifier.search.result import Result
 from falsifier.search.run import execute, execute_all, resume_run
-from falsifier.views.text import counterexample_name, make_display, result_json, result_text, results_text
+from falsifier.views.progress import make_display
+from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 
 # Where several requirements end differently, the first of these that occurs.
 _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}

@@ -1,18 +1,18 @@
-"""Search spaces and candidates.
+"""Search spaces: what may be varied, by name, with ranges and parameterizations.
 
-A candidate is the same thing whoever proposed it: input signals and parameter values by name. Where every
-parameterization is fixed, the search space is also a named box, and ``decode``/``encode`` go back and forth
-between candidates and vectors.
+Where every parameterization is fixed, the search space is also a named box, and ``decode``/``encode`` go back
+and forth between candidates and vectors.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import ceil, floor
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
 from falsifier.errors import CandidateError, did_you_mean
 
@@ -112,61 +112,6 @@ class Dimension:
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
-    """One proposed simulation.
-
-    Attributes:
-        signals: input signals by name.
-        parameters: parameter values by name.
-        origin: who proposed it.
-        rationale: why, in the engine's words.
-    """
-
-    signals: Mapping[str, Signal] = field(default_factory=dict)
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    origin: str = ""
-    rationale: str = ""
-
-    @property
-    def key(self) -> tuple[object, ...]:
-        """What is simulated, without origin and rationale: equal keys are equal simulations."""
-        return (
-            tuple(sorted(self.signals.items(), key=lambda kv: kv[0])),
-            tuple(sorted(self.parameters.items())),
-        )
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain form for journals and exports."""
-        return {
-            "signals": {
-                name: {
-                    "times": list(s.times),
-                    "values": list(s.values),
-                    "interpolation": s.interpolation,
-                    "hold": s.hold,
-                }
-                for name, s in self.signals.items()
-            },
-            "parameters": dict(self.parameters),
-            "origin": self.origin,
-            "rationale": self.rationale,
-        }
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> "Candidate":
-        """Candidate from its plain form."""
-        return cls(
-            {
-                name: Signal(tuple(s["times"]), tuple(s["values"]), s["interpolation"], s.get("hold"))
-                for name, s in data.get("signals", {}).items()
-            },
-            {name: float(v) for name, v in data.get("parameters", {}).items()},
-            data.get("origin", ""),
-            data.get("rationale", ""),
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class SearchSpace:
     """Everything that may be varied.
 
@@ -189,9 +134,7 @@ class SearchSpace:
     def dimensions(self) -> tuple[Dimension, ...]:
         """Coordinates of the vector form: control points input by input in time order, then parameters."""
         points = (
-            Dimension(r.name, t, r.low, r.high, r.unit)
-            for r in self.inputs
-            for t in even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+            Dimension(r.name, t, r.low, r.high, r.unit) for r in self.inputs for t in self.fixed_times(r)
         )
         return (*points, *(Dimension(p.name, None, p.low, p.high, p.unit) for p in self.parameters))
 
@@ -199,6 +142,14 @@ class SearchSpace:
     def bounds(self) -> NDArray[np.float64]:
         """Bounds of the vector form, shape (d, 2)."""
         return np.array([(d.low, d.high) for d in self.dimensions], dtype=np.float64).reshape(-1, 2)
+
+    def fixed_times(self, r: InputRange) -> tuple[float, ...]:
+        """Times in s of the control points that the spec gives an input."""
+        return even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+
+    def is_fixed(self, r: InputRange, signal: Signal) -> bool:
+        """Whether a signal has the control points of the spec, rather than some of an engine's choice."""
+        return signal.interpolation == r.interpolation and signal.times == self.fixed_times(r)
 
     def decode(
         self, vector: Sequence[float] | NDArray[np.float64], *, origin: str = "", rationale: str = ""
@@ -230,7 +181,7 @@ class SearchSpace:
         parts: list[float] = []
         for r in self.inputs:
             signal = candidate.signals[r.name]
-            times = even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+            times = self.fixed_times(r)
             if signal.times == times:
                 parts.extend(signal.values)
             else:
@@ -264,7 +215,7 @@ class SearchSpace:
         return replace(candidate, signals=signals, parameters=parameters)
 
     def _admit_signal(self, r: InputRange, signal: Signal) -> Signal:
-        fixed = even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
+        fixed = self.fixed_times(r)
         is_fixed = signal.interpolation == r.interpolation and (
             signal.times == fixed or _are_close(signal.times, fixed, 1e-9 * max(self.stop_time, 1.0))
         )

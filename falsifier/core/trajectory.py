@@ -64,11 +64,6 @@ class Trajectory:
         k = self.index(time)
         return {name: float(column[k]) for name, column in self.columns.items()}
 
-    def _repr_html_(self) -> str:
-        from falsifier.views.notebook import trajectory_html
-
-        return trajectory_html(self)
-
     def with_columns(
         self, columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str] | None = None
     ) -> "Trajectory":

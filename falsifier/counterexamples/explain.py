@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, InputRange, ParameterRange
+from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.words import candidate_lines, listed
 from falsifier.counterexamples.shrink import constant_signal, stretches, with_signal
 from falsifier.counterexamples.simplicity import rest_value
 from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.stl import Diagnosis, in_words
-from falsifier.views.text import candidate_lines
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Chat
@@ -97,18 +98,18 @@ class Explanation:
         whole = [e for e in self.effects if e.span is None]
         needed = sorted((e for e in whole if e.needed), key=lambda e: -(e.robustness or 0.0))
         if needed:
-            yield f"It takes {_listed([self._part(e) for e in needed])}."
+            yield f"It takes {listed([self._part(e) for e in needed])}."
         idle = [e for e in whole if e.robustness is not None and not e.needed]
         if idle:
-            yield f"It does not need {_listed([self._without(e) for e in idle])}."
+            yield f"It does not need {listed([self._without(e) for e in idle])}."
         for name in dict.fromkeys(e.name for e in needed):
             spans = [e for e in self.effects if e.name == name and e.span is not None]
             decisive = [e for e in spans if e.needed]
             if decisive and len(decisive) < len(spans):
-                yield f"Of {name}, what counts is {_listed([self._stretch(e) for e in decisive])}."
+                yield f"Of {name}, what counts is {listed([self._stretch(e) for e in decisive])}."
         failed = [e.name for e in whole if e.robustness is None]
         if failed:
-            yield f"Without {_listed(failed)} the simulation fails."
+            yield f"Without {listed(failed)} the simulation fails."
 
     def _part(self, effect: Effect) -> str:
         return f"{effect.part} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
@@ -181,7 +182,7 @@ def _findings(explanation: Explanation) -> str:
             f"Formula: {problem.requirement.formula}",
             f"Findings: {explanation.text}",
             "Inputs:",
-            *(f"- {line}" for line in candidate_lines(problem, evaluation.candidate)),
+            *(f"- {line}" for line in candidate_lines(evaluation.candidate, problem.space)),
             "Trajectory:",
             ", ".join(("time", *trajectory.names)),
             *rows,
@@ -249,7 +250,3 @@ def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float
 
 def _robustness(problem: Problem, candidate: Candidate) -> float | None:
     return evaluate(problem, problem.space.admit(candidate)).robustness
-
-
-def _listed(parts: list[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.counterexamples.shrink import stretches, with_signal
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate

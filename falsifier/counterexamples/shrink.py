@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal
-from falsifier.core.space import Candidate, InputRange
+from falsifier.core.space import InputRange
 from falsifier.counterexamples.simplicity import rest_value, rounder, simplicity
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import half_step

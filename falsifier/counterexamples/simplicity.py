@@ -14,8 +14,9 @@ The first of these that differs decides:
 from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 
-from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Candidate, InputRange, ParameterRange
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Interpolation
+from falsifier.core.space import InputRange, ParameterRange
 from falsifier.problem.problem import Problem
 
 Key = tuple[object, ...]
@@ -52,17 +53,11 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
         sum(len(s.times) for _, s in signals),
         sum(_SIMPLEST_FIRST.index(s.interpolation) for _, s in signals),
         sum(_roughness(r, v, rests[r.name]) for r, v in numbers)
-        + sum(digits(t) for r, s in signals if not is_fixed(problem, r, s) for t in s.times),
+        + sum(digits(t) for r, s in signals if not problem.space.is_fixed(r, s) for t in s.times),
         sum(_distance(r, v, rests[r.name]) for r, v in numbers),
         tuple((s.times, s.values) for _, s in signals),
         tuple(v for _, v in parameters),
     )
-
-
-def is_fixed(problem: Problem, r: InputRange, signal: Signal) -> bool:
-    """Whether a signal has the control points of the spec, rather than some of an engine's choice."""
-    times = even_times(r.control_points, stop_time=problem.space.stop_time, interpolation=r.interpolation)
-    return signal.interpolation == r.interpolation and signal.times == times
 
 
 def digits(value: float) -> int:

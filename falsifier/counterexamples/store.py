@@ -20,7 +20,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.errors import CandidateError, SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.tools import WhatIf
 
@@ -59,14 +59,3 @@ class Adviser(Protocol):
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Learn from evaluations, whoever proposed their candidates."""
         ...
-
-
-def in_few_words(candidate: Candidate) -> str:
-    """A candidate in a few words: pieces of long signals are left out."""
-    parts = []
-    for name, signal in candidate.signals.items():
-        pairs = [f"{v:.4g} from {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
-        more = f", ... {len(pairs)} points in all" if len(pairs) > 8 else ""
-        parts.append(f"{name} {signal.interpolation}: {', '.join(pairs[:8])}{more}")
-    parts += [f"{name} = {value:.6g}" for name, value in candidate.parameters.items()]
-    return "; ".join(parts)

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.signals import even_times
-from falsifier.core.space import Candidate, SearchSpace
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
@@ -58,12 +58,7 @@ class UnitBox:
 
     def represents(self, candidate: Candidate) -> bool:
         """Whether all signals have the fixed parameterization, so that a point stands for the candidate."""
-        return all(
-            candidate.signals[r.name].interpolation == r.interpolation
-            and candidate.signals[r.name].times
-            == even_times(r.control_points, stop_time=self.space.stop_time, interpolation=r.interpolation)
-            for r in self.space.inputs
-        )
+        return all(self.space.is_fixed(r, candidate.signals[r.name]) for r in self.space.inputs)
 
     def point(self, candidate: Candidate) -> Vector:
         """Point of a candidate; a free signal is read at the fixed control points."""

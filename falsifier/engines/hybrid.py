@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines.adviser import Adviser
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate

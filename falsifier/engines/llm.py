@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from falsifier.core.space import Candidate
-from falsifier.engines.adviser import Advice, in_few_words
+from falsifier.core.candidate import Candidate
+from falsifier.core.words import in_one_line
+from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
@@ -128,7 +129,7 @@ class LLMEngine:
         shown = self._disguise.hidden_candidate(candidate) if self._disguise else candidate
         if not self._variant.has("names"):
             return "; ".join(choices.as_point(self._view, shown))
-        return in_few_words(shown)
+        return in_one_line(shown)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, whoever proposed their candidates."""

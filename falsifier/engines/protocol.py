@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.evaluation.evaluate import Evaluation
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError, SimulationError
 from falsifier.problem.problem import Problem
@@ -49,11 +49,6 @@ class Evaluation:
     def violated(self) -> bool:
         """Whether the requirement is violated; a failed simulation violates nothing."""
         return self.verdict is not None and self.verdict.violated
-
-    def _repr_html_(self) -> str:
-        from falsifier.views.notebook import evaluation_html
-
-        return evaluation_html(self)
 
 
 def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.errors import ModelError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo
-from falsifier.core.space import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.view import View

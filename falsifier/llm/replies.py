@@ -12,8 +12,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
-from falsifier.core.space import Candidate, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
 

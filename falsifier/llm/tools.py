@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import Tool, ToolCall
 from falsifier.llm.prompts.variants import Variant

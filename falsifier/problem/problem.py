@@ -55,11 +55,6 @@ class Problem:
         """The requirement's name."""
         return self.requirement.name
 
-    def _repr_html_(self) -> str:
-        from falsifier.views.notebook import problem_html
-
-        return problem_html(self)
-
 
 def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
     """Group problems that differ in nothing but their requirement; all of a group record the same signals."""

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation, Status

@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError, JournalError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm

@@ -40,8 +40,3 @@ class Result:
     spent: Spent
     directory: Path | None = None
     fragile: tuple[Confirmation, ...] = ()
-
-    def _repr_html_(self) -> str:
-        from falsifier.views.notebook import result_html
-
-        return result_html(self)

@@ -24,8 +24,3 @@ class Verdict:
     def violated(self) -> bool:
         """Whether the requirement is violated."""
         return self.robustness < 0
-
-    def _repr_html_(self) -> str:
-        from falsifier.views.notebook import verdict_html
-
-        return verdict_html(self)

@@ -1,26 +1,27 @@
 """How problems, trajectories, verdicts and results look in notebooks, and progress that moves there.
 
-The ``_repr_html_`` of those values calls these functions; the markup is plain tables and PNG pictures, so
-that a code host shows it, too::
+The values know nothing of this: their formatters are registered with IPython by name, and made when one is
+first shown. The markup is plain tables and PNG pictures, so that a code host shows it, too::
 
-    result = falsify(load_problem("AT1"), listeners=[progress()])
+    result = falsify("AT1", listeners=[progress()])
     result
 """
 
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from falsifier.core.space import Candidate, SearchSpace
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import choices
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
 from falsifier.search.result import Result
 from falsifier.stl import in_words
 from falsifier.stl.verdict import Verdict
 from falsifier.views.html import Html, el, join
-from falsifier.views.text import note, seconds_text, signal_text
+from falsifier.views.text import seconds_text
 
 # Pictures are kept in the notebook's file: this makes some 20 kB each.
 _DPI = 80
@@ -30,6 +31,18 @@ _LEFT = "text-align: left"
 _DRAWN_SIGNALS = 6
 
 Fact = tuple[str, str]
+
+
+def register() -> None:
+    """Have IPython show problems, verdicts, evaluations, trajectories and results; elsewhere do nothing."""
+    from IPython.core import getipython
+
+    shell: Any = getipython.get_ipython()
+    if shell is None or shell.display_formatter is None:
+        return
+    formatter = shell.display_formatter.formatters["text/html"]
+    for shown, html in _FORMATTERS.items():
+        formatter.for_type_by_name(shown.__module__, shown.__name__, html)
 
 
 def problem_html(problem: Problem) -> str:
@@ -98,53 +111,13 @@ def result_html(result: Result) -> str:
     return join(*parts)
 
 
-def progress() -> Listener:
-    """Listener that shows a run as one line below the cell, written over while the run goes on.
-
-    It takes IPython alone: no widgets, so that every front end shows it and the last line stays in the file.
-    """
-    return _Line()
-
-
-class _Line:
-    """One display that is updated; made when the run starts."""
-
-    def __init__(self) -> None:
-        self._handle: Any = None
-        self._name = self._note = ""
-        self._total: int | None = None
-
-    def __call__(self, event: Event) -> None:
-        """Show what an event tells."""
-        match event:
-            case RunStarted():
-                self._name = f"{event.problem.name}, {event.engine}"
-                self._handle, self._total = None, event.budget.simulations
-                self._show(0)
-            case Evaluated():
-                self._note = note(event)
-                self._show(event.spent.simulations)
-            case Exchanged():
-                self._note = f"LLM answered, {event.spent.tokens} tokens so far"
-                self._show(event.spent.simulations)
-            case Confirmed():
-                self._note = f"violation {event.confirmation.outcome}"
-            case RunEnded():
-                result = event.result
-                self._note = f"{result.status}; {self._note}"
-                self._show(result.spent.simulations)
-
-    def _show(self, done: int) -> None:
-        from IPython.display import HTML, display
-
-        bar = el("progress", value=done, max=self._total) if self._total else ""
-        count = f" {done}" + (f" of {self._total}" if self._total else "")
-        text = join(el("code", self._name), " ", bar, count, " simulations. ", self._note)
-        line = HTML(text)  # type: ignore[no-untyped-call]
-        if self._handle is None:
-            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
-        else:
-            self._handle.update(line)
+_FORMATTERS: Mapping[type, Callable[[Any], str]] = {
+    Problem: problem_html,
+    Verdict: verdict_html,
+    Evaluation: evaluation_html,
+    Trajectory: trajectory_html,
+    Result: result_html,
+}
 
 
 def _verdict_facts(verdict: Verdict) -> list[Fact]:
@@ -159,8 +132,7 @@ def _verdict_facts(verdict: Verdict) -> list[Fact]:
 
 
 def _candidate_facts(candidate: Candidate) -> list[Fact]:
-    facts = [(f"input {name}", signal_text(signal)) for name, signal in candidate.signals.items()]
-    facts += [(f"parameter {name}", f"{value:g}") for name, value in candidate.parameters.items()]
+    facts = [(f"{c.role} {c.label}", c.text) for c in choices(candidate)]
     origin = ": ".join(part for part in (candidate.origin, candidate.rationale) if part)
     return [*facts, *([("proposed by", origin)] if origin else [])]
 

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Formula
 from falsifier.stl.expression import Expression, Number

@@ -1,103 +1,16 @@
-"""What people see of a run: progress on stderr, the result as text or JSON."""
+"""What people see of a finished run: the result as text or JSON."""
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate
+from falsifier.core.words import candidate_lines
 from falsifier.counterexamples.store import file_name
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
-from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunStarted
 from falsifier.search.manifest import recorded_request
 from falsifier.search.result import Result
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-# Control points printed in full; longer signals are cut in the middle.
-_SHOWN_POINTS = 12
-
-
-@contextmanager
-def make_display(*, quiet: bool = False) -> Iterator[Listener]:
-    """Listener that shows progress: live on a terminal or in a notebook, plain lines on stderr elsewhere."""
-    if quiet:
-        yield lambda event: None
-        return
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if console.is_jupyter:  # there rich's own live line needs widgets
-        from falsifier.views.notebook import progress as notebook_progress
-
-        yield notebook_progress()
-        return
-    if not console.is_terminal:
-        yield PlainDisplay(console)
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("starting", total=None, note="")
-
-        def show(event: Event) -> None:
-            match event:
-                case RunStarted():
-                    total = event.budget.simulations
-                    progress.update(task, description=f"{event.problem.name} {event.engine}", total=total)
-                case Evaluated():
-                    progress.update(task, completed=event.spent.simulations, note=note(event))
-                case Exchanged():
-                    progress.update(task, note=f"LLM answered, {event.spent.tokens} tokens so far")
-                case Confirmed():
-                    c = event.confirmation
-                    progress.console.print(
-                        f"violation {c.outcome}: {c.reason}", highlight=False, markup=False
-                    )
-                case _:
-                    pass
-
-        yield show
-
-
-class PlainDisplay:
-    """One line at the start, at each improvement, at each failure and at each confirmation."""
-
-    def __init__(self, console: "Console") -> None:
-        self._console = console
-
-    def __call__(self, event: Event) -> None:
-        """Print what is worth a line."""
-        match event:
-            case RunStarted():
-                replayed = f", {event.replayed} evaluations from the journal" if event.replayed else ""
-                self._line(f"{event.problem.name}: {event.problem.requirement.formula}")
-                self._line(f"engine {event.engine}{replayed}")
-            case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
-                self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
-            case Evaluated(evaluation=evaluation, best=best) if (
-                best is not None and best.candidate is evaluation.candidate
-            ):
-                self._line(f"simulation {event.index + 1}: {note(event)}")
-            case Confirmed():
-                self._line(f"violation {event.confirmation.outcome}: {event.confirmation.reason}")
-            case _:
-                pass
-
-    def _line(self, text: str) -> None:
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
 def result_text(result: Result) -> str:
@@ -166,31 +79,6 @@ def result_json(result: Result) -> dict[str, Any]:
     }
 
 
-def signal_text(signal: Signal) -> str:
-    """Control points of a signal in one line, and how lively it is: a reader judges how plausible that is."""
-    if len(set(signal.values)) == 1:
-        return f"constant {signal.values[0]:g}"
-    points = [f"{v:g} at {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
-    if len(points) > _SHOWN_POINTS:
-        half = _SHOWN_POINTS // 2
-        points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
-    dwell = signal.shortest_dwell
-    lively = "" if dwell is None else f", shortest dwell {dwell:.4g} s"
-    return f"{signal.interpolation}: {', '.join(points)} ({signal.switches} switches{lively})"
-
-
-def candidate_lines(problem: Problem, candidate: Candidate) -> list[str]:
-    """One line an input and a parameter, as in a result."""
-    space = problem.space
-    units = {r.name: r.unit for r in space.inputs} | {p.name: p.unit for p in space.parameters}
-    lines = [
-        f"input          {n}{_bracketed(units[n])} {signal_text(s)}" for n, s in candidate.signals.items()
-    ]
-    return lines + [
-        f"parameter      {n}{_bracketed(units[n])} = {v:.10g}" for n, v in candidate.parameters.items()
-    ]
-
-
 def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
     verdict = evaluation.verdict
     lines = []
@@ -203,7 +91,7 @@ def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
         lines.append(f"  robustness     {verdict.robustness:+.6g}")
         lines.append(f"  critical time  {verdict.critical_time:.6g} s, at {verdict.predicate}")
         lines.append(f"  values there   {values}")
-    lines += [f"  {line}" for line in candidate_lines(result.problem, evaluation.candidate)]
+    lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, result.problem.space)]
     if evaluation.candidate.rationale:
         lines.append(f"  rationale      {evaluation.candidate.rationale}")
     return lines
@@ -228,14 +116,6 @@ def _picture(result: Result) -> Path:
     return (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
 
 
-def note(event: Evaluated) -> str:
-    """Best robustness so far, in a few words."""
-    best = event.best
-    if best is None or best.verdict is None:
-        return "no successful simulation yet"
-    return f"best robustness {best.verdict.robustness:+.5g} at t = {best.verdict.critical_time:.5g} s"
-
-
 def _model_use(spent: Spent) -> str:
     cost = "price unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
     reasoning = f" ({spent.reasoning_tokens} of them reasoning)" if spent.reasoning_tokens else ""
@@ -252,10 +132,6 @@ def seconds_text(spent: Spent) -> str:
 
 def _unit(unit: str) -> str:
     return f" {unit}" if unit else ""
-
-
-def _bracketed(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
 
 
 def warn(text: str) -> None:

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.errors import CandidateError
 
 THROTTLE = InputRange("throttle", 0.0, 100.0, 7, hold=0.05, unit="%")

@@ -2,8 +2,9 @@ from collections.abc import Mapping
 
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom, ParameterRange
+from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.explain import explain, narrate
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.scripted import ScriptedChat

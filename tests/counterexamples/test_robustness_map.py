@@ -3,8 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom, ParameterRange
+from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.robustness_map import sample_neighbourhood
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate

@@ -4,8 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom, ParameterRange
+from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
 from falsifier.counterexamples.simplicity import digits, rest_value, rounder, simplicity
 from falsifier.errors import SpecError

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate
 from falsifier.engines import make_engine
 from falsifier.engines.adviser import Advice
 from falsifier.engines.hybrid import Hybrid

@@ -3,7 +3,7 @@ import threading
 import numpy as np
 import pytest
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.engines.bayesian import log_improvement
 from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised

@@ -229,8 +229,8 @@ def test_candidates_are_described_as_the_model_knows_them() -> None:
         for variant in ("MP1", "MP5")
         for anonymous in (False, True)
     }
-    assert told["MP5", False].startswith("u0 pchip: 0.5 from 0 s, 1 from 3.333 s")
-    assert told["MP5", True].startswith("u1 pchip: 0.5 from 0 s")
+    assert told["MP5", False].startswith("u0 pchip: 0.5 at 0 s, 1 at 3.333 s")
+    assert told["MP5", True].startswith("u1 pchip: 0.5 at 0 s")
     assert told["MP1", False] == told["MP1", True] == "point = [0.5, 1, -1, 2]"
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.disguise import Disguise, renamed
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render

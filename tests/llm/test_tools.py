@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse

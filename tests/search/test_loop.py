@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.space import Candidate, ValueKind
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import ValueKind
 from falsifier.engines import make_engine
 from falsifier.errors import ChatError, JournalError
 from falsifier.evaluation.confirm import Confirmation

@@ -2,7 +2,7 @@
 
 ::
 
-    counterexample.json, .png   for falsifier itself and for people
+    counterexample.json         for falsifier itself
     input.csv                   input signals: FMPy, fmusim, OpenModelica
     start_values.json, .ssv     parameters and start values: scripts; tools that read SSP parameter sets
     replay.py                   simulates both with FMPy alone, into outputs.csv, and prints what decided
@@ -16,38 +16,11 @@ from pathlib import Path
 from falsifier.counterexamples.export.inputs import input_table, start_values
 from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
 from falsifier.counterexamples.export.tables import write_csv, write_json, write_mat, write_ssv
-from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save, to_store
-from falsifier.evaluation.confirm import Confirmation
+from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-from falsifier.search.request import ProblemRequest
 
-__all__ = ["export_counterexample", "write_counterexample"]
-
-
-def write_counterexample(
-    problem: Problem,
-    confirmation: Confirmation,
-    directory: Path,
-    *,
-    request: ProblemRequest | None = None,
-    name: str = FILE_NAME,
-) -> list[Path]:
-    """Write a counterexample as JSON, as ``falsifier replay`` reads it, and as a picture; return the files.
-
-    Args:
-        problem: what it violates.
-        confirmation: the violation.
-        directory: where to write.
-        request: how the problem is loaded; None where only code can tell.
-        name: of the JSON file; the picture is named like it.
-    """
-    from falsifier.views.plotting import plot_evaluation, save_figure
-
-    data = save(to_store(problem, confirmation, request), directory / name)
-    picture = data.with_suffix(".png")
-    save_figure(plot_evaluation(problem, confirmation.evaluation), picture)
-    return [data, picture]
+__all__ = ["export_counterexample"]
 
 
 def export_counterexample(

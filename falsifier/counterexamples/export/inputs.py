@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.model import Variable
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate
 from falsifier.problem.problem import Problem
 
 

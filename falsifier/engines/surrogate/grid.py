@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from falsifier.core.space import Candidate, SearchSpace
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import Leaf

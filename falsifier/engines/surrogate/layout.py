@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Candidate, Freedom, InputRange, SearchSpace
+from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines.box import Array
 from falsifier.engines.surrogate.grid import Grid
 
@@ -114,7 +115,7 @@ def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
     return Layout(
         space,
         tuple(
-            _fixed(r, space.stop_time)
+            _fixed(space, r)
             if r.free is None
             else _held(grid.step * grid.cells, grid.cells, r.free, fine=True)
             for r in space.inputs
@@ -131,13 +132,13 @@ def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tup
         pieces: numbers of held pieces of the free inputs, one for each layout.
     """
     if all(r.free is None for r in space.inputs):
-        return (Layout(space, tuple(_fixed(r, space.stop_time) for r in space.inputs)),)
+        return (Layout(space, tuple(_fixed(space, r) for r in space.inputs)),)
     horizon = grid.step * grid.cells
     return tuple(
         Layout(
             space,
             tuple(
-                _fixed(r, space.stop_time) if r.free is None else _held(horizon, count, r.free, fine=False)
+                _fixed(space, r) if r.free is None else _held(horizon, count, r.free, fine=False)
                 for r in space.inputs
             ),
         )
@@ -145,9 +146,8 @@ def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tup
     )
 
 
-def _fixed(r: InputRange, stop_time: float) -> Coding:
-    times = even_times(r.control_points, stop_time=stop_time, interpolation=r.interpolation)
-    return Coding(times, r.interpolation, fine=False)
+def _fixed(space: SearchSpace, r: InputRange) -> Coding:
+    return Coding(space.fixed_times(r), r.interpolation, fine=False)
 
 
 def _held(horizon: float, count: int, free: Freedom, *, fine: bool) -> Coding:

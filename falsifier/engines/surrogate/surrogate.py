@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines.box import Array
 from falsifier.engines.corner_walk import CornerWalk, Levels
 from falsifier.engines.surrogate.arms import choose_arm, quality

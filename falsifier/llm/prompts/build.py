@@ -3,8 +3,8 @@
 import json
 from collections.abc import Sequence
 
-from falsifier.core.signals import even_times
-from falsifier.core.space import Candidate, InputRange, ParameterRange, nearest_value
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
@@ -122,8 +122,7 @@ def _named_inputs(view: View, variant: Variant) -> InputsBlock:
 
 def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     low, high = bounds(r.low, r.high)
-    times = even_times(r.control_points, stop_time=view.space.stop_time, interpolation=r.interpolation)
-    told = tuple(number(round(t, 6)) for t in times)
+    told = tuple(number(round(t, 6)) for t in view.space.fixed_times(r))
     if len(told) > _MOST_TIMES:
         told = (*told[:3], "...", told[-1])
     freedom = r.free if free else None

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal, even_times
-from falsifier.core.space import Candidate, InputRange
+from falsifier.core.space import InputRange
 from falsifier.llm.prompts.numbers import number, runs
 from falsifier.llm.prompts.view import View
 
@@ -56,7 +57,7 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
 
 
 def _fixed_values(view: View, r: InputRange, signal: Signal) -> tuple[float, ...]:
-    times = even_times(r.control_points, stop_time=view.space.stop_time, interpolation=r.interpolation)
+    times = view.space.fixed_times(r)
     if signal.times == times:
         return signal.values
     return tuple(float(v) for v in signal.held(None).sample(np.asarray(times)))

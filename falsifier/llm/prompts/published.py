@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from falsifier.core.signals import even_times
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import column_decimals
@@ -22,11 +21,7 @@ def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Ite
 
 def _values_at_control_points(view: View, trajectory: Trajectory) -> Iterator[str]:
     stop_time = view.space.stop_time
-    times = {
-        time
-        for r in view.space.inputs
-        for time in even_times(r.control_points, stop_time=stop_time, interpolation=r.interpolation)
-    }
+    times = {time for r in view.space.inputs for time in view.space.fixed_times(r)}
     for name in view.formula_outputs:
         if name in trajectory.columns:
             column = trajectory[name]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.tally import read_candidate

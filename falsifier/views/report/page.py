@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Table
+from falsifier.core.words import choices
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
 from falsifier.views.report.content import (
@@ -15,7 +16,6 @@ from falsifier.views.report.content import (
     run_command,
     searches,
 )
-from falsifier.views.text import signal_text
 
 
 def html_report(directory: Path) -> str:
@@ -141,8 +141,7 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
             ("critical time", f"{verdict.critical_time:.6g} s, at {verdict.predicate}"),
             ("values there", values),
         ]
-    facts += [(f"input {name}", signal_text(signal)) for name, signal in shown.candidate.signals.items()]
-    facts += [(f"parameter {name}", f"{value:.10g}") for name, value in shown.candidate.parameters.items()]
+    facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
     commands = [("repeat the search", run_command(run.manifest.request))]
     if run.falsified:
         commands.insert(0, ("simulate it again", replay_command(run)))

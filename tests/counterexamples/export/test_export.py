@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom
+from falsifier.core.space import Freedom
 from falsifier.counterexamples.export import export_counterexample
 from falsifier.counterexamples.export.inputs import input_table, start_values
 from falsifier.counterexamples.export.tables import matlab_name, write_csv, write_json, write_mat, write_ssv

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Candidate, Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate

@@ -3,7 +3,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from falsifier import Evaluation, evaluate, falsify
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.views.plotting import (
     plot_diagnosis,
     plot_predictions,

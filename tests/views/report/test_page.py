@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.space import Candidate
+from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search.budget import Budget

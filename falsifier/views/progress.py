@@ -1,0 +1,149 @@
+"""What people see of a running search: live on a terminal or in a notebook, plain lines elsewhere."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
+from falsifier.views.html import el, join
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+@contextmanager
+def make_display(*, quiet: bool = False) -> Iterator[Listener]:
+    """Listener that shows progress: live on a terminal or in a notebook, plain lines on stderr elsewhere."""
+    if quiet:
+        yield lambda event: None
+        return
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if console.is_jupyter:  # there rich's own live line needs widgets
+        yield NotebookLine()
+        return
+    if not console.is_terminal:
+        yield PlainDisplay(console)
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("starting", total=None, note="")
+
+        def show(event: Event) -> None:
+            match event:
+                case RunStarted():
+                    total = event.budget.simulations
+                    progress.update(task, description=f"{event.problem.name} {event.engine}", total=total)
+                case Evaluated():
+                    progress.update(task, completed=event.spent.simulations, note=note(event))
+                case Exchanged():
+                    progress.update(task, note=f"LLM answered, {event.spent.tokens} tokens so far")
+                case Confirmed():
+                    c = event.confirmation
+                    progress.console.print(
+                        f"violation {c.outcome}: {c.reason}", highlight=False, markup=False
+                    )
+                case _:
+                    pass
+
+        yield show
+
+
+def progress() -> Listener:
+    """Listener that shows how far a search is: one moving line in a notebook, else lines on stderr.
+
+    >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
+    """
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    return NotebookLine() if console.is_jupyter else PlainDisplay(console)
+
+
+class PlainDisplay:
+    """One line at the start, at each improvement, at each failure and at each confirmation."""
+
+    def __init__(self, console: "Console") -> None:
+        self._console = console
+
+    def __call__(self, event: Event) -> None:
+        """Print what is worth a line."""
+        match event:
+            case RunStarted():
+                replayed = f", {event.replayed} evaluations from the journal" if event.replayed else ""
+                self._line(f"{event.problem.name}: {event.problem.requirement.formula}")
+                self._line(f"engine {event.engine}{replayed}")
+            case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
+                self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
+            case Evaluated(evaluation=evaluation, best=best) if (
+                best is not None and best.candidate is evaluation.candidate
+            ):
+                self._line(f"simulation {event.index + 1}: {note(event)}")
+            case Confirmed():
+                self._line(f"violation {event.confirmation.outcome}: {event.confirmation.reason}")
+            case _:
+                pass
+
+    def _line(self, text: str) -> None:
+        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+def note(event: Evaluated) -> str:
+    """Best robustness so far, in a few words."""
+    best = event.best
+    if best is None or best.verdict is None:
+        return "no successful simulation yet"
+    return f"best robustness {best.verdict.robustness:+.5g} at t = {best.verdict.critical_time:.5g} s"
+
+
+class NotebookLine:
+    """A run as one line below the cell, written over while the run goes on.
+
+    It takes IPython alone: no widgets, so that every front end shows it and the last line stays in the file.
+    """
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+        self._name = self._note = ""
+        self._total: int | None = None
+
+    def __call__(self, event: Event) -> None:
+        """Show what an event tells."""
+        match event:
+            case RunStarted():
+                self._name = f"{event.problem.name}, {event.engine}"
+                self._handle, self._total = None, event.budget.simulations
+                self._show(0)
+            case Evaluated():
+                self._note = note(event)
+                self._show(event.spent.simulations)
+            case Exchanged():
+                self._note = f"LLM answered, {event.spent.tokens} tokens so far"
+                self._show(event.spent.simulations)
+            case Confirmed():
+                self._note = f"violation {event.confirmation.outcome}"
+            case RunEnded():
+                result = event.result
+                self._note = f"{result.status}; {self._note}"
+                self._show(result.spent.simulations)
+
+    def _show(self, done: int) -> None:
+        from IPython.display import HTML, display
+
+        bar = el("progress", value=done, max=self._total) if self._total else ""
+        count = f" {done}" + (f" of {self._total}" if self._total else "")
+        text = join(el("code", self._name), " ", bar, count, " simulations. ", self._note)
+        line = HTML(text)  # type: ignore[no-untyped-call]
+        if self._handle is None:
+            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            self._handle.update(line)
