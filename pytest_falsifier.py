@@ -125,7 +125,7 @@ def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) 
     __tracebackhide__ = True
     from falsifier.counterexamples.regression import check
     from falsifier.counterexamples.store import Database
-    from falsifier.search.request import ProblemRequest
+    from falsifier.problem.loading import load_problem
 
     config = item.config
     marker = item.get_closest_marker("falsifier")
@@ -134,9 +134,7 @@ def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) 
         **(marker.kwargs if marker else {}),
         **stated,
     }
-    request = ProblemRequest(target=problem) if isinstance(problem, str) else None
-    loaded = request.load() if request else problem
-    assert not isinstance(loaded, str)
+    loaded = load_problem(problem) if isinstance(problem, str) else problem
     folder = config.rootpath / (_setting(config, "database") or _DEFAULT_DATABASE)
     try:
         checked = check(
@@ -145,7 +143,6 @@ def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) 
             budget=int(options["budget"] or _DEFAULT_BUDGET),
             seed=int(options["seed"] or 0),
             database=Database(folder),
-            request=request,
         )
         if checked.counterexample is not None:
             raise FalsifiedError(_message(item, checked))

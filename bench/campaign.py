@@ -20,17 +20,15 @@ from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.loading import load_source
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import (
-    EndedRecord,
-    EvaluatedRecord,
-    VerdictRecord,
-    open_journal,
-    write_manifest,
-)
-from falsifier.search.loop import falsify, search
-from falsifier.search.manifest import environment, manifest
-from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.search.journal import open_journal, write_manifest
+from falsifier.search.loop import Live, search
+from falsifier.search.manifest import describe, environment
+from falsifier.search.records import ConfirmedRecord, EndedRecord, EvaluatedRecord, VerdictRecord
+from falsifier.search.request import RunRequest
+from falsifier.search.run import falsify
 from falsifier.views.report import html_report
 
 SIMULATIONS = 1000
@@ -62,13 +60,14 @@ def overhead(target: str, directory: Path) -> str:
     the engine and judging.
     """
     request = cross(suite_of(target), [Method("uniform")], seeds=[0], budget=Budget(SIMULATIONS))[0]
-    problem = request.problem.load()
+    problem = load_source(request.problems[0])
     falsify(problem, "uniform", budget=10)
-    write_manifest(directory, manifest(request, problem).model_dump(mode="json"))
+    write_manifest(directory, describe(request, [problem], "uniform").model_dump(mode="json"))
     engine, executor = TimedEngine(make_engine("uniform", problem, seed=0)), TimedExecutor()
     with open_journal(directory, keep=request.keep) as journal:
         started = perf_counter()
-        result = search(problem, lambda *_: engine, request.budget, executor=executor, journal=journal)
+        steps = Live(executor)
+        (result,) = search([problem], [engine], request.budget, steps=steps, listeners=[journal])
         whole = perf_counter() - started
     problem.model.close()
     simulating = result.spent.simulation_seconds
@@ -113,7 +112,7 @@ class TimedExecutor(Executor):
         return done
 
 
-def suite_of(target: str) -> list[ProblemRequest]:
+def suite_of(target: str) -> list[ProblemSource]:
     """The suite's request for one target."""
     return [request for request in suite("arch-comp") if request.target == target]
 
@@ -149,28 +148,38 @@ def full_report(folder: Path) -> tuple[float, int, int]:
 
 def make_run(request: RunRequest, place: Path) -> None:
     """A run directory as a search leaves it, with one real simulation in place of all."""
-    problem = request.problem.load()
+    problem = load_source(request.problems[0])
     place.mkdir(parents=True)
     (place / "trajectories").mkdir()
-    (place / "manifest.json").write_text(manifest(request, problem).model_dump_json())
+    write_manifest(place, describe(request, [problem], "uniform").model_dump(mode="json"))
     low, high = problem.space.bounds.T
     candidate = problem.space.decode(low + (high - low) * ((request.seed + 1) / 11))
     evaluation = evaluate(problem, candidate)
     assert evaluation.trajectory is not None
     assert evaluation.verdict is not None
     evaluation.trajectory.save(place / "trajectories" / f"{BUDGET - 1}.npz")
-    verdict = VerdictRecord(**{f: getattr(evaluation.verdict, f) for f in VerdictRecord.model_fields})
+    verdict = VerdictRecord.of(evaluation.verdict)
+    assert verdict is not None
     asked = json.dumps(candidate.to_json())
     with (place / "journal.jsonl").open("w") as file:
         for i in range(BUDGET):
-            file.write(f'{{"kind":"asked","first":{i},"n":1,"candidates":[{asked}],"seconds":0.0001}}\n')
+            file.write(f'{{"kind":"asked","first":{i},"n":1,"candidates":[{asked}],"seconds":0.0001,')
+            file.write(f'"requirement":"{problem.name}"}}\n')
             falling = verdict.model_copy(update={"robustness": float(BUDGET - i) if i < BUDGET - 1 else -1.0})
-            record = EvaluatedRecord(index=i, status="ok", verdict=falling, seconds=0.01)
+            record = EvaluatedRecord(index=i, status="ok", verdicts={problem.name: falling}, seconds=0.01)
             if i == BUDGET - 1:
                 record = record.model_copy(update={"trajectory": f"trajectories/{i}.npz"})
             file.write(record.model_dump_json() + "\n")
-        confirmed = {"kind": "confirmed", "index": BUDGET - 1, "outcome": "confirmed", "robustness": -1.0}
-        file.write(json.dumps({**confirmed, "reference": -1.0, "reason": "made for a measurement"}) + "\n")
+        confirmed = ConfirmedRecord(
+            index=BUDGET - 1,
+            requirement=problem.name,
+            outcome="confirmed",
+            robustness=-1.0,
+            reference=-1.0,
+            reason="made for a measurement",
+            spent={"simulations": BUDGET},
+        )
+        file.write(confirmed.model_dump_json() + "\n")
         file.write(
             EndedRecord(status="falsified", reason="", spent={"simulations": BUDGET}).model_dump_json() + "\n"
         )

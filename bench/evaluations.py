@@ -7,15 +7,10 @@ inputs for the trajectory, without monitor and without journal.
 """
 
 import tempfile
-from pathlib import Path
 from time import perf_counter
 
-from falsifier.engines import make_engine
+from falsifier import falsify, load_problem, make_engine
 from falsifier.evaluation.evaluate import monitor_for
-from falsifier.problem.loading import load_problem
-from falsifier.search.budget import Budget
-from falsifier.search.journal import open_journal
-from falsifier.search.loop import search
 
 COUNT = 1000
 ROUNDS = 3
@@ -35,11 +30,9 @@ def main() -> None:
         for candidate in candidates:
             problem.model.simulate(candidate.signals, {}, problem.experiment)
         own.append(perf_counter() - started)
-        with tempfile.TemporaryDirectory() as folder, open_journal(Path(folder)) as journal:
+        with tempfile.TemporaryDirectory() as folder:
             started = perf_counter()
-            result = search(
-                problem, lambda p, _: make_engine("uniform", p, seed=1), Budget(COUNT), journal=journal
-            )
+            result = falsify(problem, "uniform", seed=1, budget=COUNT, directory=folder)
             whole.append(perf_counter() - started)
         assert len(result.evaluations) == COUNT
     print(f"{COUNT} evaluations of AT1, best of {ROUNDS} rounds")

@@ -1,10 +1,11 @@
 """Falsify requirements of FMUs: find inputs that make a simulated system violate an STL formula.
 
-Load a problem, choose who proposes, run::
+::
 
-    from falsifier import falsify, load_problem
+    from falsifier import Problem, falsify
 
-    result = falsify(load_problem("AT1"), engine="corners", budget=100)
+    problem = Problem.from_fmu("my.fmu", "G[0,10] (h >= 0)", inputs={"u": (-1, 1)})
+    result = falsify(problem, budget=300)
 
 Everything heavy (numba, fmpy, litellm, matplotlib) is imported when it is first needed.
 
@@ -22,31 +23,203 @@ The house has twelve rooms. Each imports from itself and from those above it, ne
     campaigns/        requirements x methods x seeds
     views/            what people see
     cli/              the command line
+
+Beside them stand errors (one tree) and testing (contracts for engines of your own).
 """
 
 import sys
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
 
+if TYPE_CHECKING:
+    from falsifier.campaigns import (
+        CampaignRequest,
+        Method,
+        analysis,
+        cross,
+        resume_campaign,
+        run_campaign,
+        suite,
+    )
+    from falsifier.core.candidate import Candidate
+    from falsifier.core.model import Experiment, FunctionModel, Model, ModelInfo, Variable
+    from falsifier.core.signals import Signal
+    from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+    from falsifier.core.trajectory import Trajectory
+    from falsifier.counterexamples.explain import Explanation, explain
+    from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
+    from falsifier.counterexamples.shrink import Shrunk, shrink
+    from falsifier.counterexamples.store import StoredCounterexample
+    from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
+    from falsifier.engines.llm import make_llm_engine
+    from falsifier.engines.protocol import AsksLLM, Engine
+    from falsifier.errors import FalsifierError
+    from falsifier.evaluation.confirm import Confirmation, confirm
+    from falsifier.evaluation.evaluate import Evaluation, evaluate, simulate
+    from falsifier.fmu import FmuModel, read_info
+    from falsifier.llm.connect import connect
+    from falsifier.llm.messages import Chat, Exchange
+    from falsifier.llm.replay import RecordedChat
+    from falsifier.llm.scripted import ScriptedChat
+    from falsifier.problem.loading import load_problem, load_problems
+    from falsifier.problem.problem import Problem
+    from falsifier.problem.requirement import Requirement
+    from falsifier.problem.source import ProblemSource
+    from falsifier.search.budget import Budget, Spent
+    from falsifier.search.events import Event, Listener
+    from falsifier.search.request import LLMSettings
+    from falsifier.search.result import Result
+    from falsifier.search.run import falsify, resume
+    from falsifier.stl import Diagnosis, Formula, Monitor, Verdict, parse
+    from falsifier.views import plotting
+    from falsifier.views.plotting import Figure as Figure
+    from falsifier.views.plotting import plot
+    from falsifier.views.progress import progress
+
 _EXPORTS = {
+    "AsksLLM": "falsifier.engines.protocol",
     "Budget": "falsifier.search.budget",
+    "CampaignRequest": "falsifier.campaigns",
     "Candidate": "falsifier.core.candidate",
+    "Chat": "falsifier.llm.messages",
+    "Confirmation": "falsifier.evaluation.confirm",
+    "DEFAULT_ENGINE": "falsifier.engines",
+    "Diagnosis": "falsifier.stl",
+    "ENGINES": "falsifier.engines",
+    "Engine": "falsifier.engines.protocol",
     "Evaluation": "falsifier.evaluation.evaluate",
+    "Event": "falsifier.search.events",
+    "Exchange": "falsifier.llm.messages",
+    "Experiment": "falsifier.core.model",
+    "Explanation": "falsifier.counterexamples.explain",
     "FalsifierError": "falsifier.errors",
+    "Figure": "falsifier.views.plotting:Figure",
+    "FmuModel": "falsifier.fmu",
+    "Formula": "falsifier.stl",
+    "Freedom": "falsifier.core.space",
     "FunctionModel": "falsifier.core.model",
+    "InputRange": "falsifier.core.space",
+    "LLMSettings": "falsifier.search.request",
+    "Listener": "falsifier.search.events",
+    "Method": "falsifier.campaigns",
+    "Model": "falsifier.core.model",
+    "ModelInfo": "falsifier.core.model",
+    "Monitor": "falsifier.stl",
+    "ParameterRange": "falsifier.core.space",
     "Problem": "falsifier.problem.problem",
+    "ProblemSource": "falsifier.problem.source",
+    "RecordedChat": "falsifier.llm.replay",
+    "Requirement": "falsifier.problem.requirement",
     "Result": "falsifier.search.result",
+    "RobustnessMap": "falsifier.counterexamples.robustness_map",
+    "ScriptedChat": "falsifier.llm.scripted",
     "SearchSpace": "falsifier.core.space",
+    "Shrunk": "falsifier.counterexamples.shrink",
     "Signal": "falsifier.core.signals",
+    "Spent": "falsifier.search.budget",
+    "StoredCounterexample": "falsifier.counterexamples.store",
     "Trajectory": "falsifier.core.trajectory",
+    "Variable": "falsifier.core.model",
+    "Verdict": "falsifier.stl",
+    "confirm": "falsifier.evaluation.confirm",
+    "connect": "falsifier.llm.connect",
+    "cross": "falsifier.campaigns",
     "evaluate": "falsifier.evaluation.evaluate",
-    "falsify": "falsifier.search.loop",
+    "explain": "falsifier.counterexamples.explain",
+    "falsify": "falsifier.search.run",
     "load_problem": "falsifier.problem.loading",
+    "load_problems": "falsifier.problem.loading",
+    "make_engine": "falsifier.engines",
+    "make_llm_engine": "falsifier.engines.llm",
+    "parse": "falsifier.stl",
+    "plot": "falsifier.views.plotting",
+    "progress": "falsifier.views.progress",
+    "read_info": "falsifier.fmu",
+    "resume": "falsifier.search.run",
+    "resume_campaign": "falsifier.campaigns",
+    "robustness_map": "falsifier.counterexamples.robustness_map",
+    "run_campaign": "falsifier.campaigns",
+    "shrink": "falsifier.counterexamples.shrink",
+    "simulate": "falsifier.evaluation.evaluate",
+    "suite": "falsifier.campaigns",
+}
+_MODULES = {
+    "analysis": "falsifier.campaigns.analysis",
+    "plotting": "falsifier.views.plotting",
 }
 
-__all__ = [*_EXPORTS, "__version__"]
+__all__ = [
+    "DEFAULT_ENGINE",
+    "ENGINES",
+    "AsksLLM",
+    "Budget",
+    "CampaignRequest",
+    "Candidate",
+    "Chat",
+    "Confirmation",
+    "Diagnosis",
+    "Engine",
+    "Evaluation",
+    "Event",
+    "Exchange",
+    "Experiment",
+    "Explanation",
+    "FalsifierError",
+    "Figure",
+    "FmuModel",
+    "Formula",
+    "Freedom",
+    "FunctionModel",
+    "InputRange",
+    "LLMSettings",
+    "Listener",
+    "Method",
+    "Model",
+    "ModelInfo",
+    "Monitor",
+    "ParameterRange",
+    "Problem",
+    "ProblemSource",
+    "RecordedChat",
+    "Requirement",
+    "Result",
+    "RobustnessMap",
+    "ScriptedChat",
+    "SearchSpace",
+    "Shrunk",
+    "Signal",
+    "Spent",
+    "StoredCounterexample",
+    "Trajectory",
+    "Variable",
+    "Verdict",
+    "__version__",
+    "analysis",
+    "confirm",
+    "connect",
+    "cross",
+    "evaluate",
+    "explain",
+    "falsify",
+    "load_problem",
+    "load_problems",
+    "make_engine",
+    "make_llm_engine",
+    "parse",
+    "plot",
+    "plotting",
+    "progress",
+    "read_info",
+    "resume",
+    "resume_campaign",
+    "robustness_map",
+    "run_campaign",
+    "shrink",
+    "simulate",
+    "suite",
+]
 
 
 def _register_formatters() -> None:
@@ -59,9 +232,17 @@ def _register_formatters() -> None:
 if "IPython" in sys.modules:
     _register_formatters()
 
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    """Import a public name from its module on first use, so that ``import falsifier`` stays cheap."""
-    if name in _EXPORTS:
-        return getattr(import_module(_EXPORTS[name]), name)
-    raise AttributeError(f"module 'falsifier' has no attribute {name!r}")
+    def __getattr__(name: str) -> object:
+        """Import a public name from its module on first use, so that ``import falsifier`` stays cheap."""
+        if name in _MODULES:
+            return import_module(_MODULES[name])
+        if name in _EXPORTS:
+            module, _, original = _EXPORTS[name].partition(":")
+            return getattr(import_module(module), original or name)
+        raise AttributeError(f"module 'falsifier' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -18,7 +18,8 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.problem.problem import Problem, Requirement
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
 
 Judge = Callable[[Candidate], Evaluation]

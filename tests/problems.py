@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
-from falsifier.problem.problem import Problem, Requirement
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.problem.loading import bundled
+from falsifier.core.files import bundled
 from tests.command import ROOT
 
 SPEC = """

@@ -25,8 +25,7 @@ from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.problem.spec import ModelChanges
-from falsifier.search.tally import read_candidate
+from falsifier.search.journal import read_journal, recorded_candidates
 
 Matrix = NDArray[np.float64]
 Finder = Callable[[str, str, float | None], Problem]
@@ -155,8 +154,7 @@ def bundled_problem(requirement: str, instance: str, stop_time: float | None) ->
     Raises:
         SpecError: when there is none of that name, or the stop time is too short for the requirement.
     """
-    changes = None if stop_time is None else ModelChanges(stop_time=stop_time)
-    return load_problem(bundled_target(requirement), profile=_PROFILES[instance], changes=changes)
+    return load_problem(bundled_target(requirement), profile=_PROFILES[instance], stop_time=stop_time)
 
 
 def tolerance(requirement: str) -> float:
@@ -180,7 +178,7 @@ def _exported(run: Run) -> dict[str, object]:
         "stop time": f"{run.manifest.stop_time:.10g}",
     }
     if run.counterexample is not None:
-        candidate = Candidate.from_json(read_candidate(run.directory, run.counterexample))
+        candidate = recorded_candidates(read_journal(run.directory))[run.counterexample]
         signals = {r.name: candidate.signals[r.name] for r in run.manifest.inputs}
         row["input"] = _matrix_text(_sampled(signals, run.manifest.stop_time))
         values = (candidate.parameters[p.name] for p in run.manifest.parameters)

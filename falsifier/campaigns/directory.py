@@ -17,8 +17,9 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier.campaigns.plan import CampaignRequest
+from falsifier.core.files import write_whole
 from falsifier.errors import JournalError
-from falsifier.search.journal import write_whole
+from falsifier.search.journal import holds_run
 from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"
@@ -94,13 +95,13 @@ def run_directories(directory: Path) -> list[Path]:
     """
     if is_campaign(directory):
         named = read_campaign(directory).runs
-        return [p for n in named if ((p := run_directory(directory, n)) / "manifest.json").exists()]
-    if (directory / "manifest.json").exists():
+        return [p for n in named if holds_run(p := run_directory(directory, n))]
+    if holds_run(directory):
         return [directory]
-    below = sorted(path.parent for path in directory.glob("*/manifest.json"))
+    below = sorted(path for path in directory.glob("*") if holds_run(path))
     if below:
         return below
-    raise JournalError(f"{directory}: neither a campaign nor a run: no {CAMPAIGN} and no manifest.json")
+    raise JournalError(f"{directory}: neither a campaign nor a run: no {CAMPAIGN} and no manifest")
 
 
 @contextmanager

@@ -9,8 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.request import LLMSettings, ProblemRequest, RunRequest
+from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10
 
@@ -91,7 +92,7 @@ class CampaignRequest(BaseModel):
 
 
 def cross(
-    problems: Iterable[ProblemRequest],
+    problems: Iterable[ProblemSource],
     methods: Iterable[Method],
     *,
     seeds: Iterable[int],
@@ -110,8 +111,10 @@ def cross(
     seeds, methods = tuple(seeds), tuple(methods)
     return tuple(
         RunRequest(
-            problem=problem.model_copy(
-                update={"parameterization": method.parameterization, "profile": method.profile or None}
+            problems=(
+                problem.model_copy(
+                    update={"parameterization": method.parameterization, "profile": method.profile or None}
+                ),
             ),
             engine=method.engine or None,
             llm=_llm_settings(method, asking),
@@ -127,7 +130,7 @@ def cross(
 
 def method_of(request: RunRequest) -> Method:
     """Method of a run."""
-    problem, llm = request.problem, request.llm or LLMSettings(name="")
+    problem, llm = request.source or ProblemSource(target=""), request.llm or LLMSettings(name="")
     return Method(
         engine=request.engine or ("" if request.llm else DEFAULT_ENGINE),
         llm=llm.name,
@@ -137,13 +140,13 @@ def method_of(request: RunRequest) -> Method:
         profile=problem.profile or "",
         anonymous=llm.anonymous,
         fallback=llm.fallback or "",
-        together=len(request.together) > 1,
+        together=len(request.problems) > 1,
     )
 
 
 def run_name(request: RunRequest) -> str:
     """Name of a run's directory: readable, and different for every difference in the request."""
-    requirement = re.split(r"[:/]", request.problem.target)[-1]
+    requirement = re.split(r"[:/]", request.problems[0].target)[-1]
     digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
     readable = f"{requirement}-{method_of(request).label}-{request.seed}"
     return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable).strip('-.')}-{digest}"

@@ -2,18 +2,19 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import reduce
 from pathlib import Path
 
 from falsifier.campaigns.directory import read_campaign, run_directory
 from falsifier.campaigns.plan import Method, method_of
 from falsifier.search.budget import Spent
+from falsifier.search.journal import JournalReader
 from falsifier.search.request import RunRequest
 from falsifier.search.tally import FINISHED, RunStatus, Tally
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunProgress:
     """How far one run is.
 
@@ -87,37 +88,35 @@ class _Followed:
 
     name: str
     request: RunRequest
-    path: Path
-    tally: Tally = field(default_factory=Tally)
-    offset: int = 0
+    directory: Path
+    tally: Tally = field(init=False)
+    reader: JournalReader = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        self.tally, self.reader = Tally(), JournalReader(self.directory, with_candidates=False)
 
     def read(self) -> None:
-        if not self.path.exists():
-            return
-        size = self.path.stat().st_size
-        if size < self.offset:  # a torn line was dropped, or the directory was replaced: begin again
-            self.tally, self.offset = Tally(), 0
-        if size == self.offset:
-            return
-        with self.path.open("rb") as file:
-            file.seek(self.offset)
-            for line in file:
-                if not line.endswith(b"\n"):
-                    break
-                self.tally.feed(line, f"{self.path}: the line at byte {self.offset}")
-                self.offset += len(line)
+        if self.reader.shrank:  # a torn line was dropped, or the directory was replaced
+            self.begin()
+        for record in self.reader.new():
+            self.tally.add(record)
+        if self.reader.begun:
+            self.tally.begin()
 
     def progress(self) -> RunProgress:
         tally = self.tally
         return RunProgress(
-            self.name,
-            self.request.problem.target.rpartition(":")[2],
-            method_of(self.request),
-            self.request.seed,
-            tally.status,
-            tally.reason,
-            tally.best_robustness,
-            tally.spent,
+            name=self.name,
+            requirement=self.request.problems[0].name,
+            method=method_of(self.request),
+            seed=self.request.seed,
+            status=tally.status,
+            reason=tally.reason,
+            best=tally.best_robustness,
+            spent=tally.spent,
         )
 
 
@@ -130,7 +129,7 @@ class Follower:
 
     def __init__(self, directory: Path) -> None:
         runs = read_campaign(directory).runs
-        self._runs = [_Followed(n, r, run_directory(directory, n) / "journal.jsonl") for n, r in runs.items()]
+        self._runs = [_Followed(n, r, run_directory(directory, n)) for n, r in runs.items()]
 
     def look(self) -> Progress:
         """How far the campaign is now."""
@@ -145,14 +144,8 @@ def total(spent: Iterable[Spent]) -> Spent:
 
 
 def _plus(a: Spent, b: Spent) -> Spent:
-    return Spent(
-        a.simulations + b.simulations,
-        a.seconds + b.seconds,
-        a.simulation_seconds + b.simulation_seconds,
-        a.engine_seconds + b.engine_seconds,
-        a.calls + b.calls,
-        a.prompt_tokens + b.prompt_tokens,
-        a.completion_tokens + b.completion_tokens,
-        a.reasoning_tokens + b.reasoning_tokens,
-        None if a.cost is None or b.cost is None else a.cost + b.cost,
-    )
+    def added(name: str) -> float | None:
+        one, other = getattr(a, name), getattr(b, name)
+        return None if one is None or other is None else one + other
+
+    return Spent(**{f.name: added(f.name) for f in fields(Spent)})  # type: ignore[arg-type]

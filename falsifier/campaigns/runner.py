@@ -15,20 +15,23 @@ from falsifier.campaigns.directory import (
     run_directory,
     write_campaign,
 )
-from falsifier.campaigns.plan import CampaignRequest
+from falsifier.campaigns.plan import CampaignRequest, method_of
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.schedule import Schedule
 from falsifier.campaigns.work import Done, Task, unpack
-from falsifier.counterexamples.found import keep_counterexample
+from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import Workers, open_workers
+from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import EndedRecord, open_journal, write_manifest
-from falsifier.search.manifest import check_unchanged, environment, file_hashes, manifest
-from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.search.journal import holds_run, open_journal, write_manifest
+from falsifier.search.leaders import check_names
+from falsifier.search.manifest import check_unchanged, describe, environment, file_hashes
+from falsifier.search.records import EndedRecord
+from falsifier.search.request import RunRequest
 from falsifier.search.tally import read_tally
-from falsifier.search.wiring import check_names
 
 Listener = Callable[[Progress], None]
 
@@ -123,7 +126,7 @@ def resume_campaign(
 def _work(
     directory: Path,
     record: CampaignRecord,
-    problems: Mapping[ProblemRequest, Problem],
+    problems: Mapping[ProblemSource, Problem],
     workers: Workers,
     listeners: tuple[Listener, ...],
 ) -> Outcome:
@@ -134,13 +137,14 @@ def _work(
     unfinished = [run.name for run in runs if not run.finished]
     for run in runs:  # the file of a run that ended at the very moment of a kill is missing
         if run.status == "falsified":
-            keep_counterexample(run_directory(directory, run.name))
+            keep_recorded(run_directory(directory, run.name))
     mark = campaign_mark(directory)
     tasks = []
     for name in unfinished:
         request = record.runs[name]
-        problem = problems[request.problem]
-        tasks.append(Task(name, request, problem, manifest(request, problem), directory.absolute(), mark))
+        problem = problems[request.problems[0]]
+        described = describe(request, [problem], method_of(request).label)
+        tasks.append(Task(name, request, problem, described, directory.absolute(), mark))
 
     def report(task: Task, done: Done) -> None:
         place = run_directory(directory, task.name)
@@ -148,7 +152,7 @@ def _work(
             unpack(done.packed, place)
         elif done.status == "failed":
             _record_failure(place, task, done.reason)
-        keep_counterexample(place)
+        keep_recorded(place)
 
     schedule = Schedule(tasks, workers, calls=record.request.calls)
     try:
@@ -213,25 +217,25 @@ def _check(requests: Iterable[RunRequest], *, local: bool) -> None:
             preflight(name, api_base=api_base)
 
 
-def _load(requests: Iterable[RunRequest]) -> dict[ProblemRequest, Problem]:
+def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
     """Load each problem once.
 
     Raises:
         SpecError: when two targets have a requirement of the same name, which no table could tell apart.
     """
-    problems: dict[ProblemRequest, Problem] = {}
+    problems: dict[ProblemSource, Problem] = {}
     targets: dict[str, str] = {}
-    for request in dict.fromkeys(r.problem for r in requests):
-        problem = problems[request] = request.load()
-        other = targets.setdefault(problem.name, request.target)
-        if other != request.target:
+    for source in dict.fromkeys(r.problems[0] for r in requests):
+        problem = problems[source] = load_source(source)
+        other = targets.setdefault(problem.name, source.target)
+        if other != source.target:
             raise SpecError(
-                f"{other} and {request.target} are both called {problem.name!r}: give one another name"
+                f"{other} and {source.target} are both called {problem.name!r}: give one another name"
             )
     return problems
 
 
-def _hashes(problems: Mapping[ProblemRequest, Problem]) -> dict[str, str]:
+def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
     return {path: digest for p in problems.values() for path, digest in file_hashes(p).items()}
 
 
@@ -241,6 +245,6 @@ def _record_failure(directory: Path, task: Task, reason: str) -> None:
     if tally.status not in ("waiting", "running"):
         return
     with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
-        if not (directory / "manifest.json").exists():
+        if not holds_run(directory):
             write_manifest(directory, task.manifest.model_dump(mode="json"))
         journal.write(EndedRecord(status="failed", reason=reason, spent=asdict(tally.spent)), at_once=True)

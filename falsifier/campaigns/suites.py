@@ -2,15 +2,16 @@
 
 import tomllib
 
+from falsifier.core.files import bundled
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.problem.loading import bundled, find_spec
+from falsifier.problem.loading import find_spec
+from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
-from falsifier.search.request import ProblemRequest
 
 SUITES = ("arch-comp",)
 
 
-def suite(name: str, *, profile: str | None = None) -> tuple[ProblemRequest, ...]:
+def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]:
     """Requirements of a suite.
 
     Args:
@@ -24,7 +25,7 @@ def suite(name: str, *, profile: str | None = None) -> tuple[ProblemRequest, ...
         raise SpecError(f"unknown suite {name!r}; {did_you_mean(name, SUITES)}")
     published = tomllib.loads((bundled("specs") / "published.toml").read_text(encoding="utf-8"))
     targets = [bundled_target(key) for key in published["best"] if key != "source"]
-    return tuple(ProblemRequest(target=t) for t in targets if profile is None or _offers(t, profile))
+    return tuple(ProblemSource(target=t) for t in targets if profile is None or _offers(t, profile))
 
 
 def bundled_target(requirement: str) -> str:

@@ -24,7 +24,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.manifest import Manifest
 from falsifier.search.request import RunRequest
-from falsifier.search.run import perform
+from falsifier.search.run import carry_out
 
 # A killed campaign's workers end within moments; whoever resumes it waits that long in s for their locks.
 _PATIENCE = 10.0
@@ -92,11 +92,11 @@ def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
         in_place = campaign_mark(task.campaign) == task.mark
         campaign = task.campaign if in_place else _store() / "runs" / task.mark
         directory = run_directory(campaign, task.name)
-        (result,) = perform(
+        (result,) = carry_out(
             task.request,
             [problem],
-            task.manifest,
             directory,
+            described=task.manifest,
             listeners=[_StopWatch(campaign / STOP)],
             resume=True,
             patience=_PATIENCE,

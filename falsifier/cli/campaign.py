@@ -24,10 +24,11 @@ from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
 from falsifier.campaigns.suites import SUITES
 from falsifier.cli.options import asking, asking_options, json_option, quiet_option
-from falsifier.problem.loading import bundled, find_spec, load_problems
+from falsifier.core.files import write_whole
+from falsifier.problem.loading import sources_of
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import write_whole
-from falsifier.search.request import Effort, LLMSettings, ProblemRequest
+from falsifier.search.request import Effort, LLMSettings
 from falsifier.views.campaign_text import campaign_display, overall_line
 
 # Time in s between two looks of falsifier watch.
@@ -197,18 +198,11 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
     sys.exit(3 if failed or outcome.reason else 0)
 
 
-def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemRequest]:
-    """One request for each requirement; a spec without a requirement's name stands for all that it has."""
-    requests = []
-    for target in targets:
-        if target.startswith("python:"):
-            requests.append(ProblemRequest(target=target))
-            continue
-        path, requirement = find_spec(target)
-        names = [requirement] if requirement else [p.name for p in load_problems(target, profile=profile)]
-        spec = path.stem if path.parent == bundled("specs") else path
-        requests += [ProblemRequest(target=f"{spec}:{name}") for name in names]
-    return requests
+def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:
+    """One source for each requirement; a spec without a requirement's name stands for all that it has."""
+    return [
+        source for target in targets for source in sources_of(ProblemSource(target=target, profile=profile))
+    ]
 
 
 def _methods(

@@ -91,9 +91,9 @@ def shrink(
         confirmation = confirm(problem, shrunk.evaluation)
     if confirmation.outcome == "refuted":
         raise SpecError(f"{run}: {confirmation.reason}")
-    written = write_counterexample(problem, confirmation, file.parent, request=stored.problem, name=file.name)
+    written = write_counterexample(confirmation, file.parent, name=file.name)
     if store is not None:
-        written.append(Database(store).save(problem, to_store(problem, confirmation, stored.problem)))
+        written.append(Database(store).save(problem, to_store(confirmation)))
     end = "a local minimum" if shrunk.minimal else f"the budget of {budget} simulations is used up"
     if as_json:
         content = _confirmation_json(confirmation)
@@ -187,16 +187,16 @@ def robustness_map(
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.counterexamples.robustness_map import sample_neighbourhood
-    from falsifier.views.plotting import plot_neighbourhood, save_figure
+    from falsifier.counterexamples.robustness_map import robustness_map
+    from falsifier.views.plotting import plot_robustness_map, save_figure
 
     stored = load(run)
     picture = out or _beside(run, "robustness-map.png")
     with _problem(stored) as problem:
-        found = sample_neighbourhood(
+        found = robustness_map(
             problem, _simulated(stored, problem), radius=radius, samples=samples, points=grid, seed=seed
         )
-    save_figure(plot_neighbourhood(found, problem.name), picture)
+    save_figure(plot_robustness_map(found, problem.name), picture)
     if as_json:
         content = {
             "persistence": [{"size": size, "share": share} for size, share in found.persistence],

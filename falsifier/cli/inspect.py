@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.options import json_option
+from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
-from falsifier.problem.loading import bundled, load_problems
-from falsifier.problem.options import default_interface, default_interval, starter_spec
+from falsifier.problem.defaults import default_interface, default_interval
+from falsifier.problem.loading import load_problems
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
+from falsifier.problem.starter import starter_spec
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -116,8 +118,8 @@ def schema(*, what: str) -> None:
 def _schema(what: str) -> dict[str, Any]:
     from falsifier.campaigns.directory import CampaignRecord
     from falsifier.problem.spec import Spec
-    from falsifier.search.journal import RECORDS
     from falsifier.search.manifest import Manifest
+    from falsifier.search.records import RECORDS
 
     models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
     return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import json_option, problem_options, problem_request
+from falsifier.cli.options import json_option, problem_options, problem_source
+from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Message, Tool
@@ -46,7 +47,7 @@ def prompt(
 
     if samples is not None and directory is None:
         raise click.UsageError("--samples needs --run DIR")
-    problem = problem_request(options).load()
+    problem = load_source(problem_source(options))
     evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
     told = evaluations[:samples]
     settings = HybridSettings()

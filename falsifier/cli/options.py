@@ -8,7 +8,9 @@ from typing import Any, TypeVar
 
 import click
 
-from falsifier.search.request import LLMSettings, ProblemRequest
+from falsifier.problem.options import changes_from_options
+from falsifier.problem.source import ProblemSource
+from falsifier.search.request import LLMSettings
 
 # Options of litellm that would carry a key.
 _SECRET_OPTIONS = ("api_key", "headers", "extra_headers", "extra_body")
@@ -60,9 +62,12 @@ def problem_options(command: F) -> F:
     return command
 
 
-def problem_request(options: dict[str, Any]) -> ProblemRequest:
+def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the problem's options out of a command's keyword arguments."""
-    return ProblemRequest(**{name: options.pop(name) for name in ProblemRequest.model_fields})
+    varied = ("inputs", "parameters", "stop_time", "output_interval", "interface")
+    changes = changes_from_options(**{name: options.pop(name) for name in varied})
+    stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization")}
+    return ProblemSource(**stated, changes=changes)
 
 
 def llm_options(command: F) -> F:

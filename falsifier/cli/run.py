@@ -17,14 +17,16 @@ from falsifier.cli.options import (
     llm_settings,
     out_option,
     problem_options,
-    problem_request,
+    problem_source,
     quiet_option,
 )
+from falsifier.errors import SpecError
+from falsifier.problem.loading import find_spec, sources_of
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.manifest import recorded_request
-from falsifier.search.request import RunRequest
 from falsifier.search.result import Result
-from falsifier.search.run import execute, execute_all, resume_run
+from falsifier.search.run import falsify
+from falsifier.search.run import resume as resume_run
 from falsifier.views.progress import make_display
 from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 
@@ -65,17 +67,19 @@ def run(
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl.
     """
-    request = RunRequest(
-        problem=problem_request(options),
-        engine=engine,
-        llm=llm_settings(options),
-        seed=seed,
-        budget=Budget(budget, seconds, max_tokens, max_cost),
-        jobs=jobs,
-    )
-    directory = out or _new_directory(request.problem.target)
+    source, llm = problem_source(options), llm_settings(options)
+    sources = _all_of(source) if together else (source,)
     with make_display(quiet=quiet) as display:
-        results = (execute_all if together else execute)(request, directory, listeners=[display])
+        results = falsify(
+            sources,
+            engine,
+            llm=llm,
+            seed=seed,
+            budget=Budget(budget, seconds, max_tokens, max_cost),
+            jobs=jobs,
+            directory=out or _new_directory(source.target),
+            listeners=[display],
+        )
     _finish(results, as_json=as_json)
 
 
@@ -130,21 +134,24 @@ def _finish(results: list[Result], *, as_json: bool) -> None:
 
 
 def _write_counterexamples(result: Result, directory: Path) -> None:
-    asked = recorded_request(directory)
-    request = asked.problem
-    if asked.together:
-        request = request.model_copy(update={"target": result.problem.source})
+    name = counterexample_name(result)
     if result.counterexample is not None:
-        write_counterexample(
-            result.problem,
-            result.counterexample,
-            directory,
-            request=request,
-            name=counterexample_name(result),
-        )
+        write_counterexample(result.counterexample, directory, name=name)
     for i, fragile in enumerate(result.fragile, start=1):
-        name = counterexample_name(result).replace("counterexample", f"fragile-{i}")
-        write_counterexample(result.problem, fragile, directory, request=request, name=name)
+        write_counterexample(fragile, directory, name=name.replace("counterexample", f"fragile-{i}"))
+
+
+def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
+    """Sources of all requirements of a spec.
+
+    Raises:
+        SpecError: when the target is no spec, or names one requirement.
+    """
+    if source.target.endswith(".fmu") or source.target.startswith("python:") or source.stl is not None:
+        raise SpecError(f"{source.target}: only a spec has several requirements")
+    if find_spec(source.target)[1] is not None:
+        raise SpecError(f"{source.target}: name the spec without a requirement to falsify all of them")
+    return tuple(sources_of(source))
 
 
 def _new_directory(target: str) -> Path:

@@ -131,6 +131,11 @@ class SearchSpace:
         return (*(r.name for r in self.inputs), *(p.name for p in self.parameters))
 
     @property
+    def fixed(self) -> "SearchSpace":
+        """The same space with only the spec's own control points allowed."""
+        return replace(self, inputs=tuple(replace(r, free=None) for r in self.inputs))
+
+    @property
     def dimensions(self) -> tuple[Dimension, ...]:
         """Coordinates of the vector form: control points input by input in time order, then parameters."""
         points = (

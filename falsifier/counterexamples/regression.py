@@ -9,9 +9,8 @@ from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget
-from falsifier.search.loop import falsify
-from falsifier.search.request import ProblemRequest
 from falsifier.search.result import Result
+from falsifier.search.run import falsify
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,36 +39,32 @@ def check(
     budget: Budget | int = 100,
     seed: int = 0,
     database: Database | None = None,
-    request: ProblemRequest | None = None,
 ) -> Checked:
     """Run the stored counterexamples, then search; a new counterexample is shrunk and stored.
 
     Args:
         problem: what to check.
-        engine: name of a numerical engine; None: the usual one.
+        engine: name of an engine that needs no language model; None: the default one.
         budget: of the search; shrinking may use as many simulations again.
         seed: of the engine.
         database: where counterexamples are stored; None: nowhere.
-        request: how the problem is loaded, for the stored file.
 
     Raises:
         SimulationError: when a stored counterexample cannot be simulated, or nothing of the search can.
     """
-    from falsifier.engines import DEFAULT_ENGINE
-
     replayed: list[Replayed] = []
     for path, stored in database.fetch(problem) if database else ():
         again = replay(stored, problem)
         replayed.append(again)
         if again.status == "violates":
             return Checked(problem, again.confirmation, path, tuple(replayed), None)
-    result = falsify(problem, engine or DEFAULT_ENGINE, budget=budget, seed=seed)
+    result = falsify(problem, engine, budget=budget, seed=seed)
     if result.status == "failed":
         raise SimulationError(f"{problem.name}: {result.reason}")
     found = result.counterexample and _smallest(
         problem, result.counterexample, result.spent.simulations, budget
     )
-    file = database.save(problem, to_store(problem, found, request)) if database and found else None
+    file = database.save(problem, to_store(found)) if database and found else None
     return Checked(problem, found, file, tuple(replayed), result)
 
 

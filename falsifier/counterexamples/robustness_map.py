@@ -52,7 +52,7 @@ class Coordinate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Neighbourhood:
+class RobustnessMap:
     """Simulations around a counterexample.
 
     Attributes:
@@ -96,7 +96,7 @@ class Neighbourhood:
         )
 
 
-def sample_neighbourhood(
+def robustness_map(
     problem: Problem,
     evaluation: Evaluation,
     *,
@@ -104,7 +104,7 @@ def sample_neighbourhood(
     samples: int = 256,
     points: int = 21,
     seed: int = 0,
-) -> Neighbourhood:
+) -> RobustnessMap:
     """Simulate around a counterexample.
 
     Args:
@@ -149,7 +149,7 @@ def sample_neighbourhood(
             if second is not None:
                 row[axes[1]] = second
             surface.append(_robustness(problem, candidate, coordinates, row))
-    return Neighbourhood(
+    return RobustnessMap(
         evaluation.robustness,
         coordinates,
         radius,

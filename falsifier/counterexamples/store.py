@@ -9,7 +9,6 @@ that it can be run again after the FMU or the requirement has changed.
 """
 
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
@@ -21,13 +20,18 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
-from falsifier.errors import CandidateError, SimulationError, SpecError
+from falsifier.core.files import write_whole
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.loading import load_source, reloadable, spec_file
 from falsifier.problem.problem import Problem
-from falsifier.search.journal import ConfirmedRecord, read_journal, read_manifest, recorded_evaluations
-from falsifier.search.manifest import Manifest
-from falsifier.search.request import ProblemRequest
+from falsifier.problem.source import ProblemSource
+from falsifier.search import manifest
+from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.search.manifest import RequirementRecord
+from falsifier.search.records import ConfirmedRecord
+from falsifier.stl.verdict import Verdict
 
 FILE_NAME = "counterexample.json"
 
@@ -48,7 +52,7 @@ class StoredCounterexample(BaseModel):
     format: Literal[1] = 1
     requirement: str
     formula: str
-    problem: ProblemRequest | None = Field(
+    problem: ProblemSource | None = Field(
         None, description="How to load the problem, paths relative to this file; null: only code can tell."
     )
     candidate: dict[str, Any]
@@ -79,28 +83,47 @@ class Replayed:
     text: str
 
 
-def to_store(
-    problem: Problem, confirmation: Confirmation, request: ProblemRequest | None
-) -> StoredCounterexample:
+def to_store(confirmation: Confirmation) -> StoredCounterexample:
     """Content of the file for a confirmed or fragile violation.
 
     Raises:
         ValueError: when the evaluation has no verdict.
     """
-    evaluation = confirmation.evaluation
+    problem, evaluation = confirmation.problem, confirmation.evaluation
     if evaluation.verdict is None:
         raise ValueError("a simulation that failed is no counterexample")
-    return StoredCounterexample(
-        requirement=problem.name,
-        formula=str(problem.requirement.formula),
-        problem=request,
-        candidate=evaluation.candidate.to_json(),
-        robustness=evaluation.verdict.robustness,
-        critical_time=evaluation.verdict.critical_time,
-        predicate=evaluation.verdict.predicate,
+    return _content(
+        RequirementRecord.of(problem.requirement),
+        reloadable(problem),
+        evaluation.candidate,
+        evaluation.verdict,
         outcome=confirmation.outcome,
         reason=confirmation.reason,
         fmu_sha256=getattr(problem.model, "sha256", None),
+    )
+
+
+def _content(
+    requirement: RequirementRecord,
+    source: ProblemSource | None,
+    candidate: Candidate,
+    verdict: Verdict,
+    *,
+    outcome: Outcome,
+    reason: str,
+    fmu_sha256: str | None,
+) -> StoredCounterexample:
+    return StoredCounterexample(
+        requirement=requirement.name,
+        formula=requirement.formula,
+        problem=source,
+        candidate=candidate.to_json(),
+        robustness=verdict.robustness,
+        critical_time=verdict.critical_time,
+        predicate=verdict.predicate,
+        outcome=outcome,
+        reason=reason,
+        fmu_sha256=fmu_sha256,
     )
 
 
@@ -108,11 +131,7 @@ def save(stored: StoredCounterexample, path: Path) -> Path:
     """Write a counterexample file in one step; the problem's paths are made relative to it."""
     request = stored.problem and _seen_from(stored.problem, path.parent)
     content = stored.model_copy(update={"problem": request}).model_dump(mode="json")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    partial.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    partial.replace(path)
-    return path
+    return write_whole(path, json.dumps(content, indent=2) + "\n")
 
 
 def load(path: Path) -> StoredCounterexample:
@@ -140,8 +159,8 @@ def counterexample_file(path: Path) -> Path:
         SpecError: when there is none, or more than one.
     """
     directory = path if path.is_dir() else path.parent
-    if not path.is_file() and (directory / "manifest.json").exists():
-        _keep_recorded(directory)
+    if not path.is_file():
+        keep_recorded(directory)
     if not path.is_dir():
         if not path.is_file():
             raise SpecError(
@@ -166,47 +185,38 @@ def file_name(requirement: str = "") -> str:
     return f"counterexample-{requirement}.json" if requirement else FILE_NAME
 
 
-def _keep_recorded(directory: Path) -> None:
-    """Write the counterexamples of a run directory's journal that have no file yet."""
-    records = read_journal(directory)
-    confirmed = [r for r in records if isinstance(r, ConfirmedRecord) and r.outcome == "confirmed"]
-    missing = [r for r in confirmed if not (directory / file_name(r.requirement)).exists()]
-    if not missing:
+def keep_recorded(directory: Path) -> None:
+    """Write the counterexamples of a run directory's journal that have no file yet.
+
+    Runs that were killed, and those of a campaign, keep a journal only; a directory of no run is left alone.
+    """
+    if not holds_run(directory):
         return
-    described = Manifest.model_validate(read_manifest(directory))
-    evaluations = recorded_evaluations(directory, records)
-    for record in missing:
-        save(_stored(described, record, evaluations[record.index]), directory / file_name(record.requirement))
-
-
-def _stored(described: Manifest, confirmed: ConfirmedRecord, evaluation: Evaluation) -> StoredCounterexample:
-    """Counterexample of one requirement; where several shared a search, it is simulated again."""
-    requirement, problem = described.requirement, described.request.problem
-    if confirmed.requirement:
-        requirement = described.of(confirmed.requirement).requirement
-        target = f"{described.source.rpartition(':')[0]}:{confirmed.requirement}"
-        problem = problem.model_copy(update={"target": target})
-        loaded = problem.load()
-        evaluation = evaluate(loaded, evaluation.candidate)
-        loaded.model.close()
-    verdict = evaluation.verdict
-    if verdict is None:
-        raise SimulationError(
-            f"{requirement['name']}: the simulation {evaluation.status}: {evaluation.reason}"
+    described = manifest.read(directory)
+    records = read_journal(directory)
+    evaluations: dict[str, list[Evaluation]] = {}
+    for record in records:
+        if not isinstance(record, ConfirmedRecord) or record.outcome != "confirmed":
+            continue
+        name = record.requirement
+        file = directory / file_name(name if described.shared else "")
+        if file.exists():
+            continue
+        if name not in evaluations:
+            evaluations[name] = recorded_evaluations(directory, records, name)
+        evaluation, alone = evaluations[name][record.index], described.of(name)
+        if evaluation.verdict is None:
+            raise JournalError(f"{directory}: the journal has no verdict of the counterexample of {name}")
+        content = _content(
+            alone.requirement,
+            alone.request.source,
+            evaluation.candidate,
+            evaluation.verdict,
+            outcome="confirmed",
+            reason=record.reason,
+            fmu_sha256=described.fmu_sha256,
         )
-    digests = [digest for name, digest in described.hashes.items() if name.endswith(".fmu")]
-    return StoredCounterexample(
-        requirement=requirement["name"],
-        formula=requirement["formula"],
-        problem=problem,
-        candidate=evaluation.candidate.to_json(),
-        robustness=verdict.robustness,
-        critical_time=verdict.critical_time,
-        predicate=verdict.predicate,
-        outcome="confirmed",
-        reason=confirmed.reason,
-        fmu_sha256=digests[0] if digests else None,
-    )
+        save(content, file)
 
 
 def problem_of(stored: StoredCounterexample) -> Problem:
@@ -220,7 +230,7 @@ def problem_of(stored: StoredCounterexample) -> Problem:
             f"this counterexample of {stored.requirement} is of a problem made in Python: run the test that "
             "found it"
         )
-    return stored.problem.load()
+    return load_source(stored.problem)
 
 
 def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
@@ -265,8 +275,8 @@ class Database:
             yield path, load(path)
 
     def _place(self, problem: Problem) -> Path:
-        spec, _, _ = problem.source.rpartition(":")
-        return self.folder / (f"{Path(spec).stem}.{problem.name}" if spec else problem.name)
+        spec = None if problem.source is None else spec_file(problem.source)
+        return self.folder / (f"{spec.stem}.{problem.name}" if spec else problem.name)
 
 
 def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
@@ -286,7 +296,7 @@ def _split(target: str) -> tuple[Path | None, str]:
     return (Path(file), f":{requirement}") if colon and file.endswith(".toml") else (None, "")
 
 
-def _seen_from(request: ProblemRequest, folder: Path) -> ProblemRequest:
+def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:
     """Return the request with its file as seen from a folder."""
     file, requirement = _split(request.target)
     if file is None:
@@ -295,7 +305,7 @@ def _seen_from(request: ProblemRequest, folder: Path) -> ProblemRequest:
     return request.model_copy(update={"target": f"{seen}{requirement}"})
 
 
-def _found_from(request: ProblemRequest, folder: Path) -> ProblemRequest:
+def _found_from(request: ProblemSource, folder: Path) -> ProblemSource:
     """Return the request with its file, which is given as seen from a folder, as found from here."""
     file, requirement = _split(request.target)
     return request if file is None else request.model_copy(update={"target": f"{folder / file}{requirement}"})

@@ -1,11 +1,13 @@
 """What the hybrid engine asks of a language model."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.conversation import OnExchange
+from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
 
 
@@ -28,6 +30,10 @@ class Adviser(Protocol):
     @property
     def name(self) -> str:
         """What its candidates bear as origin."""
+        ...
+
+    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
+        """See AsksLLM.attach."""
         ...
 
     def describe(self, candidate: Candidate) -> str:

@@ -7,7 +7,7 @@ once. When its candidates stop helping, the surrogate goes on alone, near the cr
 surrogate stops helping or errs, the LLM is asked again and told why.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,6 +18,8 @@ from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.conversation import OnExchange
+from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 
@@ -84,6 +86,10 @@ class Hybrid:
         self._turn: _Turn | None = None
         self._is_opened = False
         self._numeric: Candidate | None = None
+
+    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
+        """Have the language model's side report to a run."""
+        self.adviser.attach(on_exchange, wrap)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """See Engine.ask.

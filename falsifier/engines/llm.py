@@ -1,6 +1,6 @@
 """A language model as a search engine."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -42,7 +42,7 @@ class LLMEngine:
         view: the problem, without what simulates it.
         chat: the LLM.
         variant: what its prompts tell.
-        on_exchange: called with every question and answer.
+        on_exchange: called with every question and answer, until a run attaches itself.
         sample: which of several runs with equal questions this is.
         prompt_tokens: most tokens of a prompt, by estimate.
         anonymous: whether the LLM is told neutral names only.
@@ -78,6 +78,11 @@ class LLMEngine:
     def name(self) -> str:
         """Model and prompt variant."""
         return f"{self._chat.llm} {self._variant.name}"
+
+    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
+        """Report to a run, and ask the chat that it wraps around this engine's own."""
+        self._on_exchange = on_exchange
+        self._chat = wrap(self._chat)
 
     @property
     def handed_over(self) -> bool:

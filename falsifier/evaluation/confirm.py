@@ -6,7 +6,7 @@ candidate, only how often the simulator exchanges values changes. The monitored 
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,14 +16,18 @@ from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
+if TYPE_CHECKING:
+    from falsifier import Figure
+
 Outcome = Literal["confirmed", "fragile", "refuted"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Confirmation:
     """What second simulations and the second monitor said of a violation.
 
     Attributes:
+        problem: what it violates.
         evaluation: the violation as found.
         outcome: ``confirmed``: it happened again, at half the step too, and both monitors agree on the sign;
             ``fragile``: it happened again, but not at half the step; ``refuted``: anything else.
@@ -33,12 +37,24 @@ class Confirmation:
         halved: robustness at half the communication step, None when there was no such simulation.
     """
 
+    problem: Problem
     evaluation: Evaluation
     outcome: Outcome
     robustness: float | None
     reference: float | None
     reason: str
     halved: float | None = None
+
+    @property
+    def candidate(self) -> Candidate:
+        """The inputs and parameters that violate."""
+        return self.evaluation.candidate
+
+    def plot(self) -> "Figure":
+        """Picture of the inputs and of the signals that decided, with the critical time."""
+        from falsifier import plot
+
+        return plot(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +72,14 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     fresh = _repeat(problem, evaluation.candidate)
     if fresh.doubt:
         reason = f"the second simulation {fresh.doubt}"
-        return Confirmation(evaluation, "refuted", fresh.robustness, fresh.reference, reason)
+        return Confirmation(
+            problem=problem,
+            evaluation=evaluation,
+            outcome="refuted",
+            robustness=fresh.robustness,
+            reference=fresh.reference,
+            reason=reason,
+        )
     reason = f"a fresh simulation gives {fresh.robustness:+.6g}, rtamt {fresh.reference:+.6g}"
     finer = half_step(problem)
     halved = _repeat(finer, evaluation.candidate, known=fresh)
@@ -73,7 +96,13 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     else:
         reason += f"; {steps} gives {halved.robustness:+.6g}"
     return Confirmation(
-        evaluation, outcome, fresh.robustness, fresh.reference, reason, halved=halved.robustness
+        problem=problem,
+        evaluation=evaluation,
+        outcome=outcome,
+        robustness=fresh.robustness,
+        reference=fresh.reference,
+        reason=reason,
+        halved=halved.robustness,
     )
 
 

@@ -1,5 +1,6 @@
 """One candidate in, one evaluation out."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import perf_counter
@@ -9,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import MonitorError, SimulationError
+from falsifier.errors import CandidateError, MonitorError, SimulationError, did_you_mean
 from falsifier.problem.problem import Problem
 from falsifier.stl import Formula, Monitor
 from falsifier.stl.verdict import Verdict
@@ -76,6 +78,43 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     except MonitorError as error:
         return Evaluation(candidate, "failed", None, str(error), None, seconds, outputs.log)
     return Evaluation(candidate, "ok", verdict, "", trajectory, seconds, outputs.log)
+
+
+def simulate(
+    problem: Problem,
+    inputs: Mapping[str, Signal | float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Evaluation:
+    """Simulate inputs of one's own and judge them; the search space's ranges do not apply.
+
+    Args:
+        problem: what is simulated, and the requirement to judge by.
+        inputs: by name, a signal, or a number for a constant one; other inputs are at rest.
+        parameters: by name; others keep the problem's or the model's values.
+
+    Raises:
+        CandidateError: for a name that is no input, or no parameter or start value that can be set.
+        ModelError: when the model cannot be used at all.
+
+    >>> simulate(load_problem("AT1"), {"throttle": 100.0}).robustness  # doctest: +SKIP
+    -0.213
+    """
+    info, driven = problem.info, dict(inputs or {})
+    known = [v.name for v in info.inputs]
+    settable = [v.name for v in info.variables if v.settable and v.causality != "input"]
+    settable += [v.name for v in info.parameters]
+    for name in driven:
+        if name not in known:
+            raise CandidateError(f"the model has no input {name!r}; {did_you_mean(name, known)}")
+    for name in parameters or {}:
+        if name not in settable:
+            raise CandidateError(
+                f"the model has no parameter {name!r} to set; {did_you_mean(name, settable)}"
+            )
+    signals = {n: s if isinstance(s, Signal) else Signal((0.0,), (float(s),)) for n, s in driven.items()}
+    fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
+    candidate = Candidate(signals, {n: float(v) for n, v in (parameters or {}).items()}, "user")
+    return evaluate(replace(problem, parameters=fixed), candidate)
 
 
 def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:

@@ -10,7 +10,7 @@ from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.view import View
-from falsifier.problem.problem import Requirement
+from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict
 from falsifier.stl.expression import Name
 

@@ -29,26 +29,55 @@ def _is_exchange(record: Any) -> bool:
     return isinstance(record, dict) and ("exchange" in record or {"messages", "reply"} <= record.keys())
 
 
+class Recording:
+    """Recorded exchanges, each played once, whichever chat asks for it.
+
+    Args:
+        exchanges: what was recorded, in order.
+    """
+
+    def __init__(self, exchanges: Iterable[Exchange]) -> None:
+        self._exchanges = list(exchanges)
+        self._played = 0
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._exchanges)
+
+    @property
+    def remaining(self) -> int:
+        """Recorded replies that were not played yet."""
+        return len(self._exchanges) - self._played
+
+    @property
+    def llm(self) -> str:
+        """Of what this is a recording, in words."""
+        return f"recording of {self._exchanges[0].llm}" if self._exchanges else "empty recording"
+
+    def next(self) -> Exchange | None:
+        """Next exchange; None at the end."""
+        with self._lock:
+            found = self._exchanges[self._played] if self.remaining else None
+            self._played += found is not None
+        return found
+
+
 class RecordedChat:
     """Answers with recorded replies in their order, then asks an inner chat.
 
     Args:
-        exchanges: what was recorded, in order.
+        recording: what was recorded.
         inner: who answers after that; None: nobody.
     """
 
-    def __init__(self, exchanges: Iterable[Exchange], inner: Chat | None = None) -> None:
-        self._exchanges = list(exchanges)
+    def __init__(self, recording: Recording | Iterable[Exchange], inner: Chat | None = None) -> None:
+        self.recording = recording if isinstance(recording, Recording) else Recording(recording)
         self._inner = inner
-        self._played = 0
-        self._lock = threading.Lock()
 
     @property
     def llm(self) -> str:
         """Name of the LLM that is asked; without one, that this is a recording, and of what."""
-        if self._inner is not None:
-            return self._inner.llm
-        return f"recording of {self._exchanges[0].llm}" if self._exchanges else "empty recording"
+        return self.recording.llm if self._inner is None else self._inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -58,7 +87,7 @@ class RecordedChat:
     @property
     def remaining(self) -> int:
         """Recorded replies that were not played yet."""
-        return len(self._exchanges) - self._played
+        return self.recording.remaining
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next recorded reply.
@@ -66,15 +95,13 @@ class RecordedChat:
         Raises:
             ChatError: when the recording has ended and nobody is there to ask.
         """
-        with self._lock:
-            recorded = self._exchanges[self._played] if self.remaining else None
-            self._played += recorded is not None
+        recorded = self.recording.next()
         if recorded is not None:
             if recorded.reply is None:
                 raise ChatError(recorded.problem or "no answer came")
             return recorded.reply.model_copy(update={"source": "recording"})
         if self._inner is None:
-            raise ChatError(f"the {self.llm} ends after {len(self._exchanges)} replies")
+            raise ChatError(f"the {self.llm} ends after {len(self.recording)} replies")
         return self._inner.complete(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:

@@ -1,145 +1,145 @@
-"""The loop: ask, simulate, judge, tell, until a requirement is violated or the budget is used up."""
+"""The loop: ask, simulate, judge, tell, until every requirement is violated or the budget is used up."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.protocol import Engine
-from falsifier.errors import ChatError, JournalError, SpecError
+from falsifier.engines.protocol import AsksLLM, Engine
+from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
-from falsifier.evaluation.evaluate import Evaluation, evaluate, judge
+from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.evaluation.workers import evaluate_all
+from falsifier.llm.messages import Chat, Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget, Spent
-from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
-from falsifier.search.journal import (
-    AskedRecord,
-    ConfirmedRecord,
-    EndedRecord,
-    ExchangeRecord,
-    Journal,
-    Record,
-    recorded_evaluations,
+from falsifier.search.events import (
+    Asked,
+    Confirmed,
+    Evaluated,
+    Event,
+    Exchanged,
+    Listener,
+    RunEnded,
+    RunStarted,
 )
 from falsifier.search.result import Result, ResultStatus
-
-if TYPE_CHECKING:
-    from falsifier.llm.messages import Exchange
-
-OnExchange = Callable[["Exchange"], None]
-# Makes a problem's engine, which calls what it is handed with every exchange with a language model.
-EngineBuilder = Callable[[Problem, OnExchange], Engine]
 
 # A model whose first simulations all fail is broken or wrongly set up; more of them would tell nothing new.
 _HOPELESS = 10
 
 
-def falsify(
-    problem: Problem,
-    engine: str | Engine = "corners",
-    *,
-    budget: Budget | int = 100,
-    seed: int = 0,
-    listeners: Iterable[Listener] = (),
-) -> Result:
-    """Search for a violation in this process, without a record on disk.
+class Steps(Protocol):
+    """What the loop has done for it: by engines, models and monitors, or from a record."""
 
-    Args:
-        problem: what to falsify.
-        engine: name of a numerical engine, or any engine.
-        budget: limits; a number means simulations.
-        seed: of the engine, where it is given by name.
-        listeners: called with every event.
+    @property
+    def replayed(self) -> int:
+        """How many evaluations come from a record."""
+        ...
 
-    >>> falsify(load_problem("AT1"), "corners", budget=20).status  # doctest: +SKIP
-    'falsified'
+    @property
+    def seconds(self) -> float:
+        """Wall-clock seconds that the recorded part of the run took."""
+        ...
+
+    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Candidates of an engine, how many were asked for, and how long that took in s."""
+        ...
+
+    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
+        """Yield the candidates' evaluations in their order."""
+        ...
+
+    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
+        """Check a violation, given the index of its evaluation."""
+        ...
+
+    def chat(self, inner: Chat) -> Chat:
+        """The chat that an engine asks."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Everything is done now.
+
+    Attributes:
+        executor: where to simulate; None: in this process.
     """
-    from falsifier.engines import make_engine
 
-    found = make_engine(engine, problem, seed=seed) if isinstance(engine, str) else engine
-    limits = Budget(simulations=budget) if isinstance(budget, int) else budget
-    return search(problem, lambda *_: found, limits, listeners=listeners)
+    executor: Executor | None = None
+    replayed: int = 0
+    seconds: float = 0.0
+
+    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Ask the engine."""
+        started = perf_counter()
+        candidates = engine.ask(wanted)
+        return candidates, wanted, perf_counter() - started
+
+    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
+        """Simulate and judge."""
+        return evaluate_all(problem, candidates, self.executor)
+
+    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
+        """Simulate again."""
+        return confirm(problem, evaluation)
+
+    def chat(self, inner: Chat) -> Chat:
+        """Ask the chat itself."""
+        return inner
 
 
 def search(
-    problem: Problem,
-    build: EngineBuilder,
-    budget: Budget,
-    *,
-    batch: int = 1,
-    executor: Executor | None = None,
-    journal: Journal | None = None,
-    records: Sequence[Record] = (),
-    listeners: Iterable[Listener] = (),
-) -> Result:
-    """Run the loop.
-
-    Args:
-        problem: what to falsify.
-        build: makes the engine.
-        budget: limits.
-        batch: how many candidates are asked for and simulated at a time.
-        executor: where to simulate; None: in this process.
-        journal: where to record; None: nowhere.
-        records: what the journal already holds; these evaluations are told again instead of simulated again.
-        listeners: called with every event.
-    """
-    return search_together(
-        (problem,),
-        build,
-        budget,
-        batch=batch,
-        executor=executor,
-        journal=journal,
-        records=records,
-        listeners=listeners,
-    )[0]
-
-
-def search_together(
     problems: Sequence[Problem],
-    build: EngineBuilder,
+    engines: Sequence[Engine],
     budget: Budget,
     *,
+    steps: Steps | None = None,
     batch: int = 1,
-    executor: Executor | None = None,
-    journal: Journal | None = None,
-    records: Sequence[Record] = (),
+    directory: Path | None = None,
     listeners: Iterable[Listener] = (),
 ) -> list[Result]:
-    """Falsify several requirements of one system: every simulation is judged against all of them.
+    """Falsify several requirements of one system; one is the case of a list of one.
 
-    The requirements that still hold take turns in proposing; every engine is told every simulation. A
-    result counts the simulations until its requirement fell. Arguments are those of search; the problems
-    differ in nothing but their requirement.
+    Every simulation is judged against all requirements. Those that are not falsified yet take turns in
+    asking; every engine is told every simulation. A result counts the simulations until its requirement was
+    falsified.
+
+    Args:
+        problems: what to falsify; they differ in nothing but their requirement.
+        engines: one for each problem.
+        budget: limits of the run.
+        steps: who asks, simulates and confirms; default: everything is done in this process.
+        batch: how many candidates are asked for and simulated at a time.
+        directory: where the run is recorded, for the results.
+        listeners: called with every event.
 
     Raises:
         SpecError: when the problems differ in what is varied or in how it is simulated.
     """
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
-    loop = _Loop(budget, journal, records, tuple(listeners))
+    loop = _Loop(budget, steps or Live(), directory, tuple(listeners))
+    loop.targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
+    status: ResultStatus
     try:
-        loop.targets = [_Target(problem, build(problem, loop.exchanged)) for problem in problems]
-        reason = loop.run(batch, executor)
-        status: ResultStatus = "failed" if loop.is_hopeless() else "not falsified"
+        loop.attach()
+        reason = loop.run(batch)
+        status = "failed" if loop.is_hopeless() else "not falsified"
     except KeyboardInterrupt:
         status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
         status, reason = "failed", str(error)
     except BaseException as error:
-        loop.write_end("failed", f"{type(error).__name__}: {error}")
+        with suppress(Exception):  # the first error is the one to hear of
+            loop.end("failed", f"{type(error).__name__}: {error}")
         raise
-    results = [loop.result(target, status, reason) for target in loop.targets]
-    overall = "falsified" if all(r.status == "falsified" for r in results) else status
-    loop.write_end(overall, results[0].reason if len(results) == 1 else reason)
-    for result in results:
-        loop.emit(RunEnded(result))
-    return results
+    return loop.end(status, reason)
 
 
 @dataclass(slots=True)
@@ -154,10 +154,6 @@ class _Target:
     counterexample: Confirmation | None = None
     spent: Spent | None = None
 
-    @property
-    def name(self) -> str:
-        return self.problem.name
-
     def note(self, evaluation: Evaluation) -> bool:
         """Remember an evaluation; return whether it is the best so far."""
         improved = _smaller(evaluation, self.best)
@@ -171,49 +167,55 @@ class _Loop:
     """State of one running search: the imperative shell around values and pure functions."""
 
     def __init__(
-        self,
-        budget: Budget,
-        journal: Journal | None,
-        records: Sequence[Record],
-        listeners: tuple[Listener, ...],
+        self, budget: Budget, steps: Steps, directory: Path | None, listeners: tuple[Listener, ...]
     ) -> None:
         self.targets: list[_Target] = []
         self.budget = budget
-        self.journal = journal
+        self.steps = steps
+        self.directory = directory
         self.listeners = listeners
-        self.asked = [r for r in records if isinstance(r, AskedRecord)]
-        directory = journal.directory if journal else Path()
-        self.recorded = dict(enumerate(recorded_evaluations(directory, list(records))))
-        self.confirmed = {(r.index, r.requirement) for r in records if isinstance(r, ConfirmedRecord)}
-        self.replayed_exchanges = sum(isinstance(r, ExchangeRecord) for r in records)
         self.count = 0
-        earlier = [r.spent.get("seconds") or 0.0 for r in records if isinstance(r, EndedRecord)]
-        self.started = perf_counter() - max(earlier, default=0.0)
+        self.started = perf_counter() - steps.seconds
         self.spent = Spent()
 
-    def run(self, batch: int, executor: Executor | None) -> str:
-        """Search until nothing is left to falsify or to spend; return why it ended."""
+    def attach(self) -> None:
+        """Hear of every exchange of engines that ask a language model."""
         for target in self.targets:
-            self.emit(RunStarted(target.problem, target.engine.name, self.budget, len(self.recorded)))
+            if isinstance(target.engine, AsksLLM):
+                target.engine.attach(self.exchanged, self.steps.chat)
+
+    def run(self, batch: int) -> str:
+        """Search until nothing is left to falsify or to spend; return why it ended."""
+        self.emit(
+            RunStarted(
+                problems=tuple(t.problem for t in self.targets),
+                engines=tuple(t.engine.name for t in self.targets),
+                budget=self.budget,
+                replayed=self.steps.replayed,
+            )
+        )
         turns = 0
         while standing := [t for t in self.targets if t.counterexample is None]:
             limit = self.budget.exceeded(self.clock())
-            if limit is not None:
-                return limit if not self.is_hopeless() else self.hopelessness()
-            if self.count >= _HOPELESS and self.is_hopeless():
-                return self.hopelessness()
+            if limit is not None or self.count >= _HOPELESS:
+                if self.is_hopeless():
+                    return self.hopelessness()
+                if limit is not None:
+                    return limit
             turn = standing[turns % len(standing)]
             turns += 1
-            told: dict[str, list[Evaluation]] = {target.name: [] for target in standing}
-            for evaluation, replayed in self.evaluate(turn, self.ask(turn, batch), executor):
+            told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
+            for evaluation in self.steps.evaluate(turn.problem, self.ask(turn, batch)):
                 judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
-                self.note(turn, evaluation, judged, replayed=replayed)
+                self.note(turn, evaluation, judged)
                 for target, seen in judged:
-                    told[target.name].append(seen)
+                    told[target.problem.name].append(seen)
                     self.consider(target, seen)
+            started = perf_counter()
             for target in standing:
                 if target.counterexample is None:
-                    target.engine.tell(told[target.name])
+                    target.engine.tell(told[target.problem.name])
+            self.think(perf_counter() - started)
         return "all requirements are falsified"
 
     def is_hopeless(self) -> bool:
@@ -227,108 +229,61 @@ class _Loop:
 
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
-        recorded = self.asked.pop(0) if self.asked else None
-        started = perf_counter()
-        candidates = target.engine.ask(wanted if recorded is None else recorded.n)
-        seconds = perf_counter() - started
-        if recorded is None:
-            self.write_asked(
-                AskedRecord(
-                    first=self.count,
-                    n=wanted,
-                    candidates=[c.to_json() for c in candidates],
-                    seconds=seconds,
-                    requirement=self.label(target),
-                )
+        candidates, wanted, seconds = self.steps.ask(target.engine, wanted)
+        self.think(seconds)
+        self.emit(
+            Asked(
+                first=self.count,
+                wanted=wanted,
+                candidates=tuple(candidates),
+                seconds=seconds,
+                problem=target.problem,
             )
-        else:
-            seconds = recorded.seconds
-            # Journals of earlier versions have integers as they were before rounding.
-            space = target.problem.space
-            known = [space.admit(Candidate.from_json(c)) for c in recorded.candidates]
-            if [c.key for c in candidates] != [c.key for c in known]:
-                raise JournalError(
-                    f"the engine {target.engine.name!r} does not repeat its candidate {self.count}: the "
-                    "journal was written with other settings or another version"
-                )
-        self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
+        )
         return candidates
 
-    def evaluate(
-        self, target: _Target, candidates: Sequence[Candidate], executor: Executor | None
-    ) -> Iterable[tuple[Evaluation, bool]]:
-        """Yield evaluations in the order of the candidates, each with whether it was recorded before."""
-        known = [
-            self.recorded[i] for i in range(self.count, self.count + len(candidates)) if i in self.recorded
-        ]
-        for evaluation in known:
-            yield self.with_trajectory(target, evaluation), True
-        for evaluation in evaluate_all(target.problem, candidates[len(known) :], executor):
-            yield evaluation, False
-
-    def with_trajectory(self, target: _Target, evaluation: Evaluation) -> Evaluation:
-        """Simulate a recorded evaluation again when its trajectory was not kept."""
-        if evaluation.verdict is None or evaluation.trajectory is not None:
-            return evaluation
-        return replace(evaluation, trajectory=evaluate(target.problem, evaluation.candidate).trajectory)
+    def think(self, seconds: float) -> None:
+        """Count seconds of engines."""
+        self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
 
     def note(
-        self,
-        turn: _Target,
-        evaluation: Evaluation,
-        judged: Sequence[tuple[_Target, Evaluation]],
-        *,
-        replayed: bool,
+        self, turn: _Target, evaluation: Evaluation, judged: Sequence[tuple[_Target, Evaluation]]
     ) -> None:
-        """Count, record and announce one simulation, judged by each requirement that stands."""
+        """Count and announce one simulation, judged by each requirement that is not falsified yet."""
         improved = [target.note(seen) for target, seen in judged]
         self.spent = replace(
-            self.spent,
+            self.clock(),
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
-            seconds=perf_counter() - self.started,
         )
-        if self.journal is not None and not replayed:
-            verdicts = {target.name: seen.verdict for target, seen in judged} if self.shared else None
-            self.journal.evaluated(self.count, evaluation, improved=any(improved), verdicts=verdicts)
-        self.emit(Evaluated(self.count, evaluation, turn.best, self.spent, replayed))
+        self.emit(
+            Evaluated(
+                index=self.count,
+                problem=turn.problem,
+                evaluation=evaluation,
+                judged={target.problem.name: seen for target, seen in judged},
+                improved=any(improved),
+                best=turn.best,
+                spent=self.spent,
+                replayed=self.count < self.steps.replayed,
+            )
+        )
         self.count += 1
 
     def consider(self, target: _Target, evaluation: Evaluation) -> None:
         """Confirm a violation of one requirement; a fragile or refuted one does not end its search."""
         if not evaluation.violated or target.counterexample is not None:
             return
-        confirmation = confirm(target.problem, evaluation)
+        confirmation = self.steps.confirm(target.problem, evaluation, self.count - 1)
+        spent = self.clock()
         if confirmation.outcome == "confirmed":
-            target.counterexample = confirmation
-            target.spent = self.clock()
+            target.counterexample, target.spent = confirmation, spent
         else:
             target.doubtful.append(confirmation)
-        record = ConfirmedRecord(
-            index=self.count - 1,
-            outcome=confirmation.outcome,
-            robustness=confirmation.robustness,
-            reference=confirmation.reference,
-            reason=confirmation.reason,
-            halved=confirmation.halved,
-            requirement=self.label(target),
-            spent=_amounts(self.clock()) if self.shared else None,
-        )
-        if self.journal is not None and (record.index, record.requirement) not in self.confirmed:
-            self.journal.write(record, at_once=True)
-        self.emit(Confirmed(confirmation))
+        self.emit(Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent))
 
-    def label(self, target: _Target) -> str:
-        """Name of the requirement, where a record must say which one is meant."""
-        return target.name if self.shared else ""
-
-    @property
-    def shared(self) -> bool:
-        """Whether several requirements are falsified together."""
-        return len(self.targets) > 1
-
-    def exchanged(self, exchange: "Exchange") -> None:
-        """Count, record and announce an exchange with a language model.
+    def exchanged(self, exchange: Exchange) -> None:
+        """Count and announce an exchange with a language model.
 
         Raises:
             ChatError: when the budget is used up while the LLM is in the middle of its turn.
@@ -340,14 +295,10 @@ class _Loop:
             reasoning=usage.reasoning_tokens,
             cost=usage.cost,
         )
-        replayed = self.replayed_exchanges > 0
-        if replayed:
-            self.replayed_exchanges -= 1
-        elif self.journal is not None:
-            self.journal.write(ExchangeRecord(exchange=exchange.model_dump(mode="json")), at_once=True)
-        self.emit(Exchanged(exchange, self.clock()))
+        self.emit(Exchanged(exchange=exchange, spent=self.clock()))
         goes_on = exchange.reply is not None and bool(exchange.reply.tool_calls)
-        if goes_on and not replayed and (limit := self.budget.exceeded(self.clock())):
+        is_new = exchange.reply is not None and exchange.reply.source != "recording"
+        if goes_on and is_new and (limit := self.budget.exceeded(self.clock())):
             raise ChatError(f"the LLM's turn was cut short: {limit}")
 
     def clock(self) -> Spent:
@@ -359,28 +310,27 @@ class _Loop:
         for listener in self.listeners:
             listener(event)
 
-    def write_asked(self, record: AskedRecord) -> None:
-        if self.journal is not None:
-            self.journal.write(record)
-
-    def write_end(self, status: ResultStatus, reason: str) -> None:
-        if self.journal is not None:
-            record = EndedRecord(status=status, reason=reason, spent=_amounts(self.spent))
-            self.journal.write(record, at_once=True)
+    def end(self, status: ResultStatus, reason: str) -> list[Result]:
+        """Announce the end; return how it ended for each requirement."""
+        results = [self.result(target, status, reason) for target in self.targets]
+        overall = "falsified" if all(r.falsified for r in results) else status
+        said = results[0].reason if len(results) == 1 else reason
+        self.emit(RunEnded(status=overall, reason=said, results=tuple(results), spent=self.clock()))
+        return results
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
-        fallen = target.counterexample
+        found = target.counterexample
         return Result(
-            target.problem,
-            status if fallen is None else "falsified",
-            reason if fallen is None else fallen.reason,
-            fallen,
-            target.best,
-            tuple(target.evaluations),
-            tuple(c for c in target.doubtful if c.outcome == "refuted"),
-            target.spent or self.clock(),
-            self.journal.directory if self.journal else None,
-            tuple(c for c in target.doubtful if c.outcome == "fragile"),
+            problem=target.problem,
+            status=status if found is None else "falsified",
+            reason=reason if found is None else found.reason,
+            counterexample=found,
+            best=target.best,
+            evaluations=tuple(target.evaluations),
+            refuted=tuple(c for c in target.doubtful if c.outcome == "refuted"),
+            fragile=tuple(c for c in target.doubtful if c.outcome == "fragile"),
+            spent=target.spent or self.clock(),
+            directory=self.directory,
         )
 
 
@@ -391,10 +341,6 @@ def _check_alike(one: Problem, other: Problem) -> None:
             f"{one.name} and {other.name} differ in what is varied or in how it is simulated: "
             "search for them one after the other"
         )
-
-
-def _amounts(spent: Spent) -> dict[str, float | None]:
-    return {name: getattr(spent, name) for name in Spent.__dataclass_fields__}
 
 
 def _smaller(evaluation: Evaluation, best: Evaluation | None) -> bool:

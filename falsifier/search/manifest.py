@@ -2,21 +2,24 @@
 
 import platform
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.errors import JournalError
-from falsifier.problem.problem import Problem, conjunction
-from falsifier.search.journal import read_manifest
+from falsifier.problem.loading import spec_file
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.problem.source import Parameterization
+from falsifier.search.journal import MANIFEST, read_manifest
 from falsifier.search.request import RunRequest
-from falsifier.stl import Formula, parse
 
 _RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
 
@@ -35,6 +38,21 @@ class InputRecord(_Strict):
     description: str = ""
 
 
+class RequirementRecord(_Strict):
+    """One requirement."""
+
+    name: str
+    formula: str
+    description: str = ""
+
+    @classmethod
+    def of(cls, requirement: Requirement) -> "RequirementRecord":
+        """Return the record of a requirement."""
+        return cls(
+            name=requirement.name, formula=str(requirement.formula), description=requirement.description
+        )
+
+
 class Manifest(_Strict):
     """What a run directory says of how it came to be."""
 
@@ -44,12 +62,13 @@ class Manifest(_Strict):
     packages: dict[str, str] = Field(description="Versions of the packages that decide numbers.")
     started: str = Field(description="Date and time in UTC.")
     request: RunRequest
-    source: str = Field(description="Where the problem was loaded from.")
-    requirement: dict[str, str] = Field(description="name, formula and description of the requirement.")
-    requirements: tuple[dict[str, str], ...] = Field(
-        (), description="The same of each, where several are falsified together."
-    )
+    engine: str = Field(description="Name of the engine, also of one made in Python.")
+    requirements: tuple[RequirementRecord, ...] = Field(min_length=1)
+    fingerprints: dict[str, str] = Field(description="By requirement, of what is searched and how.")
     model: str = Field(description="Name of the model.")
+    parameterization: Parameterization = Field(
+        description="free: engines could place control points of an input themselves."
+    )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
     stop_time: float = Field(description="End of each simulation in s.")
@@ -57,13 +76,23 @@ class Manifest(_Strict):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the requirements; several where they are falsified together."""
-        return self.request.together if self.shared else (self.requirement["name"],)
+        """Names of the requirements; several where they share a search."""
+        return tuple(r.name for r in self.requirements)
 
     @property
     def shared(self) -> bool:
-        """Whether several requirements are falsified together."""
-        return len(self.request.together) > 1
+        """Whether several requirements share a search."""
+        return len(self.requirements) > 1
+
+    @property
+    def requirement(self) -> RequirementRecord:
+        """The requirement; the first one where several share a search."""
+        return self.requirements[0]
+
+    @property
+    def fmu_sha256(self) -> str | None:
+        """Hash of the FMU; None where the model is none."""
+        return next((digest for path, digest in self.hashes.items() if path.endswith(".fmu")), None)
 
     def of(self, name: str) -> "Manifest":
         """Return the same with one of the requirements alone.
@@ -73,40 +102,37 @@ class Manifest(_Strict):
         """
         if name not in self.names:
             raise JournalError(f"this run searched {', '.join(self.names)}, not {name}")
-        if not self.shared:
-            return self
-        found = {each["name"]: each for each in self.requirements} or self._parts()
-        return self.model_copy(update={"requirement": found[name]})
-
-    def _parts(self) -> dict[str, dict[str, str]]:
-        """Take the requirements apart where only their conjunction was recorded."""
-        rest: Formula = parse(self.requirement["formula"])
-        parts: list[Formula] = []
-        for _ in self.names[1:]:
-            rest, last = rest.children
-            parts.insert(0, last)
-        return {
-            name: {"name": name, "formula": str(formula), "description": ""}
-            for name, formula in zip(self.names, [rest, *parts], strict=True)
-        }
+        which = self.names.index(name)
+        request = self.request.model_copy(update={"problems": self.request.problems[which : which + 1]})
+        return self.model_copy(update={"requirements": (self.requirements[which],), "request": request})
 
 
-def recorded_request(directory: Path) -> RunRequest:
-    """What the run of a directory was asked for."""
-    return RunRequest.model_validate(read_manifest(directory)["request"])
+def read(directory: Path) -> Manifest:
+    """Manifest of a run directory.
+
+    Raises:
+        JournalError: when there is none, or it cannot be understood.
+    """
+    try:
+        return Manifest.model_validate(read_manifest(directory))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise JournalError(f"{directory}/{MANIFEST}: {key}: {first['msg']}") from None
 
 
-def manifest(request: RunRequest, *problems: Problem) -> Manifest:
-    """Describe a run before it starts; several problems are falsified together."""
-    problem = conjunction(problems)
+def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> Manifest:
+    """Describe a run before it starts."""
+    problem = problems[0]
     space = problem.space
     return Manifest(
         **environment(),
         request=request,
-        source=problem.source,
-        requirement=_requirement_record(problem),
-        requirements=tuple(map(_requirement_record, problems)) if len(problems) > 1 else (),
+        engine=engine,
+        requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
+        fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
+        parameterization="free" if any(r.free for r in space.inputs) else "fixed",
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
         stop_time=space.stop_time,
@@ -127,29 +153,25 @@ def environment() -> dict[str, Any]:
 
 def file_hashes(problem: Problem) -> dict[str, str]:
     """SHA-256 by path of the files that decide what is simulated: the FMU and the spec."""
-    spec = problem.source.rpartition(":")[0]
-    paths = [getattr(problem.model, "path", None), Path(spec) if spec.endswith(".toml") else None]
-    return {str(p): sha256(Path(p).read_bytes()).hexdigest() for p in paths if p is not None}
+    spec = None if problem.source is None else spec_file(problem.source)
+    paths: list[Path | None] = [getattr(problem.model, "path", None), spec]
+    return {str(p): sha256(p.read_bytes()).hexdigest() for p in paths if p is not None}
 
 
 def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
-    """Refuse to continue with other files than those that a run or campaign was started with.
+    """Refuse to continue with other files or problems than those that a run or campaign was started with.
+
+    Args:
+        directory: of the run or campaign.
+        recorded: hashes by path, or fingerprints by requirement.
+        found: the same today.
 
     Raises:
-        JournalError: naming the file that has changed.
+        JournalError: naming what has changed.
     """
-    for path, digest in found.items():
-        if recorded.get(path, digest) != digest:
-            raise JournalError(f"{directory}: {path} has changed since this was started; start anew")
-
-
-def _requirement_record(problem: Problem) -> dict[str, str]:
-    requirement = problem.requirement
-    return {
-        "name": problem.name,
-        "formula": str(requirement.formula),
-        "description": requirement.description,
-    }
+    for name, digest in found.items():
+        if recorded.get(name, digest) != digest:
+            raise JournalError(f"{directory}: {name} has changed since this was started; start a new run")
 
 
 def _range_record(range_: InputRange | ParameterRange) -> InputRecord:

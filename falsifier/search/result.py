@@ -1,6 +1,6 @@
 """How a run ended."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -12,7 +12,7 @@ from falsifier.search.budget import Spent
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
     """How a run ended.
 
@@ -33,10 +33,25 @@ class Result:
     problem: Problem
     status: ResultStatus
     reason: str
-    counterexample: Confirmation | None
-    best: Evaluation | None
-    evaluations: tuple[Evaluation, ...]
-    refuted: tuple[Confirmation, ...]
-    spent: Spent
-    directory: Path | None = None
+    counterexample: Confirmation | None = None
+    best: Evaluation | None = None
+    evaluations: tuple[Evaluation, ...] = ()
+    refuted: tuple[Confirmation, ...] = ()
     fragile: tuple[Confirmation, ...] = ()
+    spent: Spent = field(default_factory=Spent)
+    directory: Path | None = None
+
+    @property
+    def falsified(self) -> bool:
+        """Whether a confirmed counterexample was found."""
+        return self.counterexample is not None
+
+    @property
+    def shown(self) -> Evaluation | None:
+        """The counterexample's evaluation, else the best one."""
+        return self.best if self.counterexample is None else self.counterexample.evaluation
+
+    @property
+    def robustness(self) -> float | None:
+        """Robustness of the counterexample, else the smallest one; None when every simulation failed."""
+        return None if self.shown is None else self.shown.robustness

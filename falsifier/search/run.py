@@ -1,115 +1,259 @@
-"""Carry out a request: load its problem, make its engine, open its record, run the loop."""
+"""The one way to search: ``falsify`` starts a run, ``resume`` continues one."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import overload
 
-from falsifier.errors import JournalError
+from falsifier.engines import ENGINES
+from falsifier.engines.protocol import Engine
+from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
+from falsifier.llm.messages import Chat
+from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike
+from falsifier.problem.source import ProblemSource
+from falsifier.search import manifest
+from falsifier.search.budget import Budget
 from falsifier.search.events import Listener
-from falsifier.search.journal import (
-    Journal,
-    Record,
-    open_journal,
-    read_journal,
-    read_manifest,
-    write_manifest,
-)
-from falsifier.search.loop import search_together
-from falsifier.search.manifest import Manifest, check_unchanged, manifest, recorded_request
-from falsifier.search.request import RunRequest
+from falsifier.search.journal import holds_run, open_journal, write_manifest
+from falsifier.search.leaders import make_engines
+from falsifier.search.loop import Live, Steps, search
+from falsifier.search.manifest import Manifest
+from falsifier.search.replay import replayed
+from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
-from falsifier.search.wiring import engine_builder
+
+Falsifiable = Problem | ProblemSource | str
+LLM = LLMSettings | Chat | str
 
 
-def execute(
-    request: RunRequest, directory: Path | None, *, listeners: Iterable[Listener] = (), resume: bool = False
-) -> list[Result]:
-    """Run a request, recorded in a directory; with resume, go on where that directory's journal ends.
+@overload
+def falsify(
+    problem: Falsifiable,
+    engine: str | Engine | None = ...,
+    *,
+    llm: LLM | None = ...,
+    budget: Budget | int = ...,
+    seed: int = ...,
+    directory: Path | str | None = ...,
+    jobs: int = ...,
+    listeners: Iterable[Listener] = ...,
+) -> Result: ...
+
+
+@overload
+def falsify(
+    problem: list[Problem] | list[ProblemSource] | list[str] | tuple[Falsifiable, ...],
+    engine: str | None = ...,
+    *,
+    llm: LLM | None = ...,
+    budget: Budget | int = ...,
+    seed: int = ...,
+    directory: Path | str | None = ...,
+    jobs: int = ...,
+    listeners: Iterable[Listener] = ...,
+) -> list[Result]: ...
+
+
+def falsify(
+    problem: Falsifiable | list[Problem] | list[ProblemSource] | list[str] | tuple[Falsifiable, ...],
+    engine: str | Engine | None = None,
+    *,
+    llm: LLM | None = None,
+    budget: Budget | int = 100,
+    seed: int = 0,
+    directory: Path | str | None = None,
+    jobs: int = 1,
+    listeners: Iterable[Listener] = (),
+) -> Result | list[Result]:
+    """Search for inputs that violate a requirement, or several.
+
+    Several requirements of one system share a search: every simulation is judged for all of them, and they
+    share one budget. Those that differ in what is varied or how it is simulated are searched one after the
+    other, each group with the budget and a directory of its own below the given one.
+
+    Args:
+        problem: what to falsify: a Problem, or what ``falsifier run`` takes, such as ``"AT1"``; or several.
+        engine: name of an engine, or an engine made in Python; default: ``surrogate``, or the language model
+            where one is given.
+        llm: name of a language model such as ``"openai/gpt-5-mini"``, its settings, or a chat with it.
+        budget: limits; a number means simulations.
+        seed: of engines that are given by name.
+        directory: where to record the run so that it can be continued; None: nowhere.
+        jobs: simulations at a time.
+        listeners: called with every event.
 
     Returns:
-        one result for each requirement that the request names.
+        one result; several in the order of the problems where several were given.
 
     Raises:
-        JournalError: when the directory holds another run, or its FMU or spec has changed since.
-        SpecError: when the request cannot be understood.
+        SpecError: when a problem, an engine or a language model is not what it should be.
         ModelError: when the FMU cannot be used.
-        ChatError: when the language model cannot be used, before the first simulation.
+        ChatError: when the language model cannot be asked, before the first simulation.
+        JournalError: when the directory holds a run already.
+
+    >>> falsify("AT1", budget=20).status  # doctest: +SKIP
+    'falsified'
     """
-    problems = request.problem.load_all(request.together) if request.together else [request.problem.load()]
-    described = manifest(request, *problems)
-    return perform(request, problems, described, directory, listeners=listeners, resume=resume)
-
-
-def execute_all(request: RunRequest, directory: Path, *, listeners: Iterable[Listener] = ()) -> list[Result]:
-    """Run a request for all requirements of its spec, like execute.
-
-    Requirements that are searched and simulated alike share one search, with one budget; where a spec has
-    several such groups, each has a search and a directory below of its own.
-    """
-    groups = alike(request.problem.load_all())
-    results: list[Result] = []
+    several = isinstance(problem, list | tuple)
+    problems = [_problem(each) for each in (problem if isinstance(problem, list | tuple) else [problem])]
+    groups = alike(problems)
+    chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
+    results: dict[str, Result] = {}
     for group in groups:
-        names = tuple(problem.name for problem in group)
-        place = directory if len(groups) == 1 else directory / names[0]
-        results += execute(request.model_copy(update={"together": names}), place, listeners=listeners)
+        request = RunRequest(
+            problems=_sources(group) if directory is not None else (),
+            engine=engine if isinstance(engine, str) or engine is None else engine.name,
+            llm=_settings(llm),
+            seed=seed,
+            budget=_budget(budget),
+            jobs=jobs,
+        )
+        place = None if directory is None else Path(directory)
+        if place is not None and len(groups) > 1:
+            place = place / group[0].name
+        found = carry_out(
+            request,
+            group,
+            place,
+            engine=None if isinstance(engine, str) else engine,
+            chat=chat,
+            listeners=listeners,
+        )
+        results |= {result.problem.name: result for result in found}
+    ordered = [results[each.name] for each in problems]
+    return ordered if several else ordered[0]
+
+
+def resume(
+    directory: Path | str,
+    *,
+    problems: Sequence[Problem] = (),
+    engine: Engine | None = None,
+    chat: Chat | None = None,
+    budget: Budget | int | None = None,
+    listeners: Iterable[Listener] = (),
+) -> list[Result]:
+    """Continue a recorded run; what it holds is neither simulated nor asked for again.
+
+    Args:
+        directory: of the run; or a folder of runs, which are continued one after the other.
+        problems: what is searched, where it was made in Python.
+        engine: who suggests, where it was made in Python; new, as it was before the run.
+        chat: with the language model, where it was made in Python.
+        budget: limits of the whole run, what is recorded included; default: those it was started with.
+        listeners: called with every event.
+
+    Returns:
+        one result for each requirement.
+
+    Raises:
+        JournalError: when the directory holds no run, or the FMU, the spec or the problem has changed.
+    """
+    directory = Path(directory)
+    places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
+    results: list[Result] = []
+    for place in places or [directory]:
+        described = manifest.read(place)
+        request = described.request
+        if budget is not None:
+            request = request.model_copy(update={"budget": _budget(budget)})
+        if not problems and not request.problems:
+            raise JournalError(f"{place}: this run's problem was made in Python: give problems=[...]")
+        if engine is None and request.llm is None and described.engine not in ENGINES:
+            raise JournalError(f"{place}: this run's engine was made in Python: give engine=...")
+        loaded = list(problems) or load_sources(request.problems)
+        results += carry_out(
+            request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
+        )
     return results
 
 
-def perform(
+def carry_out(
     request: RunRequest,
     problems: Sequence[Problem],
-    described: Manifest,
     directory: Path | None,
     *,
+    described: Manifest | None = None,
+    engine: Engine | None = None,
+    chat: Chat | None = None,
     listeners: Iterable[Listener] = (),
     resume: bool = False,
     patience: float = 0.0,
 ) -> list[Result]:
-    """Run a request whose problems are loaded, like execute; several problems are falsified together.
+    """Carry out a request whose problems are loaded; for falsify, resume and the workers of campaigns.
 
     Args:
         request: what to run.
-        problems: of the request, alike but for their requirement.
-        described: manifest of the request.
+        problems: what is searched, alike but for their requirement.
         directory: of the run; None: nothing is recorded.
+        described: manifest of the request; made where it is not given.
+        engine: who suggests, where it was made in Python.
+        chat: with the language model, where it was made in Python.
         listeners: called with every event.
-        resume: go on where the directory's journal ends; start where there is none.
+        resume: continue where the directory's journal ends; start where there is none.
         patience: how long in s to wait for another process that writes to the directory.
     """
+    if engine is not None and len(problems) > 1:
+        raise SpecError("an engine made in Python searches one requirement: give the name of an engine")
     with ExitStack() as stack:
-        journal: Journal | None = None
-        records: Sequence[Record] = ()
-        begun = directory is not None and (directory / "manifest.json").exists()
-        if directory is not None and begun:
-            if not resume:
-                raise JournalError(
-                    f"{directory} already holds a run: choose another --out, or continue it with "
-                    f"'falsifier resume {directory}'"
-                )
+        begun = directory is not None and holds_run(directory)
+        if begun and not resume:
+            raise JournalError(
+                f"{directory} already holds a run: choose another --out, or to continue it: "
+                f"falsifier resume {directory}"
+            )
+        # Before anything is written: a wrong engine or a missing key leaves no folder.
+        engines = [engine] if engine is not None else make_engines(request, problems, chat)
+        live = Live(stack.enter_context(local_executor(request.jobs)))
+        steps: Steps = live
+        heard = tuple(listeners)
+        if directory is not None:
+            described = described or manifest.describe(request, problems, engines[0].name)
+            if begun:
+                _check_same(directory, described)
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
-            check_unchanged(directory, read_manifest(directory)["hashes"], described.hashes)
-            records = read_journal(directory)
-        build = engine_builder(request, problems, records)
-        if directory is not None and not begun:  # only now: a wrong engine or a missing key leaves no folder
-            journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
-            write_manifest(directory, described.model_dump(mode="json"))
-        executor = stack.enter_context(local_executor(request.jobs))
+            if not begun:
+                write_manifest(directory, described.model_dump(mode="json"))
+            steps = replayed(directory, journal.records, live)
+            heard = (journal, *heard)
         for problem in problems:
             stack.callback(problem.model.close)
-        return search_together(
+        return search(
             problems,
-            build,
+            engines,
             request.budget,
+            steps=steps,
             batch=request.jobs,
-            executor=executor,
-            journal=journal,
-            records=records,
-            listeners=listeners,
+            directory=directory,
+            listeners=heard,
         )
 
 
-def resume_run(directory: Path, *, listeners: Iterable[Listener] = ()) -> list[Result]:
-    """Continue the run of a directory."""
-    return execute(recorded_request(directory), directory, listeners=listeners, resume=True)
+def _problem(given: Falsifiable) -> Problem:
+    if isinstance(given, Problem):
+        return given
+    return load_source(ProblemSource(target=given) if isinstance(given, str) else given)
+
+
+def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
+    """Where the problems come from; empty where one of them was made or changed in Python."""
+    sources = [reloadable(problem) for problem in problems]
+    return tuple(s for s in sources if s is not None) if all(sources) else ()
+
+
+def _budget(given: Budget | int) -> Budget:
+    return Budget(simulations=given) if isinstance(given, int) else given
+
+
+def _settings(llm: LLM | None) -> LLMSettings | None:
+    if llm is None or isinstance(llm, LLMSettings):
+        return llm
+    return LLMSettings(name=llm if isinstance(llm, str) else llm.llm)
+
+
+def _check_same(directory: Path, described: Manifest) -> None:
+    recorded = manifest.read(directory)
+    manifest.check_unchanged(directory, recorded.hashes, described.hashes)
+    manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)

@@ -42,7 +42,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
-                    progress.update(task, description=f"{event.problem.name} {event.engine}", total=total)
+                    progress.update(task, description=_title(event), total=total)
                 case Evaluated():
                     progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
@@ -80,8 +80,9 @@ class PlainDisplay:
         match event:
             case RunStarted():
                 replayed = f", {event.replayed} evaluations from the journal" if event.replayed else ""
-                self._line(f"{event.problem.name}: {event.problem.requirement.formula}")
-                self._line(f"engine {event.engine}{replayed}")
+                for problem in event.problems:
+                    self._line(f"{problem.name}: {problem.requirement.formula}")
+                self._line(f"engine {event.engines[0]}{replayed}")
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
             case Evaluated(evaluation=evaluation, best=best) if (
@@ -120,7 +121,7 @@ class NotebookLine:
         """Show what an event tells."""
         match event:
             case RunStarted():
-                self._name = f"{event.problem.name}, {event.engine}"
+                self._name = _title(event)
                 self._handle, self._total = None, event.budget.simulations
                 self._show(0)
             case Evaluated():
@@ -132,9 +133,8 @@ class NotebookLine:
             case Confirmed():
                 self._note = f"violation {event.confirmation.outcome}"
             case RunEnded():
-                result = event.result
-                self._note = f"{result.status}; {self._note}"
-                self._show(result.spent.simulations)
+                self._note = f"{event.status}; {self._note}"
+                self._show(event.spent.simulations)
 
     def _show(self, done: int) -> None:
         from IPython.display import HTML, display
@@ -147,3 +147,8 @@ class NotebookLine:
             self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
         else:
             self._handle.update(line)
+
+
+def _title(event: RunStarted) -> str:
+    """What is searched, and by whom."""
+    return f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}"

@@ -8,8 +8,8 @@ from typing import Any
 from falsifier.core.words import candidate_lines
 from falsifier.counterexamples.store import file_name
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.search import manifest
 from falsifier.search.budget import Spent
-from falsifier.search.manifest import recorded_request
 from falsifier.search.result import Result
 
 
@@ -58,7 +58,7 @@ def results_text(results: Sequence[Result]) -> str:
 
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; several results in one directory have one each."""
-    shared = result.directory is not None and len(recorded_request(result.directory).together) > 1
+    shared = result.directory is not None and manifest.read(result.directory).shared
     return file_name(result.problem.name if shared else "")
 
 

@@ -10,8 +10,8 @@ import pytest
 from falsifier.campaigns import CampaignRequest, Method, cross
 from falsifier.campaigns.analysis import Run, load
 from falsifier.evaluation.workers import Workers
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.request import ProblemRequest
 
 
 def request(
@@ -24,7 +24,7 @@ def request(
     """Campaign over problems of tests.problems."""
     return CampaignRequest(
         runs=cross(
-            [ProblemRequest(target=f"python:tests.problems:{name}") for name in names],
+            [ProblemSource(target=f"python:tests.problems:{name}") for name in names],
             [Method(engine) for engine in engines],
             seeds=range(seeds),
             budget=Budget(budget),

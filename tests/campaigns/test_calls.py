@@ -11,8 +11,9 @@ from typing import cast
 import pytest
 
 from falsifier.campaigns import CampaignRequest, Method, cross, run_campaign
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.request import LLMSettings, ProblemRequest
+from falsifier.search.request import LLMSettings
 from tests.llm.server import Step, serving
 
 # Seconds that the server takes for an answer, and those that it asks to wait.
@@ -61,7 +62,7 @@ def campaign(server: str, *, runs: int, calls: int) -> CampaignRequest:
     """Runs of one simulation each, which ask once."""
     return CampaignRequest(
         runs=cross(
-            [ProblemRequest(target="python:tests.problems:impossible")],
+            [ProblemSource(target="python:tests.problems:impossible")],
             [Method(llm="openai/m", variant="MP4")],
             seeds=range(runs),
             budget=Budget(1),

@@ -2,16 +2,18 @@ import pytest
 
 from falsifier.campaigns import CampaignRequest, Method, cross, method_of, run_name, suite
 from falsifier.errors import SpecError
+from falsifier.problem.loading import load_source
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.request import LLMSettings, ProblemRequest
+from falsifier.search.request import LLMSettings
 
-AT1 = ProblemRequest(target="AT1")
+AT1 = ProblemSource(target="AT1")
 
 
 def test_a_campaign_is_requirements_times_methods_times_seeds() -> None:
     methods = [Method("uniform"), Method(llm="openai/gpt-5-nano", effort="low", variant="MP4")]
     runs = cross(
-        [AT1, ProblemRequest(target="my.toml:R")],
+        [AT1, ProblemSource(target="my.toml:R")],
         methods,
         seeds=range(3),
         budget=Budget(7),
@@ -28,13 +30,13 @@ def test_a_campaign_is_requirements_times_methods_times_seeds() -> None:
         options={"top_p": 0.5},
         cache=False,
     )
-    assert {r.problem.parameterization for r in runs} == {"fixed"}
+    assert {r.problems[0].parameterization for r in runs} == {"fixed"}
     assert {r.budget for r in runs} == {Budget(7)}
 
 
 def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     def name(method: Method, seed: int = 0, budget: int = 5, target: str = "specs/AT.toml:AT1") -> str:
-        problem = ProblemRequest(target=target)
+        problem = ProblemSource(target=target)
         return run_name(cross([problem], [method], seeds=[seed], budget=Budget(budget))[0])
 
     base = name(Method("uniform"))
@@ -75,7 +77,7 @@ def test_the_suite_has_the_published_requirements() -> None:
     names = [r.target for r in suite("arch-comp")]
     assert len(names) == 21
     assert {"AT:AT1", "AT:AT6abc", "NN:NN", "CC:CCx", "F16:F16", "SC:SC"} < set(names)
-    assert [r.load().name for r in suite("arch-comp")] == [name.split(":")[1] for name in names]
+    assert [load_source(s).name for s in suite("arch-comp")] == [name.split(":")[1] for name in names]
 
 
 def test_instance_2_leaves_out_what_has_none() -> None:

@@ -14,9 +14,9 @@ from falsifier.campaigns import (
 from falsifier.campaigns.directory import locked, run_directory
 from falsifier.counterexamples.store import load, problem_of, replay
 from falsifier.errors import JournalError, SpecError
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.loop import falsify
-from falsifier.search.request import ProblemRequest
+from falsifier.search.run import falsify
 from tests import problems
 from tests.campaigns.support import outcomes, request, work_in_threads
 
@@ -100,7 +100,7 @@ def test_another_worker_error_is_a_failed_run_in_its_journal(
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no memory")
 
-    monkeypatch.setattr("falsifier.campaigns.work.perform", broken)
+    monkeypatch.setattr("falsifier.campaigns.work.carry_out", broken)
     directory = tmp_path / "c"
     run_campaign(request("easy", seeds=1), directory)
     monkeypatch.undo()
@@ -116,7 +116,7 @@ def test_a_changed_model_is_refused(tmp_path: Path) -> None:
         f'[model]\nfmu = "{fmu}"\ninterface = "co-simulation"\nstop_time = 1.0\noutput_interval = 0.1\n'
         "[inputs.throttle]\ncontrol_points = 1\n[requirements.R]\nformula = 'G[0,1] (speed <= -1)'\n"
     )
-    runs = cross([ProblemRequest(target=f"{spec}:R")], [Method("uniform")], seeds=[0], budget=Budget(1))
+    runs = cross([ProblemSource(target=f"{spec}:R")], [Method("uniform")], seeds=[0], budget=Budget(1))
     run_campaign(CampaignRequest(runs=runs), directory)
     spec.write_text(spec.read_text() + "# changed\n")
     with pytest.raises(JournalError, match=r"lag\.toml has changed"):
@@ -152,7 +152,7 @@ def test_counterexamples_are_files_that_can_be_replayed(tmp_path: Path) -> None:
     run_campaign(request("hard", "impossible", seeds=1), tmp_path)
     (file,) = tmp_path.rglob("counterexample.json")
     stored = load(file.parent)
-    assert stored.problem == ProblemRequest(target="python:tests.problems:hard", parameterization="fixed")
+    assert stored.problem == ProblemSource(target="python:tests.problems:hard", parameterization="fixed")
     assert replay(stored, problem_of(stored)).status == "violates"
     file.unlink()
     resume_campaign(tmp_path)

@@ -11,9 +11,10 @@ import pytest
 from falsifier.campaigns.schedule import Schedule
 from falsifier.campaigns.work import Done, Missing, Task
 from falsifier.evaluation.workers import Workers
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.manifest import manifest
-from falsifier.search.request import LLMSettings, ProblemRequest, RunRequest
+from falsifier.search.manifest import describe
+from falsifier.search.request import LLMSettings, RunRequest
 from tests.problems import easy
 
 PROBLEM = easy()
@@ -21,11 +22,11 @@ PROBLEM = easy()
 
 def task(name: str, model: str | None = None) -> Task:
     request = RunRequest(
-        problem=ProblemRequest(target="python:tests.problems:easy"),
+        problems=(ProblemSource(target="python:tests.problems:easy"),),
         llm=LLMSettings(name=model) if model else None,
         budget=Budget(1),
     )
-    return Task(name, request, PROBLEM, manifest(request, PROBLEM), Path("unused"), "")
+    return Task(name, request, PROBLEM, describe(request, [PROBLEM], "corners"), Path("unused"), "")
 
 
 def run(

@@ -9,10 +9,12 @@ from falsifier.campaigns.work import Done, Missing, Task, run_task, unpack
 from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import EvaluatedRecord, read_journal
-from falsifier.search.manifest import manifest
-from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.search.journal import read_journal
+from falsifier.search.manifest import describe
+from falsifier.search.records import EvaluatedRecord
+from falsifier.search.request import RunRequest
 from tests.problems import easy
 
 
@@ -24,10 +26,15 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def remote_task(problem: Problem, target: str) -> Task:
     request = RunRequest(
-        problem=ProblemRequest(target=target), engine="corners", budget=Budget(2), keep="best"
+        problems=(ProblemSource(target=target),), engine="corners", budget=Budget(2), keep="best"
     )
     return Task(
-        "R-0", request, problem, manifest(request, problem), Path("/nowhere"), "another machine's mark"
+        "R-0",
+        request,
+        problem,
+        describe(request, [problem], "corners"),
+        Path("/nowhere"),
+        "another machine's mark",
     )
 
 

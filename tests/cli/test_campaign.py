@@ -100,7 +100,7 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
         *("--parameterization", "fixed", "--parameterization", "free"),
     )
     (request,) = seen
-    asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problem.parameterization) for r in request.runs}
+    asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problems[0].parameterization) for r in request.runs}
     assert len(asked) == len(request.runs) == 8
     assert ("openai/gpt-5-nano", "low", "MP1", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
@@ -121,8 +121,8 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     command("bench", "--suite", "arch-comp", "--instance", "2", "--engine", "uniform")
     first, second = seen
     assert (len(first.runs), len(second.runs)) == (210, 200)
-    assert {r.problem.profile for r in first.runs} == {None}
-    assert {r.problem.profile for r in second.runs} == {"instance2"}
+    assert {r.problems[0].profile for r in first.runs} == {None}
+    assert {r.problems[0].profile for r in second.runs} == {"instance2"}
     assert first.suite == "arch-comp"
 
 
@@ -154,7 +154,7 @@ def test_watch_says_how_far_a_campaign_is(command: Any) -> None:
 def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:
     bench(command, "--out", "c", "--quiet")
     for journal in sorted((tmp_path / "c" / "runs").rglob("journal.jsonl"))[:2]:
-        journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:-1]))  # as after a kill
+        journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:-2]))  # as after a kill
     for arguments in (["watch", "c"], ["watch", "c", "--once"]):
         result = command(*arguments)
         assert "2/4 runs finished" in result.stdout

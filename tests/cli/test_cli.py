@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.problem.loading import bundled
+from falsifier.core.files import bundled
 from falsifier.search.journal import read_journal
 from tests.command import ROOT, falsifier, listen_to_interrupts
 
@@ -78,7 +78,7 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
         (["run", "AT1", "--llm", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
         (["run", "AT1", "--llm", "opnai/x", "--variant", "MP9"], "unknown prompt variant 'MP9'"),
         (["run", "AT1", "--llm", "opnai/x", "--fallback", "corner"], "did you mean 'corners'"),
-        (["run", "AT1", "--llm", "opnai/x", "--fallback", "hybrid"], "asks no language model"),
+        (["run", "AT1", "--llm", "opnai/x", "--fallback", "hybrid"], "does not use a language model"),
         (["run", "AT1", "--llm", "gpt-5-mini"], "expected PROVIDER/MODEL"),
         (["llm", "check", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
         (["bench", "AT1", "--llm", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.cli import main
-from falsifier.problem.loading import bundled
+from falsifier.core.files import bundled
 from tests.command import Done
 from tests.llm.server import Step, serving
 

@@ -6,11 +6,11 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
-from falsifier.counterexamples.robustness_map import sample_neighbourhood
+from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.views.plotting import plot_neighbourhood, save_figure
+from falsifier.views.plotting import plot_robustness_map, save_figure
 from tests.problems import lag_problem
 
 # x(10) of x' = u - x, x(0) = x0, by Euler with 0.1 s: u + (x0 - u) 0.9**100. The range of u is 2 wide.
@@ -26,7 +26,7 @@ def problem() -> Problem:
 
 
 def test_the_violation_persists_as_far_as_it_does() -> None:
-    found = sample_neighbourhood(problem(), at(problem(), 0.54, 0.0), radius=0.1, samples=128, points=11)
+    found = robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.1, samples=128, points=11)
     assert [c.label for c in found.coordinates] == ["u [V]", "x0"]
     assert found.axes[0] == 0
     shares = dict(found.persistence)
@@ -40,7 +40,7 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:
-    first, second = (sample_neighbourhood(problem(), at(problem(), 1.0, -1.0), samples=20) for _ in range(2))
+    first, second = (robustness_map(problem(), at(problem(), 1.0, -1.0), samples=20) for _ in range(2))
     assert first.values[:, 0].max() <= 1.0
     assert first.values[:, 1].min() >= -1.0
     np.testing.assert_array_equal(first.robustness, second.robustness)
@@ -49,7 +49,7 @@ def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:
 def test_each_stretch_moves_alone() -> None:
     free = lag_problem(free=Freedom(5, 0.1))
     signal = Signal((0.0, 2.0, 4.0, 6.0), (1.0, 0.0, 0.0, 1.0), "constant")
-    found = sample_neighbourhood(free, evaluate(free, Candidate({"u": signal})), samples=16, points=3)
+    found = robustness_map(free, evaluate(free, Candidate({"u": signal})), samples=16, points=3)
     assert [(c.time, c.value) for c in found.coordinates] == [(0.0, 1.0), (2.0, 0.0), (6.0, 1.0)]
     assert found.axes[0] == 2  # what comes last decides x(10)
 
@@ -58,11 +58,11 @@ def test_each_stretch_moves_alone() -> None:
 def test_the_map_is_drawn(tmp_path: Path, parameters: tuple[ParameterRange, ...]) -> None:
     lag = lag_problem(parameters=parameters)
     start = evaluate(lag, lag.space.decode([1.0] * len(lag.space.dimensions)))
-    found = sample_neighbourhood(lag, start, samples=8, points=3)
-    save_figure(plot_neighbourhood(found, "LAG"), tmp_path / "map.png")
+    found = robustness_map(lag, start, samples=8, points=3)
+    save_figure(plot_robustness_map(found, "LAG"), tmp_path / "map.png")
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_settings_are_checked() -> None:
     with pytest.raises(SpecError, match="radius"):
-        sample_neighbourhood(problem(), at(problem(), 0.54, 0.0), radius=0.0)
+        robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.0)

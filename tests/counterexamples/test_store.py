@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.files import bundled
 from falsifier.counterexamples.regression import check
 from falsifier.counterexamples.store import Database, load, problem_of, replay, save, to_store
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.loading import bundled
+from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.search.budget import Budget
-from falsifier.search.request import ProblemRequest, RunRequest
-from falsifier.search.run import execute
+from falsifier.problem.source import ProblemSource
+from falsifier.search.run import falsify
 from falsifier.stl import parse
 from tests.problems import lag_problem, never
 from tests.stepped import euler_problem
@@ -51,7 +51,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
     problem = lag_problem()
-    stored = to_store(problem, violation(problem), None)
+    stored = to_store(violation(problem))
     assert load(save(stored, tmp_path / "deep" / "c.json")) == stored
     assert list((tmp_path / "deep").iterdir()) == [tmp_path / "deep" / "c.json"]
 
@@ -60,10 +60,9 @@ def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
-    request = ProblemRequest(target="my.toml:R", parameters=("finalDrive=3.225",))
-    problem = request.load()
+    problem = load_problem("my.toml:R", parameters={"finalDrive": 3.225})
     database = Database(Path("counterexamples"))
-    path = database.save(problem, to_store(problem, violation(problem), request))
+    path = database.save(problem, to_store(violation(problem)))
     assert json.loads(path.read_text())["problem"]["target"] == "../../my.toml:R"
     monkeypatch.chdir(tmp_path)
     folder.rename(tmp_path / "moved")
@@ -75,9 +74,8 @@ def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
 
 def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    request = ProblemRequest(target="my.toml:R")
-    problem = request.load()
-    path = save(to_store(problem, violation(problem), request), folder / "c.json")
+    problem = load_problem("my.toml:R")
+    path = save(to_store(violation(problem)), folder / "c.json")
     Path("my.toml").write_text(SPEC.replace("120", "130"))
     with Path("AT.fmu").open("ab") as fmu:
         fmu.write(b"\0")  # a comment after the archive: another file with the same model
@@ -92,7 +90,7 @@ def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPa
 
 def test_a_counterexample_of_another_parameterization_does_not_fit() -> None:
     problem = lag_problem()
-    stored = to_store(problem, violation(problem), None)
+    stored = to_store(violation(problem))
     replayed = replay(stored, lag_problem(points=5))
     assert (replayed.status, replayed.evaluation) == ("does not fit", None)
     assert "expected 5 evenly spaced control points" in replayed.text
@@ -101,10 +99,10 @@ def test_a_counterexample_of_another_parameterization_does_not_fit() -> None:
 def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() -> None:
     coarse = euler_problem("G[1,1] (x <= 0.65)")
     found = violation(coarse)
-    assert replay(to_store(coarse, found, None), coarse).status == "fragile"
+    assert replay(to_store(found), coarse).status == "fragile"
     broken = lag_problem(function=never)
     with pytest.raises(SimulationError, match="out of order"):
-        replay(to_store(coarse, found, None), broken)
+        replay(to_store(found), broken)
 
 
 @pytest.mark.parametrize(
@@ -128,8 +126,7 @@ def test_a_run_without_the_file_is_read_from_its_journal(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
-    request = RunRequest(problem=ProblemRequest(target="my.toml:R"), engine="corners", budget=Budget(5))
-    result = execute(request, Path("run"))[0]
+    result = falsify("my.toml:R", "corners", budget=5, directory="run")
     assert result.counterexample is not None
     stored = load(Path("run"))
     assert stored.robustness == result.counterexample.evaluation.robustness
@@ -140,14 +137,14 @@ def test_a_run_without_the_file_is_read_from_its_journal(
 def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
     problem = lag_problem()
     for name in ("counterexample-A.json", "counterexample-B.json"):
-        save(to_store(problem, violation(problem), None), tmp_path / name)
+        save(to_store(violation(problem)), tmp_path / name)
     with pytest.raises(SpecError, match=r"several counterexamples, .*counterexample-A\.json"):
         load(tmp_path)
 
 
 def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
     problem = lag_problem()
-    path = save(to_store(problem, violation(problem), None), tmp_path / "c.json")
+    path = save(to_store(violation(problem)), tmp_path / "c.json")
     with pytest.raises(SpecError, match="LAG is of a problem made in Python"):
         problem_of(load(path))
 
@@ -174,9 +171,10 @@ def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Pat
 
 def test_databases_keep_requirements_of_one_name_apart(tmp_path: Path) -> None:
     database = Database(tmp_path)
-    one = replace(lag_problem(), source="a/one.toml:LAG")
-    other = replace(lag_problem(), source="a/other.toml:LAG")
-    path = database.save(one, to_store(one, violation(one), None))
+    one = replace(lag_problem(), source=ProblemSource(target="a/one.toml:LAG"))
+    other = replace(lag_problem(), source=ProblemSource(target="a/other.toml:LAG"))
+    found = to_store(violation(lag_problem()))
+    path = database.save(one, found)
     assert path.parent.name == "one.LAG"
     assert [p for p, _ in database.fetch(one)] == [path]
     assert list(database.fetch(other)) == []
@@ -190,5 +188,5 @@ def test_a_check_that_cannot_simulate_is_an_error() -> None:
 
 def test_the_formula_is_kept_as_text() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9 or u < -2)")
-    stored = to_store(problem, violation(problem), None)
+    stored = to_store(violation(problem))
     assert parse(stored.formula) == problem.requirement.formula

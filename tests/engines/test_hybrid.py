@@ -1,5 +1,5 @@
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,8 @@ from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.conversation import OnExchange
+from falsifier.llm.messages import Chat
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
@@ -58,6 +60,9 @@ class Script:
         if isinstance(answer, Exception):
             raise answer
         return Advice([self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]])
+
+    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
+        """It asks nobody."""
 
     def describe(self, candidate: Candidate) -> str:
         return str(candidate.key)

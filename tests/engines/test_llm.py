@@ -25,9 +25,11 @@ from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget
-from falsifier.search.journal import ExchangeRecord, open_journal, read_journal
-from falsifier.search.loop import search
+from falsifier.search.events import Event, Exchanged
+from falsifier.search.journal import holds_run, read_journal
+from falsifier.search.records import ExchangeRecord
 from falsifier.search.result import Result
+from falsifier.search.run import falsify, resume
 from falsifier.testing import EngineContract
 from tests.llm.server import Step, serving
 from tests.problems import lag_problem
@@ -54,16 +56,9 @@ def test_transmission_in_two_simulations(form: str) -> None:
     ]
     with serving(*(Step(a) for a in answers)) as server:
         chat = LiteLLMChat("openai/gpt-5-mini", effort="high", api_base=server.url)
-        exchanges: list[Exchange] = []
-
-        def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Engine:
-            def both(exchange: Exchange) -> None:
-                exchanges.append(exchange)
-                on_exchange(exchange)
-
-            return make_llm_engine(problem, chat, variant="MP4", on_exchange=both)
-
-        result = search(problem, build, Budget(simulations=5))
+        events: list[Event] = []
+        engine = make_llm_engine(problem, chat, variant="MP4")
+        result = falsify(problem, engine, budget=5, listeners=[events.append])
     assert result.status == "falsified"
     assert [e.robustness for e in result.evaluations] == pytest.approx([0.419, -0.213], abs=1e-3)
     assert result.evaluations[1].candidate.origin == "openai/gpt-5-mini MP4"
@@ -77,6 +72,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
     assert result.spent.tokens == 240
     assert result.spent.reasoning_tokens == 24
     assert result.spent.cost is None
+    exchanges = [event.exchange for event in events if isinstance(event, Exchanged)]
     assert [e.reply.source for e in exchanges if e.reply] == ["llm", "llm"]
 
 
@@ -239,14 +235,10 @@ def test_killed_and_resumed_without_asking_twice(tmp_path: Path, last: int) -> N
 
 def recorded_run(problem: Problem, chat: Chat, directory: Path) -> Result:
     """Run, or resume where the directory holds a run already."""
-    records = read_journal(directory)
-    recorded = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
-
-    def build(problem: Problem, on_exchange: Callable[[Exchange], None]) -> Engine:
-        return make_llm_engine(problem, RecordedChat(recorded, chat), variant="MP5", on_exchange=on_exchange)
-
-    with open_journal(directory) as journal:
-        return search(problem, build, Budget(simulations=20), journal=journal, records=records)
+    engine = make_llm_engine(problem, chat, variant="MP5")
+    if holds_run(directory):
+        return resume(directory, problems=[problem], engine=engine)[0]
+    return falsify(problem, engine, budget=20, directory=directory)
 
 
 def test_no_secret_reaches_the_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -305,10 +297,8 @@ def test_money_limit_with_unknown_price_is_an_error() -> None:
     with serving(Step(reply([0.1] * 4)), Step(reply([0.2] * 4))) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url)
         with pytest.raises(SpecError, match="price of this language model is unknown"):
-            search(
-                problem,
-                lambda problem, on: make_llm_engine(problem, chat, variant="MP4", on_exchange=on),
-                Budget(simulations=5, cost=1.0),
+            falsify(
+                problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(simulations=5, cost=1.0)
             )
 
 
@@ -316,10 +306,8 @@ def test_token_budget_ends_a_run() -> None:
     problem = lag_problem()
     with serving(*(Step(reply([0.01 * i] * 4)) for i in range(9))) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url)
-        result = search(
-            problem,
-            lambda problem, on: make_llm_engine(problem, chat, variant="MP4", on_exchange=on),
-            Budget(simulations=50, tokens=300),
+        result = falsify(
+            problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(simulations=50, tokens=300)
         )
     assert result.status == "not falsified"
     assert "300 tokens" in result.reason

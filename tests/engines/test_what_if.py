@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,13 +17,12 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
-from falsifier.llm.replay import RecordedChat
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget
-from falsifier.search.journal import open_journal, read_journal, recorded_exchanges
-from falsifier.search.loop import search
+from falsifier.search.journal import holds_run, read_journal, recorded_exchanges
 from falsifier.search.result import Result
+from falsifier.search.run import falsify, resume
 from falsifier.testing import drive, lag_problem, simulated
 from tests.engines.test_hybrid import HASTY
 from tests.llm.server import Received, Step, serving
@@ -248,18 +248,11 @@ class TestResume:
         return call(1.0 + 0.01 * len(told)) if len(told) < 2 else candidates(1.5 + 0.01 * samples)
 
     def search(self, directory: Path, chat: Chat, simulations: int, tokens: int | None = None) -> Result:
-        def build(_: Problem, on_exchange: OnExchange) -> Engine:
-            return hybrid(chat, on_exchange=on_exchange)
-
-        records = read_journal(directory)
-        with open_journal(directory) as journal:
-            return search(
-                problem(),
-                build,
-                Budget(simulations=simulations, tokens=tokens),
-                journal=journal,
-                records=records,
-            )
+        """Run, or continue where the directory holds a run already."""
+        engine, budget = hybrid(chat), Budget(simulations=simulations, tokens=tokens)
+        if holds_run(directory):
+            return resume(directory, problems=[problem()], engine=engine, budget=budget)[0]
+        return falsify(problem(), engine, budget=budget, directory=directory)
 
     def test_mid_turn(self, tmp_path: Path) -> None:
         whole = self.search(tmp_path / "whole", ScriptedChat(self.script), 14)
@@ -268,30 +261,17 @@ class TestResume:
         cuts = [i for i, line in enumerate(lines) if b'"tool_calls":[{' in line][:2]
         for number, cut in enumerate(cuts, start=1):
             directory = tmp_path / f"cut{number}"
-            directory.mkdir()
+            shutil.copytree(tmp_path / "whole", directory)
             (directory / "journal.jsonl").write_bytes(b"".join(lines[: cut + 1]))
             rest = ScriptedChat(self.script)
             recorded = recorded_exchanges(read_journal(directory))
-            resumed = self.search(directory, RecordedChat(recorded, rest), 14)
+            resumed = self.search(directory, rest, 14)
             assert [e.candidate.key for e in resumed.evaluations] == [
                 e.candidate.key for e in whole.evaluations
             ]
             assert resumed.spent.calls == whole.spent.calls
             assert len(answers(rest.requests[0])) == number
             assert len(rest.requests) + len(recorded) == whole.spent.calls
-
-    def test_a_journal_from_before_there_were_tools(self, tmp_path: Path) -> None:
-        def old(request: ChatRequest) -> Line:
-            return self.script(request.model_copy(update={"tools": ()}))
-
-        whole = self.search(tmp_path / "old", ScriptedChat(old), 14)
-        text = (tmp_path / "old" / "journal.jsonl").read_text()
-        assert "tool" not in text
-        again = ScriptedChat([ChatError("nobody is asked")])
-        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "old")), again)
-        resumed = self.search(tmp_path / "old", played, 14)
-        assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
-        assert again.requests == []
 
     def test_a_turn_ends_where_the_budget_does(self, tmp_path: Path) -> None:
         chat = ScriptedChat(self.script)
@@ -300,8 +280,7 @@ class TestResume:
         assert chat.requests[-1].tools and answers(chat.requests[-1]) == [], "the call was not answered"
         assert cut.spent.tokens == 10
         # With more to spend the run goes on, from the same candidates.
-        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "run")), ScriptedChat(self.script))
-        resumed = self.search(tmp_path / "run", played, 16)
+        resumed = self.search(tmp_path / "run", ScriptedChat(self.script), 16)
         assert len(resumed.evaluations) == 16 > len(cut.evaluations)
         for before, after in zip(cut.evaluations, resumed.evaluations, strict=False):
             assert before.candidate.key == after.candidate.key
@@ -319,8 +298,7 @@ class TestResume:
         whole = self.search(tmp_path / "run", ScriptedChat(breaking), 16)
         assert chat_failed
         nobody = ScriptedChat([ChatError("nobody is asked")])
-        played = RecordedChat(recorded_exchanges(read_journal(tmp_path / "run")), nobody)
-        resumed = self.search(tmp_path / "run", played, 16)
+        resumed = self.search(tmp_path / "run", nobody, 16)
         assert [e.candidate.key for e in resumed.evaluations] == [e.candidate.key for e in whole.evaluations]
         assert nobody.requests == []
 

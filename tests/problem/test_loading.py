@@ -4,15 +4,17 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.files import bundled
 from falsifier.core.model import Variable
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import read_info
-from falsifier.problem.loading import bundled, load_problem, load_problems
-from falsifier.problem.options import adhoc_problem, changes_from_options, starter_spec
+from falsifier.problem.loading import load_problem, load_problems
+from falsifier.problem.options import changes_from_options
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import input_range
 from falsifier.problem.spec import InputSection
+from falsifier.problem.starter import starter_spec
 from tests.fmu.fixtures import path as fmu_path
 
 AT = bundled("fmus") / "AT.fmu"
@@ -124,18 +126,19 @@ def test_unknown_names_come_with_what_there_is() -> None:
 
 
 def test_no_spec_is_needed(folder: Path) -> None:
-    changes = changes_from_options(
-        inputs=["throttle=0:100:4:linear", "brake=10"], parameters=["finalDrive=3:3.5"], stop_time=20.0
+    problem = Problem.from_fmu(
+        folder / "AT.fmu",
+        "G[0,20] (speed <= 120)",
+        inputs={"throttle": (0, 100, 4, "linear"), "brake": 10},
+        parameters={"finalDrive": (3, 3.5)},
+        stop_time=20.0,
     )
-    problem = adhoc_problem(folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes)
     assert [d.name for d in problem.space.dimensions] == ["throttle"] * 4 + ["finalDrive"]
     assert problem.parameters == {"brake": 10}
     assert problem.experiment.stop_time == 20
-    named = adhoc_problem(
-        folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options(inputs=["brake"])
-    )
+    named = Problem.from_fmu(folder / "AT.fmu", "G[0,20] (speed <= 120)", inputs={"brake": None})
     assert [(r.name, r.low, r.high) for r in named.space.inputs] == [("brake", 0, 325)]
-    every = adhoc_problem(folder / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
+    every = Problem.from_fmu(folder / "AT.fmu", "G[0,20] (speed <= 120)")
     assert [r.name for r in every.space.inputs] == ["throttle", "brake"]
 
 
@@ -156,8 +159,8 @@ def test_options_that_cannot_be_read_are_named(option: str, message: str) -> Non
 
 
 def test_an_input_by_its_name_alone_is_as_the_spec_says(folder: Path) -> None:
-    target, changes = spec(folder, GOOD), changes_from_options(inputs=["throttle"])
-    assert load_problem(target, changes=changes).space == load_problem(target).space
+    target = spec(folder, GOOD)
+    assert load_problem(target, inputs={"throttle": None}).space == load_problem(target).space
 
 
 def test_a_range_that_nobody_knows_must_be_given() -> None:

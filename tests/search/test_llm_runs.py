@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.search.journal import ExchangeRecord, read_journal
+from falsifier.search.journal import read_journal
+from falsifier.search.records import ExchangeRecord
 from tests.command import falsifier
 from tests.llm.server import Step, serving
 

@@ -1,3 +1,4 @@
+import shutil
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -14,16 +15,11 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
-from falsifier.search.journal import (
-    AskedRecord,
-    EndedRecord,
-    EvaluatedRecord,
-    Journal,
-    open_journal,
-    read_journal,
-)
-from falsifier.search.loop import falsify, search
+from falsifier.search.journal import holds_run, read_journal
+from falsifier.search.loop import Live, search
+from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
 from falsifier.search.result import Result
+from falsifier.search.run import falsify, resume
 from tests.problems import broken, lag_problem, never
 
 
@@ -35,14 +31,10 @@ def run(
     budget: int = 20,
     seed: int = 1,
 ) -> Result:
-    def build(*_: object) -> object:
-        return make_engine(engine, problem, seed=seed)
-
-    if directory is None:
-        return search(problem, build, Budget(budget))  # type: ignore[arg-type]
-    with open_journal(directory) as journal:
-        records = read_journal(directory)
-        return search(problem, build, Budget(budget), journal=journal, records=records)  # type: ignore[arg-type]
+    """Run, or continue where the directory holds a run already."""
+    if directory is not None and holds_run(directory):
+        return resume(directory, problems=[problem])[0]
+    return falsify(problem, engine, budget=budget, seed=seed, directory=directory)
 
 
 def test_stops_at_the_first_confirmed_violation() -> None:
@@ -99,14 +91,7 @@ def test_interruption_loses_nothing(tmp_path: Path) -> None:
         if isinstance(event, Evaluated) and event.index == 4:
             raise KeyboardInterrupt
 
-    with open_journal(tmp_path) as journal:
-        result = search(
-            problem,
-            lambda *_: make_engine("uniform", problem, seed=1),
-            Budget(20),
-            journal=journal,
-            listeners=[interrupt],
-        )
+    result = falsify(problem, "uniform", seed=1, budget=20, directory=tmp_path, listeners=[interrupt])
     assert result.status == "interrupted"
     assert sum(isinstance(r, EvaluatedRecord) for r in read_journal(tmp_path)) == 5
     resumed = run(problem, tmp_path)
@@ -122,7 +107,7 @@ def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine
     whole = run(problem, tmp_path / "whole", engine=engine)
     lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
     cut = tmp_path / "cut"
-    cut.mkdir()
+    shutil.copytree(tmp_path / "whole", cut)
     torn = lines[keep][: len(lines[keep]) // 2]
     (cut / "journal.jsonl").write_bytes(b"".join(lines[:keep]) + torn)
     resumed = run(problem, cut, engine=engine)
@@ -137,35 +122,21 @@ def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine
 def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
     run(problem, tmp_path, budget=3)
-    with pytest.raises(JournalError, match="does not repeat its candidate 0"):
-        run(problem, tmp_path, seed=2)
-
-
-def test_one_writer_per_directory(tmp_path: Path) -> None:
-    with open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
-        Journal(tmp_path)
-
-
-def test_a_damaged_line_is_named(tmp_path: Path) -> None:
-    run(lag_problem("G[0,10] (x <= 2)"), tmp_path, budget=3)
-    path = tmp_path / "journal.jsonl"
-    lines = path.read_text().splitlines()
-    path.write_text("\n".join([lines[0], "{broken", *lines[2:]]) + "\n")
-    with pytest.raises(JournalError, match="line 2 is damaged"):
-        read_journal(tmp_path)
+    with pytest.raises(JournalError, match="candidate 0 of the engine 'uniform' differs from the journal"):
+        resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
 
 
 def test_batches_are_told_in_the_order_of_asking() -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
     with ThreadPoolExecutor(3) as executor:
-        parallel = search(
-            problem,
-            lambda *_: make_engine("uniform", problem, seed=5),
+        (parallel,) = search(
+            [problem],
+            [make_engine("uniform", problem, seed=5)],
             Budget(10),
             batch=4,
-            executor=executor,
+            steps=Live(executor),
         )
-    alone = search(problem, lambda *_: make_engine("uniform", problem, seed=5), Budget(10), batch=4)
+    (alone,) = search([problem], [make_engine("uniform", problem, seed=5)], Budget(10), batch=4)
     assert len(parallel.evaluations) == 10
     assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
 
@@ -191,8 +162,7 @@ class Silent:
 
 def test_a_silent_language_model_ends_the_run_with_everything_kept(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
-    with open_journal(tmp_path) as journal:
-        result = search(problem, lambda *_: Silent(problem), Budget(20), journal=journal)
+    result = falsify(problem, Silent(problem), budget=20, directory=tmp_path)
     assert (result.status, result.reason) == ("failed", "no usable reply")
     assert len(result.evaluations) == 2
     records = read_journal(tmp_path)
@@ -204,7 +174,14 @@ def test_a_silent_language_model_ends_the_run_with_everything_kept(tmp_path: Pat
 
 def test_a_refuted_violation_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     def refute(problem: Problem, evaluation: Evaluation) -> Confirmation:
-        return Confirmation(evaluation, "refuted", 0.1, 0.1, "did not happen again")
+        return Confirmation(
+            problem=problem,
+            evaluation=evaluation,
+            outcome="refuted",
+            robustness=0.1,
+            reference=0.1,
+            reason="did not happen again",
+        )
 
     monkeypatch.setattr("falsifier.search.loop.confirm", refute)
     result = run(lag_problem(), engine="corners", budget=4)
@@ -228,12 +205,3 @@ def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
     result = run(problem, engine=engine, budget=20)
     assert result.spent.simulations == 20
     assert {e.candidate.signals["u"].values for e in result.evaluations} <= {(-1.0,), (0.0,), (1.0,)}
-
-
-@pytest.mark.parametrize("engine", ["surrogate", "annealing", "cma"])
-def test_a_journal_with_numbers_from_before_rounding_is_continued(tmp_path: Path, engine: str) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    before = run(whole(problem, "real"), tmp_path, engine=engine, budget=8)
-    after = run(whole(problem, "integer"), tmp_path, engine=engine, budget=12)
-    assert [e.robustness for e in after.evaluations[:8]] == [e.robustness for e in before.evaluations]
-    assert all(e.candidate.signals["u"].values[0].is_integer() for e in after.evaluations[8:])

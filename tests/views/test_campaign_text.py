@@ -9,7 +9,16 @@ from falsifier.views.campaign_text import PlainScoreboard, Rate, _fitting, overa
 
 def run(name: str, seed: int, status: str, simulations: int = 0, best: float | None = None) -> RunProgress:
     spent = Spent(simulations=simulations, calls=1, prompt_tokens=90, completion_tokens=10, cost=0.25)
-    return RunProgress(f"{name}-{seed}", name, Method("uniform"), seed, status, "", best, spent)  # type: ignore[arg-type]
+    return RunProgress(
+        name=f"{name}-{seed}",
+        requirement=name,
+        method=Method("uniform"),
+        seed=seed,
+        status=status,  # type: ignore[arg-type]
+        reason="",
+        best=best,
+        spent=spent,
+    )
 
 
 BEFORE = Progress((run("A", 0, "running", 3, 0.5), run("A", 1, "waiting"), run("B", 0, "waiting")))

@@ -7,8 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.files import bundled
 from falsifier.errors import SpecError
-from falsifier.problem.loading import bundled
 
 # Published means have one decimal, so ours are compared at one decimal: 1.3 and 1.34 share a rank.
 _DECIMALS = 1

@@ -4,22 +4,20 @@ A search for several requirements together is a run for each of them.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.plan import Method, method_of
 from falsifier.counterexamples.store import file_name
 from falsifier.errors import JournalError
+from falsifier.search import manifest as manifests
 from falsifier.search.budget import Spent
-from falsifier.search.journal import read_manifest
 from falsifier.search.manifest import Manifest
-from falsifier.search.shared import shared_tally
 from falsifier.search.tally import RunStatus, read_tally
 from falsifier.stl.verdict import Verdict
 
@@ -27,13 +25,14 @@ if TYPE_CHECKING:
     import pandas
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Run:
     """One run as its directory tells it.
 
     Attributes:
         directory: where it lies.
-        manifest: how it came to be.
+        manifest: how it came to be, with this requirement alone.
+        shared: whether several requirements shared this search.
         method: how it searched.
         status: how it ended, or ``running``.
         reason: why it ended.
@@ -48,6 +47,7 @@ class Run:
 
     directory: Path
     manifest: Manifest
+    shared: bool
     method: Method
     status: RunStatus
     reason: str
@@ -62,12 +62,12 @@ class Run:
     @property
     def requirement(self) -> str:
         """Name of the requirement."""
-        return self.manifest.requirement["name"]
+        return self.manifest.requirement.name
 
     @property
     def counterexample_file(self) -> Path:
         """File of the counterexample, for ``falsifier replay``; it is written when it is first asked for."""
-        return self.directory / file_name(self.requirement if self.manifest.shared else "")
+        return self.directory / file_name(self.requirement if self.shared else "")
 
     @property
     def seed(self) -> int:
@@ -101,8 +101,12 @@ def load(directory: Path) -> list[Run]:
     Raises:
         JournalError: when the directory is none of these, or a file in it cannot be understood.
     """
-    described = ((path, _manifest(path)) for path in run_directories(directory))
-    return [_run(path, manifest.of(name)) for path, manifest in described for name in manifest.names]
+    described = ((path, manifests.read(path)) for path in run_directories(directory))
+    return [
+        _run(path, manifest.of(name), shared=manifest.shared)
+        for path, manifest in described
+        for name in manifest.names
+    ]
 
 
 def load_run(directory: Path, requirement: str | None = None) -> Run:
@@ -115,36 +119,30 @@ def load_run(directory: Path, requirement: str | None = None) -> Run:
     Raises:
         JournalError: when a file in it cannot be understood, or a requirement must be named.
     """
-    manifest = _manifest(directory)
+    manifest = manifests.read(directory)
     if requirement is None and manifest.shared:
         names = ", ".join(manifest.names)
         raise JournalError(f"{directory}: several requirements were falsified together, name one of {names}")
-    return _run(directory, manifest.of(requirement or manifest.names[0]))
+    return _run(directory, manifest.of(requirement or manifest.names[0]), shared=manifest.shared)
 
 
-def _manifest(directory: Path) -> Manifest:
-    try:
-        return Manifest.model_validate(read_manifest(directory))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise JournalError(f"{directory}/manifest.json: {first['loc']}: {first['msg']}") from None
-
-
-def _run(directory: Path, manifest: Manifest) -> Run:
-    tally = shared_tally(directory, manifest.requirement) if manifest.shared else read_tally(directory)
+def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
+    tally = read_tally(directory, manifest.requirement.name)
+    method = replace(method_of(manifest.request), parameterization=manifest.parameterization, together=shared)
     return Run(
-        directory,
-        manifest,
-        method_of(manifest.request),
-        tally.status,
-        tally.reason,
-        tally.robustness,
-        tally.best,
-        Verdict(**tally.verdict) if tally.verdict else None,
-        tally.counterexample,
-        tally.unconfirmed,
-        tally.trajectories,
-        tally.spent,
+        directory=directory,
+        manifest=manifest,
+        shared=shared,
+        method=method,
+        status=tally.status,
+        reason=tally.reason,
+        robustness=tally.robustness,
+        best=tally.best,
+        verdict=tally.verdict.verdict if tally.verdict else None,
+        counterexample=tally.counterexample,
+        unconfirmed=tally.unconfirmed,
+        trajectories=tally.trajectories,
+        spent=tally.spent,
     )
 
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.space import SearchSpace
-from falsifier.problem.problem import Problem, Requirement
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,12 @@ The only place that imports matplotlib. Functions draw on the axes that they are
 nothing here needs a display.
 """
 
+from typing import TYPE_CHECKING
+
 from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_rates
 from falsifier.views.plotting.diagnosis import plot_diagnosis
 from falsifier.views.plotting.evaluation import (
+    plot,
     plot_evaluation,
     plot_panel,
     plot_requirement,
@@ -14,19 +17,23 @@ from falsifier.views.plotting.evaluation import (
     save_figure,
 )
 from falsifier.views.plotting.prediction import plot_predictions
-from falsifier.views.plotting.robustness_map import plot_neighbourhood
+from falsifier.views.plotting.robustness_map import plot_robustness_map
 from falsifier.views.plotting.trajectory import plot_signal, plot_trajectory
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Figure
+
 __all__ = [
+    "plot",
     "plot_comparison",
     "plot_diagnosis",
     "plot_evaluation",
     "plot_history",
-    "plot_neighbourhood",
     "plot_panel",
     "plot_predictions",
     "plot_rates",
     "plot_requirement",
+    "plot_robustness_map",
     "plot_signal",
     "plot_trajectory",
     "png",

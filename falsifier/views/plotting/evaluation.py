@@ -4,10 +4,14 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+from falsifier.search.result import Result
 from falsifier.views.panels import Panel, panels
 from falsifier.views.plotting.axes import figure_of, own_axes
+from falsifier.views.plotting.trajectory import plot_trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,6 +19,20 @@ if TYPE_CHECKING:
 
 _OUTPUT, _INPUT, _BOUND, _CRITICAL, _WINDOW = "#1f5fa8", "#2f7d4f", "#b3261e", "#b3261e", "#8a8a8a"
 _PANEL_HEIGHT = 1.9
+
+
+def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
+    """Picture of a result, a counterexample or a trajectory.
+
+    Raises:
+        ValueError: for a result without a simulation that could be drawn.
+    """
+    if isinstance(shown, Trajectory):
+        return plot_trajectory(shown)
+    evaluation = shown.shown if isinstance(shown, Result) else shown.evaluation
+    if evaluation is None:
+        raise ValueError("no simulation succeeded: there is nothing to draw")
+    return plot_evaluation(shown.problem, evaluation)
 
 
 def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":

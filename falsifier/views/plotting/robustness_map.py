@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from falsifier.counterexamples.robustness_map import Neighbourhood
+from falsifier.counterexamples.robustness_map import RobustnessMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _VIOLATES, _HOLDS, _ZERO = "#b3261e", "#1f5fa8", "#8a8a8a"
 
 
-def plot_neighbourhood(found: Neighbourhood, title: str = "") -> "Figure":
+def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     """Figure with two panels: robustness over the size of the change, and the map of the deciding inputs."""
     from matplotlib.figure import Figure
 
@@ -28,7 +28,7 @@ def plot_neighbourhood(found: Neighbourhood, title: str = "") -> "Figure":
     return figure
 
 
-def _plot_sizes(ax: "Axes", found: Neighbourhood) -> None:
+def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
     violates = found.robustness < 0
     for mask, color, label in ((violates, _VIOLATES, "violates"), (~violates, _HOLDS, "holds")):
         ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
@@ -38,7 +38,7 @@ def _plot_sizes(ax: "Axes", found: Neighbourhood) -> None:
     ax.legend()
 
 
-def _plot_map(ax: "Axes", found: Neighbourhood) -> None:
+def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     first, second = (found.coordinates[i] for i in found.axes)
     largest = float(np.nanmax(np.abs(found.surface))) or 1.0
     mesh = ax.pcolormesh(
@@ -51,7 +51,7 @@ def _plot_map(ax: "Axes", found: Neighbourhood) -> None:
     ax.figure.colorbar(mesh, ax=ax, label="robustness, below 0 violates")
 
 
-def _plot_line(ax: "Axes", found: Neighbourhood) -> None:
+def _plot_line(ax: "Axes", found: RobustnessMap) -> None:
     coordinate = found.coordinates[found.axes[0]]
     ax.plot(found.grid[0], found.surface[0], color=_HOLDS, linewidth=1.2)
     ax.plot(coordinate.value, found.original, "o", color=_VIOLATES)

@@ -8,8 +8,9 @@ from pathlib import Path
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
+from falsifier.problem.options import options_from
+from falsifier.search.journal import read_journal, recorded_candidates
 from falsifier.search.request import LLMSettings, RunRequest
-from falsifier.search.tally import read_candidate
 from falsifier.stl import parse
 from falsifier.views.panels import Panel, panels
 
@@ -90,7 +91,7 @@ def gather(directory: Path, published: Published | None = None) -> Content:
 
 def replay_command(run: Run) -> str:
     """Shell command that simulates a run's counterexample again."""
-    place = run.counterexample_file if run.manifest.shared else run.directory
+    place = run.counterexample_file if run.shared else run.directory
     return shlex.join(["falsifier", "replay", str(place)])
 
 
@@ -104,22 +105,21 @@ def searches(runs: Iterable[Run]) -> list[Run]:
     return list(longest.values())
 
 
-def run_command(request: RunRequest) -> str:
-    """Shell command that repeats a run's search.
+def run_command(request: RunRequest, *, shared: bool = False) -> str:
+    """Shell command that repeats a run's search; shared: for all requirements of its spec.
 
-    >>> run_command(RunRequest(problem=ProblemRequest(target="AT1"), engine="uniform"))
+    >>> run_command(RunRequest(problems=(ProblemSource(target="AT1"),), engine="uniform"))
     'falsifier run AT1 --engine uniform --budget 100 --seed 0'
     """
-    problem, budget = request.problem, request.budget
+    problem, budget = request.source, request.budget
+    if problem is None:
+        return "(its problem was made in Python)"
+    target = problem.target.rpartition(":")[0] if shared else problem.target
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
         ("--profile", problem.profile),
         ("--parameterization", None if problem.parameterization == "free" else problem.parameterization),
-        ("--interface", problem.interface),
-        *(("--input", text) for text in problem.inputs),
-        *(("--param", text) for text in problem.parameters),
-        ("--stop-time", problem.stop_time),
-        ("--output-interval", problem.output_interval),
+        *options_from(problem.changes),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
@@ -127,9 +127,9 @@ def run_command(request: RunRequest) -> str:
         ("--max-tokens", budget.tokens),
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
-        ("--all", True if request.together else None),
+        ("--all", True if shared else None),
     ]
-    words = ["falsifier", "run", problem.target]
+    words = ["falsifier", "run", target]
     for name, value in options:
         words += [] if value is None else [name] if value is True else [name, str(value)]
     return shlex.join(words)
@@ -154,8 +154,8 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     found = [run for run in runs if run.falsified] or _best(runs)
     return Section(
         name,
-        requirement["formula"],
-        requirement.get("description", ""),
+        requirement.formula,
+        requirement.description,
         by_method,
         [_shown(run) for run in found],
     )
@@ -169,12 +169,12 @@ def _best(runs: Iterable[Run]) -> list[Run]:
 def _shown(run: Run) -> Shown:
     index = run.counterexample if run.counterexample is not None else run.best
     assert index is not None
-    candidate = Candidate.from_json(read_candidate(run.directory, index))
+    candidate = recorded_candidates(read_journal(run.directory))[index]
     path = run.directory / run.trajectories.get(index, "-")
     if not path.is_file():
         return Shown(run, candidate, [])
     drawn = panels(
-        parse(run.manifest.requirement["formula"]),
+        parse(run.manifest.requirement.formula),
         Trajectory.load(path),
         candidate,
         run.manifest.inputs,

@@ -54,11 +54,11 @@ def _case(label: str, run: Run) -> ElementTree.Element:
         failure.text = "\n".join(
             line.translate(_NO_CONTROLS)
             for line in (
-                run.manifest.requirement["formula"],
+                run.manifest.requirement.formula,
                 f"at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
                 run.reason,
                 replay_command(run),
-                run_command(run.manifest.request),
+                run_command(run.manifest.request, shared=run.shared),
             )
         )
     elif run.status == "failed":

@@ -142,7 +142,7 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
             ("values there", values),
         ]
     facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
-    commands = [("repeat the search", run_command(run.manifest.request))]
+    commands = [("repeat the search", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
         commands.insert(0, ("simulate it again", replay_command(run)))
     rationale = shown.candidate.rationale

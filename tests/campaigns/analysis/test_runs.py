@@ -7,16 +7,15 @@ import pytest
 from falsifier.campaigns.analysis import columns, frame, histories, load, load_run
 from falsifier.campaigns.analysis.curves import falsification_curve, improvements, thinned
 from falsifier.errors import JournalError
+from falsifier.problem.source import ProblemSource
 from falsifier.search.journal import (
-    AskedRecord,
-    EvaluatedRecord,
-    VerdictRecord,
     read_journal,
     recorded_evaluations,
     write_manifest,
 )
-from falsifier.search.manifest import manifest
-from falsifier.search.request import ProblemRequest, RunRequest
+from falsifier.search.manifest import describe
+from falsifier.search.records import AskedRecord, EvaluatedRecord, VerdictRecord
+from falsifier.search.request import RunRequest
 from tests.problems import easy
 
 
@@ -74,14 +73,14 @@ def test_curves(campaign: Path) -> None:
 
 def test_a_journal_of_ten_thousand_simulations_loads_quickly(tmp_path: Path) -> None:
     problem = easy()
-    request = RunRequest(problem=ProblemRequest(target="python:tests.problems:easy"))
-    write_manifest(tmp_path, manifest(request, problem).model_dump(mode="json"))
+    request = RunRequest(problems=(ProblemSource(target="python:tests.problems:easy"),))
+    write_manifest(tmp_path, describe(request, [problem], "corners").model_dump(mode="json"))
     candidate = problem.space.decode([0.5, 0.25, 0.1, -0.3], origin="uniform").to_json()
     verdict = VerdictRecord(robustness=0.1, critical_time=3.0, predicate="x <= 0.9", values={"x": 0.8})
     with (tmp_path / "journal.jsonl").open("w") as file:
         for i in range(10_000):
-            asked = AskedRecord(first=i, n=1, candidates=[candidate], seconds=1e-4)
-            done = EvaluatedRecord(index=i, status="ok", verdict=verdict, seconds=0.01)
+            asked = AskedRecord(first=i, n=1, candidates=[candidate], seconds=1e-4, requirement="EASY")
+            done = EvaluatedRecord(index=i, status="ok", verdicts={"EASY": verdict}, seconds=0.01)
             file.write(f"{asked.model_dump_json()}\n{done.model_dump_json()}\n")
     load_run(tmp_path)
     started = perf_counter()

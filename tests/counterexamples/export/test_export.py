@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.files import bundled
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.counterexamples.export import export_counterexample
@@ -17,9 +18,9 @@ from falsifier.counterexamples.export.tables import matlab_name, write_csv, writ
 from falsifier.counterexamples.store import FILE_NAME, load, to_store
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.problem.loading import bundled, load_problem
+from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.search.request import ProblemRequest
+from falsifier.problem.source import ProblemSource
 from tests.command import ROOT
 from tests.problems import lag_problem
 
@@ -40,9 +41,21 @@ AT_INPUTS = {
 }
 
 
+def confirmed(problem: Problem, evaluation: Evaluation) -> Confirmation:
+    return Confirmation(
+        problem=problem,
+        evaluation=evaluation,
+        outcome="confirmed",
+        robustness=evaluation.robustness,
+        reference=evaluation.robustness,
+        reason="",
+    )
+
+
 def exported(problem: Problem, evaluation: Evaluation, target: str, directory: Path) -> list[Path]:
-    confirmation = Confirmation(evaluation, "confirmed", evaluation.robustness, evaluation.robustness, "")
-    stored = to_store(problem, confirmation, ProblemRequest(target=target))
+    stored = to_store(confirmed(problem, evaluation)).model_copy(
+        update={"problem": ProblemSource(target=target)}
+    )
     return export_counterexample(problem, stored, evaluation, directory)
 
 
@@ -95,14 +108,13 @@ def test_fmpy_alone_gets_the_same_of_interpolated_inputs_and_of_start_values(
 def test_fmpy_alone_gets_the_same_of_inputs_of_all_types(tmp_path: Path, version: int) -> None:
     real = "in_Real" if version == 2 else "in_Float64"
     whole = "in_Integer" if version == 2 else "in_Int32"
-    request = ProblemRequest(
-        target=str(ROOT / "tests" / "fixtures" / "fmus" / f"Echo_{version}.fmu"),
-        stl=f"G[0,2] ({real.replace('in', 'out')} <= 100)",
-        inputs=(f"{real}=-5:5:4", f"{whole}=0:9:5", "in_Boolean=0:1:3", "in_Enumeration=1:2:2"),
+    problem = Problem.from_fmu(
+        ROOT / "tests" / "fixtures" / "fmus" / f"Echo_{version}.fmu",
+        f"G[0,2] ({real.replace('in', 'out')} <= 100)",
+        inputs={real: (-5, 5, 4), whole: (0, 9, 5), "in_Boolean": (0, 1, 3), "in_Enumeration": (1, 2, 2)},
         stop_time=2.0,
         output_interval=0.01,
     )
-    problem = request.load()
     low, high = problem.space.bounds.T
     candidate = problem.space.decode(np.random.default_rng(version).uniform(low, high))
     trajectory = evaluate(problem, candidate).trajectory
@@ -115,7 +127,7 @@ def test_fmpy_alone_gets_the_same_of_inputs_of_all_types(tmp_path: Path, version
 
 def test_a_model_exchange_solver_of_another_tool_gets_the_same_within_its_tolerance(tmp_path: Path) -> None:
     spec = bundled("specs") / "CC.toml"
-    problem = ProblemRequest(target=f"{spec}:CC1", interface="model-exchange", stop_time=100.0).load()
+    problem = load_problem(f"{spec}:CC1", interface="model-exchange", stop_time=100.0)
     low, high = problem.space.bounds.T
     candidate = problem.space.decode((low + high) / 2)
     trajectory = evaluate(problem, candidate).trajectory
@@ -225,8 +237,8 @@ def test_the_mat_file_holds_time_and_value_by_names_that_matlab_accepts(tmp_path
 def test_what_does_not_apply_is_left_out(tmp_path: Path) -> None:
     problem = lag_problem()
     evaluation = evaluate(problem, problem.space.decode([1.0] * 4))
-    confirmation = Confirmation(evaluation, "confirmed", evaluation.robustness, evaluation.robustness, "")
-    files = export_counterexample(problem, to_store(problem, confirmation, None), evaluation, tmp_path)
+    stored = to_store(confirmed(problem, evaluation))
+    files = export_counterexample(problem, stored, evaluation, tmp_path)
     assert {f.name for f in files} == {
         FILE_NAME,
         "input.csv",

@@ -11,7 +11,8 @@ from falsifier.engines.surrogate import Settings, Surrogate
 from falsifier.engines.surrogate.arms import choose_arm, quality
 from falsifier.engines.surrogate.opening import opening
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.problem import Problem, Requirement
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 

@@ -17,7 +17,8 @@ from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
 from falsifier.problem.loading import load_problem
-from falsifier.problem.problem import Problem, Requirement
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
 from tests.problems import lag_problem
 

@@ -12,11 +12,11 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.options import changes_from_options
+from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import open_journal, write_manifest
-from falsifier.search.loop import search
-from falsifier.search.manifest import manifest
-from falsifier.search.request import LLMSettings, ProblemRequest, RunRequest
+from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.search.run import falsify
 from falsifier.views.report import html_report
 from falsifier.views.report.content import run_command
 from tests.problems import easy
@@ -104,10 +104,7 @@ class Talker:
 def talked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run whose engine's rationale is an attack."""
     directory = tmp_path_factory.mktemp("talked")
-    request = RunRequest(problem=ProblemRequest(target="python:tests.problems:easy"), engine="corners")
-    with open_journal(directory) as journal:
-        write_manifest(directory, manifest(request, easy()).model_dump(mode="json"))
-        search(easy(), lambda *_: Talker(), Budget(5), journal=journal)
+    falsify(easy(), Talker(), budget=5, directory=directory)
     return directory
 
 
@@ -198,8 +195,9 @@ def test_the_environment_is_told(page: Element) -> None:
 
 
 def test_a_search_can_be_repeated_from_its_command() -> None:
+    changes = changes_from_options(inputs=["u=0:1:3"], stop_time=5.0)
     request = RunRequest(
-        problem=ProblemRequest(target="my.toml:R", stl="G[0,1] (x <= 1)", inputs=("u=0:1:3",), stop_time=5.0),
+        problems=(ProblemSource(target="my.toml:R", stl="G[0,1] (x <= 1)", changes=changes),),
         engine="uniform",
         seed=3,
         budget=Budget(7, cost=0.5),
@@ -214,7 +212,7 @@ def test_a_models_search_can_be_repeated_too() -> None:
     model = LLMSettings(
         name="openai/gpt-5-mini", effort="high", variant="MP4", price=(0.25, 2), anonymous=True
     )
-    request = RunRequest(problem=ProblemRequest(target="AT1"), llm=model)
+    request = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model)
     assert run_command(request) == (
         "falsifier run AT1 --llm openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
         "--budget 100 --seed 0"

@@ -1,0 +1,260 @@
+"""A validated spec and its FMU joined: everything that a problem consists of."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.errors import ModelError, SpecError, did_you_mean
+from falsifier.fmu import FmuModel, read_info
+from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
+from falsifier.problem.ranges import fixed_value, input_range, parameter_range
+from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
+
+# Share of the output interval by which the stop time may miss a whole multiple of it: 15 / (1/30) is exact
+# only up to rounding.
+_GRID_ROUNDING = 1e-6
+_DEFAULT_TIME_LIMIT = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """What a problem consists of; the attributes are those of Problem."""
+
+    model: Model
+    requirement: Requirement
+    space: SearchSpace
+    experiment: Experiment
+    parameters: Mapping[str, float]
+
+
+def join(
+    spec: Spec,
+    requirement: str,
+    *,
+    path: Path,
+    profile: str | None = None,
+    stl: str | None = None,
+    changes: ModelChanges | None = None,
+) -> Joined:
+    """Join a validated spec with its FMU.
+
+    Args:
+        spec: the spec.
+        requirement: name of the requirement.
+        path: of the spec file, for relative names and for errors.
+        profile: name of a profile of the spec.
+        stl: a formula to judge instead of the spec's.
+        changes: override everything that the spec says of the experiment, inputs and parameters.
+
+    Raises:
+        SpecError: naming file, key and cure.
+        ModelError: when the FMU cannot be read or simulated.
+    """
+    file = str(path)
+    if requirement not in spec.requirements:
+        raise SpecError(
+            f"no requirement {requirement!r}; {did_you_mean(requirement, spec.requirements)}", file=file
+        )
+    if profile is not None and profile not in spec.profiles:
+        raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}", file=file)
+    fmu = path.parent / spec.model.fmu
+    if not fmu.is_file():
+        raise SpecError(
+            f"there is no FMU {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
+        )
+    layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
+    model = FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), file))
+    experiment = _experiment(spec, layers, model.info, file)
+    inputs, parameters = _merged(spec, layers)
+    space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    section = spec.requirements[requirement]
+    is_option = stl is not None or path.suffix == ".fmu"
+    key = "--stl" if is_option else f"requirements.{requirement}.formula"
+    formula = parse_requirement(
+        section.formula if stl is None else stl, model.info, experiment, file=file, key=key
+    )
+    return Joined(
+        model,
+        Requirement(requirement if stl is None else "stl", formula, "" if stl else section.description),
+        space,
+        _recording(experiment, model.info, [*spec.model.record, *formula.signals], file),
+        fixed,
+    )
+
+
+def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
+    """Join an FMU and a formula, without a spec.
+
+    Without any searched input or parameter all real inputs that have a min and a max are searched.
+
+    Raises:
+        SpecError: naming what cannot be known and the option that says it.
+        ModelError: when the FMU cannot be read.
+    """
+    if not fmu.is_file():
+        raise SpecError(f"there is no file {fmu}")
+    info = read_info(fmu)
+    stop_time = changes.stop_time or info.stop_time
+    if stop_time is None:
+        raise SpecError(f"{fmu}: the FMU has no default stop time: give --stop-time SECONDS")
+    searched = any(s.value is None for s in changes.inputs.values()) or any(
+        s.range is not None for s in changes.parameters.values()
+    )
+    spec = parse_spec(
+        {
+            "model": {
+                "fmu": str(fmu.resolve()),
+                "interface": changes.interface or default_interface(info),
+                "stop_time": stop_time,
+                "output_interval": default_interval(info, stop_time),
+            },
+            "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
+            "requirements": {"stl": {"formula": stl}},
+        },
+        file=str(fmu),
+    )
+    if not searched and not spec.inputs:
+        known = [v.name for v in info.inputs]
+        raise SpecError(
+            f"{fmu}: nothing to search: give --input NAME=LOW:HIGH:POINTS; {did_you_mean('', known)}"
+        )
+    return join(spec, "stl", path=fmu, changes=changes)
+
+
+def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
+    stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
+    if not info.interfaces:
+        raise ModelError(
+            f"{info.name}: it offers neither co-simulation nor model exchange, and scheduled execution is "
+            "not supported; export it for co-simulation"
+        )
+    if stated is None and len(info.interfaces) == 1:
+        return info.interfaces[0]
+    offered = " and ".join(info.interfaces)
+    if stated is None or stated not in info.interfaces:
+        raise SpecError(f"the FMU offers {offered}: say which", file=file, key="model.interface")
+    return stated
+
+
+def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, file: str) -> Experiment:
+    def stated(key: str) -> float | None:
+        value: float | None = getattr(spec.model, key)
+        for layer in layers:
+            if getattr(layer, key) is not None:
+                value = getattr(layer, key)
+        return value
+
+    stop_time = stated("stop_time") or info.stop_time
+    if stop_time is None:
+        raise SpecError("the FMU has no default stop time: add this key", file=file, key="model.stop_time")
+    output_interval = stated("output_interval") or info.step_size
+    if output_interval is None:
+        raise SpecError("the FMU has no default step: add this key", file=file, key="model.output_interval")
+    intervals = stop_time / output_interval
+    if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
+        raise SpecError(
+            f"{output_interval:g} s does not divide the stop time {stop_time:g} s into whole intervals",
+            file=file,
+            key="model.output_interval",
+        )
+    return Experiment(
+        stop_time=stop_time,
+        output_interval=stop_time / round(intervals),
+        outputs=(),
+        step_size=stated("step_size"),
+        tolerance=stated("tolerance"),
+        time_limit=spec.model.time_limit or _DEFAULT_TIME_LIMIT,
+    )
+
+
+def _recording(experiment: Experiment, info: ModelInfo, extra: Iterable[str], file: str) -> Experiment:
+    """Return the experiment that records all outputs and those extra variables that are no inputs."""
+    inputs = {v.name for v in info.inputs}
+    outputs = [v.name for v in info.outputs if v.kind != "string"]
+    for name in extra:
+        if name not in info:
+            known = [v.name for v in info.variables]
+            raise SpecError(
+                f"unknown variable {name!r}; {did_you_mean(name, known)}", file=file, key="model.record"
+            )
+        if name not in outputs and name not in inputs:
+            outputs.append(name)
+    return replace(experiment, outputs=tuple(outputs))
+
+
+def _merged(
+    spec: Spec, layers: Iterable[ModelChanges]
+) -> tuple[dict[str, InputSection], dict[str, ParameterSection]]:
+    inputs, parameters = dict(spec.inputs), dict(spec.parameters)
+    for layer in layers:
+        for name, changed in layer.inputs.items():
+            inputs[name] = overlay(inputs.get(name), changed)
+        for name, change in layer.parameters.items():
+            parameters[name] = overlay(parameters.get(name), change)
+    return inputs, parameters
+
+
+def _space(
+    inputs: Mapping[str, InputSection],
+    parameters: Mapping[str, ParameterSection],
+    info: ModelInfo,
+    experiment: Experiment,
+    file: str,
+) -> tuple[SearchSpace, dict[str, float]]:
+    searched: list[InputRange] = []
+    fixed: dict[str, float] = {}
+    for name, section in inputs.items():
+        key = f"inputs.{name}"
+        variable = _variable(name, info.inputs, "input", file, key)
+        if section.value is not None:
+            fixed[name] = fixed_value(variable, section.value, file=file, key=f"{key}.value")
+        else:
+            searched.append(input_range(variable, section, file=file, key=key))
+    ranges: list[ParameterRange] = []
+    for name, parameter in parameters.items():
+        key = f"parameters.{name}"
+        settable = [v for v in info.variables if v.settable and v.causality != "input"]
+        if name in info and not info[name].settable:
+            v = info[name]
+            raise SpecError(
+                f"cannot be set: it is a {v.variability} {v.causality} of the FMU", file=file, key=key
+            )
+        variable = _variable(name, settable, "parameter or start value", file, key)
+        if parameter.range is not None:
+            ranges.append(parameter_range(variable, parameter.range, file=file, key=f"{key}.range"))
+        elif parameter.value is not None:
+            fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
+    if not searched and not ranges:
+        raise SpecError(
+            "nothing to search: add [inputs.NAME] with range and control_points, "
+            "or [parameters.NAME] with range",
+            file=file,
+            key="inputs",
+        )
+    return SearchSpace(tuple(searched), tuple(ranges), experiment.stop_time), fixed
+
+
+def _variable(name: str, variables: Iterable[Variable], kind: str, file: str, key: str) -> Variable:
+    known = {v.name: v for v in variables}
+    if name not in known:
+        raise SpecError(f"the FMU has no such {kind}; {did_you_mean(name, known)}", file=file, key=key)
+    return known[name]
+
+
+def _bounded_inputs(info: ModelInfo) -> dict[str, object]:
+    return {
+        v.name: {"control_points": DEFAULT_POINTS}
+        for v in info.inputs
+        if v.kind == "real" and v.low is not None and v.high is not None
+    }
+
+
+def _searched_inputs(changes: ModelChanges) -> dict[str, object]:
+    return {
+        name: {"control_points": DEFAULT_POINTS}
+        for name, section in changes.inputs.items()
+        if section.value is None
+    }

@@ -1,0 +1,108 @@
+"""The starter spec of an FMU: it loads as it is, and says in comments what to fill in."""
+
+from collections.abc import Iterable
+from itertools import islice
+from math import ceil, floor
+from pathlib import Path
+
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.errors import SpecError
+from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
+from falsifier.stl.names import name_text
+
+# Seconds that the starter spec simulates when the FMU gives no stop time.
+_DEFAULT_STOP_TIME = 10.0
+# Bound of the starter spec's placeholder requirement when the FMU gives no max.
+_UNREACHED = 1e9
+# Parameters that the starter spec lists.
+_SHOWN_PARAMETERS = 10
+
+
+def starter_spec(fmu: Path, info: ModelInfo) -> str:
+    """Text of a spec file for an FMU: it loads as it is, and says in comments what to fill in."""
+    inputs = [v for v in info.inputs if v.kind != "string"]
+    tunable = sorted(
+        (v for v in info.parameters if v.settable and v.kind != "string"), key=lambda v: v.kind != "real"
+    )
+    sections = [_model_section(fmu, info), *(_input_section(v) for v in inputs)]
+    if tunable and not inputs:
+        sections.append(_searched_parameter(tunable[0]))
+    if tunable:
+        sections.append(_parameter_hints(tunable))
+    sections.append(_requirement_section(info))
+    return "\n\n".join(sections) + "\n"
+
+
+def _model_section(fmu: Path, info: ModelInfo) -> str:
+    stop_time = info.stop_time or _DEFAULT_STOP_TIME
+    doubt = "" if info.stop_time else "  # the FMU gives none: check this"
+    about = f"# {info.name}: {info.description}\n\n" if info.description else f"# {info.name}\n\n"
+    return (
+        f'{about}[model]\nfmu = "{fmu.as_posix()}"\ninterface = "{default_interface(info)}"\n'
+        f"stop_time = {stop_time!r}{doubt}\noutput_interval = {default_interval(info, stop_time)!r}"
+    )
+
+
+def _input_section(v: Variable) -> str:
+    meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
+    comment = f"# {meaning}\n" if meaning else ""
+    comment += f"# {_items(v)}\n" if v.literals else ""
+    least, most = v.limits
+    low, high = (0.0, 1.0) if least is None or most is None else (least, most)
+    if low == high:
+        return f"{comment}[inputs.{_toml_key(v.name)}]\nvalue = {low!r}"
+    unknown = least is None or most is None
+    doubt = "  # the FMU gives no min and max: put the real range here" if unknown else ""
+    interpolation = "pchip" if v.kind == "real" else "constant"
+    return (
+        f"{comment}[inputs.{_toml_key(v.name)}]\nrange = {_range(v, low, high)}{doubt}\n"
+        f'control_points = {DEFAULT_POINTS}\ninterpolation = "{interpolation}"'
+    )
+
+
+def _searched_parameter(v: Variable) -> str:
+    start = v.start if isinstance(v.start, int | float) else 0.0
+    reach = max(abs(start), 1.0) / 2
+    least, most = v.limits
+    low = start - reach if least is None else least
+    high = start + reach if most is None else most
+    return f"[parameters.{_toml_key(v.name)}]  # put the real range here\nrange = {_range(v, low, high)}"
+
+
+def _range(v: Variable, low: float, high: float) -> str:
+    """A range in TOML; of whole numbers where the variable has no others."""
+    if v.kind == "real":
+        return f"[{float(low)!r}, {float(high)!r}]"
+    return f"[{floor(low)}, {ceil(high)}]"
+
+
+def _items(v: Variable) -> str:
+    return ", ".join(f"{number} = {name}" for name, number in v.literals.items())
+
+
+def _parameter_hints(parameters: Iterable[Variable]) -> str:
+    hints = ["# Parameters may be searched, or fixed with value = NUMBER:"]
+    for v in islice(parameters, _SHOWN_PARAMETERS):
+        low, high = v.limits
+        limits = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
+        hints.append(
+            f"# parameters.{_toml_key(v.name)}.range = {limits}  # starts at {v.start} {v.unit}".rstrip()
+        )
+    return "\n".join(hints)
+
+
+def _requirement_section(info: ModelInfo) -> str:
+    output = next((v for v in info.outputs if v.kind != "string"), None)
+    if output is None:
+        raise SpecError(f"{info.name}: the FMU has no output that a requirement could speak of")
+    bound = _UNREACHED if output.high is None else output.high
+    stop_time = info.stop_time or _DEFAULT_STOP_TIME
+    return (
+        "[requirements.R1]\n"
+        f"formula = 'G[0,{stop_time:.10g}] ({name_text(output.name)} <= {bound:.10g})'"
+        '  # put the real requirement here\ndescription = ""'
+    )
+
+
+def _toml_key(name: str) -> str:
+    return name if name.replace("_", "").replace("-", "").isalnum() else f'"{name}"'

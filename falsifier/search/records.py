@@ -1,0 +1,123 @@
+"""Lines of a journal: what happened in a run, as typed records."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+from falsifier.evaluation.confirm import Confirmation, Outcome
+from falsifier.evaluation.evaluate import Status
+from falsifier.search.budget import Spent
+from falsifier.stl.verdict import Verdict
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class AskedRecord(_Record):
+    """The engine was asked for n candidates and gave these, as evaluations first, first + 1, ..."""
+
+    kind: Literal["asked"] = "asked"
+    first: int
+    n: int
+    candidates: list[dict[str, Any]]
+    seconds: float
+    requirement: str = Field(description="Whose turn it was.")
+
+
+class VerdictRecord(_Record):
+    """A verdict."""
+
+    robustness: float = Field(allow_inf_nan=False)
+    critical_time: float
+    predicate: str
+    values: dict[str, float]
+
+    @classmethod
+    def of(cls, verdict: Verdict | None) -> "VerdictRecord | None":
+        """Return the record of a verdict, None where there is none."""
+        if verdict is None:
+            return None
+        return cls(
+            robustness=verdict.robustness,
+            critical_time=verdict.critical_time,
+            predicate=verdict.predicate,
+            values=dict(verdict.values),
+        )
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict."""
+        return Verdict(self.robustness, self.critical_time, self.predicate, self.values)
+
+
+class EvaluatedRecord(_Record):
+    """Evaluation index has ended."""
+
+    kind: Literal["evaluated"] = "evaluated"
+    index: int
+    status: Status
+    verdicts: dict[str, VerdictRecord | None] = Field(
+        description="By requirement, of each that was not falsified yet; null where it could not be judged."
+    )
+    reason: str = ""
+    seconds: float
+    log: list[str] = []
+    trajectory: str | None = Field(None, description="File below the run directory.")
+
+
+class ExchangeRecord(_Record):
+    """A language model was asked and answered."""
+
+    kind: Literal["exchange"] = "exchange"
+    exchange: dict[str, Any]
+
+
+class ConfirmedRecord(_Record):
+    """A violation was checked."""
+
+    kind: Literal["confirmed"] = "confirmed"
+    index: int
+    requirement: str
+    outcome: Outcome
+    robustness: float | None
+    reference: float | None
+    reason: str
+    halved: float | None = None
+    spent: dict[str, float | None] = Field(description="What the run had used by then.")
+
+    @classmethod
+    def of(cls, confirmation: Confirmation, *, index: int, spent: Spent) -> "ConfirmedRecord":
+        """Return the record of a confirmation."""
+        return cls(
+            index=index,
+            requirement=confirmation.problem.name,
+            outcome=confirmation.outcome,
+            robustness=confirmation.robustness,
+            reference=confirmation.reference,
+            reason=confirmation.reason,
+            halved=confirmation.halved,
+            spent=asdict(spent),
+        )
+
+
+class EndedRecord(_Record):
+    """The run ended, or was interrupted."""
+
+    kind: Literal["ended"] = "ended"
+    status: str
+    reason: str
+    spent: dict[str, float | None]
+
+
+Record = AskedRecord | EvaluatedRecord | ExchangeRecord | ConfirmedRecord | EndedRecord
+RECORDS: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator="kind")])
+
+
+def spent_of(recorded: Mapping[str, float | None]) -> Spent:
+    """Spent from its record, in which all numbers are floats."""
+    whole = {f.name for f in fields(Spent) if f.type is int}
+    numbers = {name: int(v) if name in whole and v is not None else v for name, v in recorded.items()}
+    return Spent(**numbers)  # type: ignore[arg-type]

@@ -1,0 +1,114 @@
+"""Continuing a run: what its journal holds is taken from there, and only then is anything done anew.
+
+The engine is asked as before and must give what was recorded, which restores its state; evaluations,
+confirmations and replies of a language model come from the journal and cost nothing.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines.protocol import Engine
+from falsifier.errors import JournalError
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.messages import Chat
+from falsifier.llm.replay import RecordedChat, Recording
+from falsifier.problem.problem import Problem
+from falsifier.search.journal import recorded_evaluations, recorded_exchanges
+from falsifier.search.loop import Steps
+from falsifier.search.records import AskedRecord, ConfirmedRecord, EndedRecord, Record
+
+
+@dataclass(slots=True)
+class Replayed:
+    """Steps of a run that a journal holds, then live ones.
+
+    Attributes:
+        live: what does the rest.
+        asked: what engines gave, in order.
+        evaluations: in order.
+        confirmed: by evaluation and requirement.
+        recording: replies of a language model.
+        seconds: that the recorded part took.
+    """
+
+    live: Steps
+    asked: list[AskedRecord]
+    evaluations: list[Evaluation]
+    confirmed: dict[tuple[int, str], ConfirmedRecord]
+    recording: Recording
+    seconds: float
+    replayed: int = field(init=False)
+    _next: int = 0
+
+    def __post_init__(self) -> None:
+        self.replayed = len(self.evaluations)
+
+    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Have the engine repeat what it gave.
+
+        Raises:
+            JournalError: when it gives something else.
+        """
+        if not self.asked:
+            return self.live.ask(engine, wanted)
+        record = self.asked.pop(0)
+        candidates = engine.ask(record.n)
+        if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
+            raise JournalError(
+                f"cannot continue: candidate {record.first} of the engine {engine.name!r} differs from the "
+                "journal, which was written with other settings or another version"
+            )
+        return candidates, record.n, record.seconds
+
+    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
+        """Yield recorded evaluations, then live ones."""
+        known = self.evaluations[self._next : self._next + len(candidates)]
+        self._next += len(known)
+        for evaluation in known:
+            yield _with_trajectory(problem, evaluation)
+        if len(known) < len(candidates):
+            yield from self.live.evaluate(problem, candidates[len(known) :])
+
+    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
+        """What was found out about a violation."""
+        record = self.confirmed.get((index, problem.name))
+        if record is None:
+            return self.live.confirm(problem, evaluation, index)
+        return Confirmation(
+            problem=problem,
+            evaluation=evaluation,
+            outcome=record.outcome,
+            robustness=record.robustness,
+            reference=record.reference,
+            reason=record.reason,
+            halved=record.halved,
+        )
+
+    def chat(self, inner: Chat) -> Chat:
+        """Play recorded replies first."""
+        return RecordedChat(self.recording, self.live.chat(inner))
+
+
+def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
+    """Steps that take what a journal holds from there; the live ones where it holds nothing."""
+    if not records:
+        return live
+    ended = [r.spent["seconds"] or 0.0 for r in records if isinstance(r, ConfirmedRecord | EndedRecord)]
+    return Replayed(
+        live,
+        [r for r in records if isinstance(r, AskedRecord)],
+        recorded_evaluations(directory, records),
+        {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
+        Recording(recorded_exchanges(records)),
+        max(ended, default=0.0),
+    )
+
+
+def _with_trajectory(problem: Problem, evaluation: Evaluation) -> Evaluation:
+    """Simulate a recorded evaluation again when its trajectory was not kept."""
+    if evaluation.verdict is None or evaluation.trajectory is not None:
+        return evaluation
+    return replace(evaluation, trajectory=evaluate(problem, evaluation.candidate).trajectory)

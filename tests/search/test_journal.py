@@ -1,0 +1,61 @@
+"""Reading and writing the record of a run."""
+
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import JournalError
+from falsifier.search.journal import Journal, JournalReader, open_journal, read_journal, recorded_candidates
+from falsifier.search.records import AskedRecord
+from falsifier.search.run import falsify
+from tests.problems import impossible
+from tests.search.test_tally import evaluated
+
+
+def test_candidates_are_found_in_batches(tmp_path: Path) -> None:
+    lines = [
+        AskedRecord(
+            first=0, n=2, candidates=[{"origin": "a"}, {"origin": "b"}], seconds=0.1, requirement="R"
+        ),
+        evaluated(0, 1.0),
+        AskedRecord(first=2, n=2, candidates=[{"origin": "c"}], seconds=0.1, requirement="R"),
+    ]
+    (tmp_path / "journal.jsonl").write_text("".join(f"{line.model_dump_json()}\n" for line in lines))
+    found = recorded_candidates(read_journal(tmp_path))
+    assert [found[i].origin for i in range(3)] == ["a", "b", "c"]
+
+
+def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> None:
+    reader = JournalReader(tmp_path)
+    assert list(reader.new()) == [] and not reader.begun
+    path = tmp_path / "journal.jsonl"
+    lines = [evaluated(i, float(i)).model_dump_json() for i in range(3)]
+    path.write_text(f"{lines[0]}\n{lines[1][:20]}")
+    assert [r.index for r in reader.new()] == [0]  # type: ignore[union-attr]
+    path.write_text("".join(f"{line}\n" for line in lines))
+    assert [r.index for r in reader.new()] == [1, 2]  # type: ignore[union-attr]
+    path.write_text(f"{lines[0]}\n")
+    assert reader.shrank
+
+
+def test_lines_of_candidates_can_be_passed_over(tmp_path: Path) -> None:
+    falsify(impossible(), "uniform", budget=2, directory=tmp_path)
+    kinds = [r.kind for r in read_journal(tmp_path)]
+    assert kinds == ["asked", "evaluated", "asked", "evaluated", "ended"]
+    assert [r.kind for r in read_journal(tmp_path, with_candidates=False)] == [
+        k for k in kinds if k != "asked"
+    ]
+
+
+def test_one_writer_per_directory(tmp_path: Path) -> None:
+    with open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
+        Journal(tmp_path)
+
+
+def test_a_damaged_line_is_named(tmp_path: Path) -> None:
+    falsify(impossible(), "uniform", budget=3, directory=tmp_path)
+    path = tmp_path / "journal.jsonl"
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], "{broken", *lines[2:]]) + "\n")
+    with pytest.raises(JournalError, match="line 2 is damaged"):
+        read_journal(tmp_path)
