@@ -8,12 +8,10 @@ from typing import Any, TypeVar
 
 import click
 
+from falsifier.core.secrets import is_secret_option
 from falsifier.problem.options import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.search.request import LLMSettings
-
-# Options of litellm that would carry a key.
-_SECRET_OPTIONS = ("api_key", "headers", "extra_headers", "extra_body")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -161,7 +159,7 @@ def _llm_option(text: str) -> tuple[str, str | float]:
     name, equals, value = text.partition("=")
     if not equals or not name:
         raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
-    if name in _SECRET_OPTIONS:  # options stand in the run's manifest
+    if is_secret_option(name):  # options stand in the run's manifest
         raise click.UsageError(f"--llm-option {name}: keys are read from the environment only")
     try:
         return name, int(value) if value.isdigit() else float(value)

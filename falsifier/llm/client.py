@@ -5,17 +5,16 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
-from falsifier.llm.failures import classify, redact
+from falsifier.core.secrets import redact, secrets_in, without_secrets
+from falsifier.llm.failures import classify
 from falsifier.llm.litellm_import import dropped_parameters, load_litellm
-from falsifier.llm.messages import ChatReply, ChatRequest
-from falsifier.llm.modes import MODES, Mode
+from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode
 from falsifier.llm.providers import find_key, known
 from falsifier.llm.usage import Price, usage_of
 from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, storable
 
 # Reasoning models may think for minutes; seconds.
 DEFAULT_TIMEOUT = 600.0
-_SECRET_OPTIONS = frozenset({"api_key", "extra_headers", "headers"})
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,7 @@ class LiteLLMChat:
     def parameters(self) -> Mapping[str, Any]:
         """What is sent beside the messages, without secrets."""
         stated = {"effort": self.effort, "api_base": self.api_base and redact(self.api_base)}
-        options = {k: v for k, v in self._options().items() if k not in _SECRET_OPTIONS}
-        return {**{k: v for k, v in stated.items() if v is not None}, **options}
+        return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Send one request.
@@ -76,7 +74,7 @@ class LiteLLMChat:
                 llm=self.llm,
                 api_base=self.api_base,
                 key_variables=known(self.llm).keys,
-                secrets=(key or "", *self._secret_options()),
+                secrets=(key or "", *secrets_in(self.options)),
                 offers_tools=bool(request.tools),
             ) from None
 
@@ -85,13 +83,6 @@ class LiteLLMChat:
 
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}
-
-    def _secret_options(self) -> list[str]:
-        found: list[str] = []
-        for name in _SECRET_OPTIONS & self.options.keys():
-            value = self.options[name]
-            found += [str(v) for v in value.values()] if isinstance(value, Mapping) else [str(value)]
-        return found
 
     def _arguments(self, request: ChatRequest) -> dict[str, Any]:
         provider = known(self.llm)

@@ -9,8 +9,7 @@ from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.litellm_import import check_name, listed_price
-from falsifier.llm.messages import Chat, ChatRequest, Message, Usage
-from falsifier.llm.modes import Mode
+from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
 from falsifier.llm.providers import find_key, first_mode, key_variable
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate, RetryingChat
 from falsifier.llm.usage import Price

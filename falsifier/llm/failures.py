@@ -1,10 +1,9 @@
 """What can go wrong between here and a language model, sorted by what helps against it."""
 
-import os
-import re
 from collections.abc import Iterable
 from urllib.parse import urlsplit
 
+from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.providers import known, server_address
 
@@ -22,17 +21,6 @@ _FORMAT_WORDS = (
 )
 _TOOL_WORDS = ("tool", "function call", "function_call")
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
-_REDACTED = "[redacted]"
-_SECRET_PATTERNS = (
-    re.compile(r"(?i)(?<=bearer )[^\s'\",}]+"),
-    re.compile(r"(?i)(?<=[?&]key=)[^\s&'\"]+"),
-    re.compile(r"(?i)(?<=api[_-]key=)[^\s&'\"]+"),
-    re.compile(r"(?<=://)[^\s/@]+(?=@)"),
-    re.compile(r"\b(?:sk|hf|gsk|xai|AIza|pplx|nvapi)[-_][\w*-]{8,}"),
-)
-_SECRET_NAMES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
-# Shorter values are words that happen to be set, and redacting them would garble messages.
-_SHORTEST_SECRET = 6
 _LONGEST_DETAIL = 600
 # Requests to a server on this machine that refuses connections: one that starts this moment is still met.
 _LOCAL_PATIENCE = 3
@@ -67,17 +55,6 @@ class FormatUnsupportedError(ChatError):
 
 class ToolsUnsupportedError(ChatError):
     """The server, or the LLM behind it, takes no tools."""
-
-
-def redact(text: str, secrets: Iterable[str] = ()) -> str:
-    """Text without keys: the given ones, those in the environment, and what looks like one."""
-    environment = (v for k, v in os.environ.items() if k.upper().endswith(_SECRET_NAMES))
-    for secret in sorted({*secrets, *environment}, key=len, reverse=True):
-        if len(secret) >= _SHORTEST_SECRET:
-            text = text.replace(secret, _REDACTED)
-    for pattern in _SECRET_PATTERNS:
-        text = pattern.sub(_REDACTED, text)
-    return text
 
 
 def classify(

@@ -8,8 +8,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, ToolsUnsupportedError
 from falsifier.llm.litellm_import import may_take_tools
-from falsifier.llm.messages import ChatReply, ChatRequest
-from falsifier.llm.modes import MODES, Mode, below
+from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode, below
 
 
 @dataclass

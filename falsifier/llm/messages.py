@@ -1,20 +1,29 @@
 """What travels to and from a language model, as frozen values that go into the journal as they are."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 Role = Literal["system", "user", "assistant", "tool"]
 Source = Literal["llm", "script", "recording", "cache"]
+# Ways to ask for JSON, from the strictest to the plainest.
+Mode = Literal["json_schema", "json_object", "prompt"]
+MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 class _Value(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def below(mode: Mode) -> Mode | None:
+    """Next plainer way, or None."""
+    rest = MODES[MODES.index(mode) + 1 :]
+    return rest[0] if rest else None
+
+
 class _MayUseTools(_Value):
-    """Leaves out empty fields of tools, so that records and cache keys without tools stay what they were."""
+    """Leaves out empty fields of tools: most messages have none, and a journal has many."""
 
     @model_serializer(mode="wrap")
     def _without_empty_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

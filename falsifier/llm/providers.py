@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from falsifier.errors import ChatSetupError
-from falsifier.llm.modes import MODES, Mode
+from falsifier.llm.messages import MODES, Mode
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from falsifier.core.secrets import is_secret_option
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
@@ -18,6 +19,9 @@ class _Strict(BaseModel):
 class LLMSettings(_Strict):
     """Which language model, and how it is asked."""
 
+    # An option that holds a key is refused, and must not stand in the error's text either.
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
     name: str
     effort: Effort | None = None
     api_base: str | None = None
@@ -31,6 +35,13 @@ class LLMSettings(_Strict):
     anonymous: bool = Field(default=False, description="The LLM is told neutral names only.")
     fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")
     cache: bool = Field(default=True, description="Equal questions are answered from disk.")
+
+    @field_validator("options")
+    @classmethod
+    def _without_keys(cls, options: dict[str, str | float]) -> dict[str, str | float]:
+        for name in filter(is_secret_option, options):
+            raise ValueError(f"{name}: keys are read from the environment only; requests are recorded")
+        return options
 
 
 class RunRequest(_Strict):

@@ -2,9 +2,10 @@ import socket
 
 import pytest
 
+from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.failures import TransientChatError, classify, redact
+from falsifier.llm.failures import TransientChatError, classify
 from falsifier.llm.retry import Gate, RetryingChat
 from tests.llm.test_client import REQUEST
 

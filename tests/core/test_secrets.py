@@ -1,6 +1,16 @@
 import pytest
 
-from falsifier.fmu.environment import scrubbed
+from falsifier.core.secrets import redact, scrubbed, without_secrets
+
+KEYS = (
+    "hf_abcdefghijklmnopqrst",
+    "gsk_abcdefghijklmnopqrst",
+    "xai-abcdefghijklmnopqrst",
+    "nvapi-abcdefghijklmnopqrst",
+    "github_pat_abcdefghijklmnopqrst",
+    "glpat-abcdefghijklmnopqrst",
+    "sk-ant-abcdefghijklmnopqrst",
+)
 
 
 @pytest.mark.parametrize(
@@ -16,6 +26,10 @@ from falsifier.fmu.environment import scrubbed
         ("HTTPS_PROXY", "http://user:pass@proxy:3128"),
         ("ENDPOINT", "sk-proj-abcdefghijklmnopqrstuvwx"),
         ("PLAIN", "ghp_abcdefghijklmnopqrstuvwxyz"),
+        ("MYPASS", "x"),
+        ("GH_PAT", "x"),
+        ("SESSION_JWT", "x"),
+        *(("PLAIN", key) for key in KEYS),
     ],
 )
 def test_secrets_are_taken_out(name: str, value: str) -> None:
@@ -36,3 +50,18 @@ def test_secrets_are_taken_out(name: str, value: str) -> None:
 )
 def test_what_models_need_stays(name: str, value: str) -> None:
     assert scrubbed({name: value}) == {name: value}
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_keys_are_taken_out_of_texts(key: str) -> None:
+    assert redact(f"refused: {key}, try again") == "refused: [redacted], try again"
+
+
+def test_options_that_may_hold_a_key_are_recorded_without_it() -> None:
+    options = {"extra_body": {"key": "s"}, "headers": {"X": "s"}, "aws_secret": "s", "max_tokens": 5}
+    assert without_secrets(options) == {
+        "extra_body": "[redacted]",
+        "headers": "[redacted]",
+        "aws_secret": "[redacted]",
+        "max_tokens": 5,
+    }

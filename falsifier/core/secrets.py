@@ -1,0 +1,90 @@
+"""What may be a secret, and how it is kept out of records, messages and other processes."""
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+# Options of litellm that carry a key, or may.
+_OPTION_NAMES = frozenset({"api_key", "headers", "extra_headers", "default_headers", "extra_body"})
+_OPTION_NAME = re.compile(
+    r"(^|_)(key|secret|password|credentials?|token|authorization|cookie)$", re.IGNORECASE
+)
+# Licence servers and run-time folders of exporting tools must stay, so variables are judged one by one.
+_VARIABLE_NAME = re.compile(
+    r"KEY|TOKEN|SECRET|PASS(?!IVE|AGE)|_PWD$|CREDENTIAL|AUTH|COOKIE|PRIVATE|BEARER|JWT|(^|_)PAT$"
+    r"|^(AWS|AZURE|GOOGLE|OPENAI|ANTHROPIC|MISTRAL|GEMINI|COHERE|HF|GITHUB|GITLAB|VAULT|LITELLM|DATABASE)_",
+    re.IGNORECASE,
+)
+# The shapes of well-known keys: OpenAI and its kin, Hugging Face, Groq, xAI, NVIDIA, Perplexity, Google,
+# GitHub, GitLab, Slack, AWS, PEM files, JSON web tokens.
+_KEY_SHAPES = (
+    r"(?<![a-zA-Z0-9])(?:sk|pk|rk)-[\w*-]{8,}",
+    r"\b(?:hf|gsk|pplx|nvapi|xai)[-_][\w*-]{8,}",
+    r"\bAIza[\w-]{20,}",
+    r"\b(?:github_pat_|gh[opsur]_)\w{16,}",
+    r"\bglpat-[\w-]{16,}",
+    r"\bxox[abprs]-[\w-]{8,}",
+    r"\bAKIA[0-9A-Z]{12,}",
+    r"-----BEGIN [A-Z ]*PRIVATE KEY-----",
+    r"\beyJ[\w-]{10,}\.[\w-]{10,}(?:\.[\w-]*)?",
+)
+_CREDENTIALS_IN_ADDRESS = r"(?<=://)[^\s/@]+(?=@)"
+_VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS)))
+_IN_TEXT = re.compile(
+    "|".join(
+        (
+            r"(?i:(?<=bearer ))[^\s'\",}]+",
+            r"(?i:(?<=[?&]key=))[^\s&'\"]+",
+            r"(?i:(?<=api[_-]key=))[^\s&'\"]+",
+            _CREDENTIALS_IN_ADDRESS,
+            *_KEY_SHAPES,
+        )
+    )
+)
+# Variables of the environment whose values are taken out of texts.
+_KEY_VARIABLES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
+# Shorter values are words that happen to be set, and taking them out would garble messages.
+_SHORTEST = 6
+_REDACTED = "[redacted]"
+
+
+def is_secret_option(name: str) -> bool:
+    """Whether an option of a language model's client may hold a secret.
+
+    >>> is_secret_option("extra_body"), is_secret_option("azure_ad_token"), is_secret_option("max_tokens")
+    (True, True, False)
+    """
+    return name in _OPTION_NAMES or bool(_OPTION_NAME.search(name))
+
+
+def without_secrets(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as they may be recorded: the values of those that may hold a secret are replaced."""
+    return {name: _REDACTED if is_secret_option(name) else value for name, value in options.items()}
+
+
+def secrets_in(options: Mapping[str, Any]) -> list[str]:
+    """Values of the options that may hold a secret, for redact."""
+    found: list[str] = []
+    for name, value in options.items():
+        if is_secret_option(name):
+            found += [str(v) for v in value.values()] if isinstance(value, Mapping) else [str(value)]
+    return found
+
+
+def redact(text: str, secrets: Iterable[str] = ()) -> str:
+    """Text without keys: the given ones, those in the environment, and what looks like one."""
+    environment = (v for k, v in os.environ.items() if k.upper().endswith(_KEY_VARIABLES))
+    for secret in sorted({*secrets, *environment}, key=len, reverse=True):
+        if len(secret) >= _SHORTEST:
+            text = text.replace(secret, _REDACTED)
+    return _IN_TEXT.sub(_REDACTED, text)
+
+
+def scrubbed(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment without variables whose name or value looks like a secret."""
+    return {
+        name: value
+        for name, value in environment.items()
+        if not _VARIABLE_NAME.search(name) and not _VALUE.search(value)
+    }
