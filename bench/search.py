@@ -1,10 +1,9 @@
 """How many simulations do the engines need? Measured beside the published numbers.
 
-Each run asks for one candidate, simulates it and tells the result, until the requirement is violated or the
-budget is used up. FR is the number of falsified runs, S the mean number of simulations over them. Seeds 100
+Each run is a search by the public API until a violation is confirmed or the budget is used up. FR is the number of falsified runs, S the mean number of simulations over them. Seeds 100
 to 109 were not used while the engines were made. Dwell is the shortest time between two changes of a
 counterexample's inputs and switches their number, medians over the counterexamples: they say how plausible
-an input of a free parameterization is. Counterexamples are judged by the monitor alone here.
+an input of a free parameterization is. Every counterexample is confirmed.
 
     python bench/search.py                                    # default engine, free parameterization
     python bench/search.py --parameterization fixed --requirements CC1 CC2
@@ -14,10 +13,8 @@ an input of a free parameterization is. Counterexamples are judged by the monito
 import argparse
 import os
 import sys
-import time
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mean, median
 from typing import Any
@@ -26,11 +23,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier.core.candidate import Candidate
-from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
-from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.loading import load_problem
-from falsifier.problem.problem import Problem
+from falsifier import DEFAULT_ENGINE, ENGINES, Result, falsify, load_problem
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEMS = {
@@ -44,70 +37,24 @@ SYSTEMS = {
 LONG = {"CC4": 1500, "CCx": 1500}
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One search.
-
-    Attributes:
-        simulations: until the violation, None where there was none.
-        best: smallest robustness.
-        counterexample: the violating candidate.
-        seconds: per proposal, telling included.
-    """
-
-    simulations: int | None
-    best: float
-    counterexample: Candidate | None
-    seconds: float
-
-
-def problem_of(requirement: str, *, free: bool) -> Problem:
-    """Bundled problem; with the spec's fixed parameterization alone unless ``free``."""
-    system = next(name for name, requirements in SYSTEMS.items() if requirement in requirements)
-    problem = load_problem(f"{system}:{requirement}")
-    if free:
-        return problem
-    inputs = tuple(replace(r, free=None) for r in problem.space.inputs)
-    return replace(problem, space=replace(problem.space, inputs=inputs))
-
-
-def run(problem: Problem, name: str, seed: int, budget: int) -> Run:
-    """Search once."""
-    engine = make_engine(name, problem, seed=seed)
-    best, thinking = float("inf"), 0.0
-    for count in range(1, budget + 1):
-        started = time.perf_counter()
-        (candidate,) = engine.ask(1)
-        thinking += time.perf_counter() - started
-        evaluation = evaluate(problem, candidate)
-        if evaluation.robustness is not None:
-            best = min(best, evaluation.robustness)
-        if evaluation.violated:
-            return Run(count, best, candidate, thinking / count)
-        started = time.perf_counter()
-        engine.tell([evaluation])
-        thinking += time.perf_counter() - started
-    return Run(None, best, None, thinking / budget)
-
-
-def row(requirement: str, runs: Sequence[Run], published: dict[str, Any]) -> str:
+def row(requirement: str, results: Sequence[Result], published: dict[str, Any]) -> str:
     """One line of the table."""
-    counts = [r.simulations for r in runs if r.simulations is not None]
-    found = [r.counterexample for r in runs if r.counterexample is not None]
+    counts = [r.spent.simulations for r in results if r.falsified]
+    found = [r.counterexample.candidate for r in results if r.counterexample is not None]
     dwells = [s.shortest_dwell for c in found for s in c.signals.values() if s.shortest_dwell is not None]
     switches = [sum(s.switches for s in c.signals.values()) for c in found if c.signals]
-    missed = ", ".join(f"{r.best:.3g}" for r in runs if r.simulations is None)
+    missed = ", ".join(f"{r.robustness:.3g}" for r in results if not r.falsified)
     cells = [
         requirement,
         _published(published["best"].get(requirement)),
         _published(published["uniform"].get(requirement)),
-        f"{len(counts)}/{len(runs)}",
+        f"{len(counts)}/{len(results)}",
         f"{mean(counts):.1f}" if counts else "–",
         f"{median(counts):g}" if counts else "–",
         str(max(counts)) if counts else "–",
         f"{median(dwells):.2g}" if dwells else "–",
         f"{median(switches):g}" if switches else "–",
-        f"{mean(r.seconds for r in runs):.2f}",
+        f"{mean(r.spent.engine_seconds / r.spent.simulations for r in results):.2f}",
         missed or "–",
     ]
     return f"| {' | '.join(cells)} |"
@@ -147,11 +94,11 @@ def main() -> None:
     )
     print(f"|{'---|' * 11}")
     for requirement in options.requirements:
-        problem = problem_of(requirement, free=options.parameterization == "free")
+        system = next(name for name, requirements in SYSTEMS.items() if requirement in requirements)
+        problem = load_problem(f"{system}:{requirement}", parameterization=options.parameterization)
         budget = options.budget or LONG.get(requirement, 300)
-        runs = [run(problem, options.engine, seed, budget) for seed in options.seeds]
-        print(row(requirement, runs, published), flush=True)
-        problem.model.close()
+        results = [falsify(problem, options.engine, seed=seed, budget=budget) for seed in options.seeds]
+        print(row(requirement, results, published), flush=True)
     sys.stdout.flush()
 
 

@@ -72,9 +72,17 @@ def lag_problem(
     name: str = "LAG",
 ) -> Problem:
     """Problem over the lag: falsified only where u stays near its upper end for long."""
-    space = SearchSpace(
-        (InputRange("u", -1.0, 1.0, points, "linear", None, free, "V", "drive"),), parameters, STOP
+    drive = InputRange(
+        "u",
+        -1.0,
+        1.0,
+        control_points=points,
+        interpolation="linear",
+        free=free,
+        unit="V",
+        description="drive",
     )
+    space = SearchSpace((drive,), parameters, STOP)
     model = FunctionModel(function, INFO)  # type: ignore[arg-type]
     return Problem(model, Requirement(name, parse(stl)), space, Experiment(STOP, STEP, ("x",)))
 

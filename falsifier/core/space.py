@@ -5,7 +5,7 @@ and forth between candidates and vectors.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from math import ceil, floor
 from typing import Literal
 
@@ -57,6 +57,7 @@ class InputRange:
     name: str
     low: float
     high: float
+    _: KW_ONLY
     control_points: int = 1
     interpolation: Interpolation = "pchip"
     hold: float | None = None
@@ -85,6 +86,7 @@ class ParameterRange:
     name: str
     low: float
     high: float
+    _: KW_ONLY
     nominal: float | None = None
     unit: str = ""
     description: str = ""

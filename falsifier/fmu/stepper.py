@@ -145,13 +145,9 @@ def check_range(model: str, names: Sequence[str], ports: Ports, rows: NDArray[np
 
 
 def loops() -> Any:
-    """The compiled loops, or the plain ones where numba is not installed."""
-    try:
-        from falsifier.fmu import stepping
-    except ImportError:
-        from falsifier.fmu import plain
+    """The compiled loops; importing them takes a moment."""
+    from falsifier.fmu import stepping
 
-        return plain
     return stepping
 
 

@@ -10,8 +10,8 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.errors import CandidateError
 
-THROTTLE = InputRange("throttle", 0.0, 100.0, 7, hold=0.05, unit="%")
-BRAKE = InputRange("brake", 0.0, 325.0, 3, "constant")
+THROTTLE = InputRange("throttle", 0.0, 100.0, control_points=7, hold=0.05, unit="%")
+BRAKE = InputRange("brake", 0.0, 325.0, control_points=3, interpolation="constant")
 ROLL = ParameterRange("roll", 0.63, 0.89)
 SPACE = SearchSpace((THROTTLE, BRAKE), (ROLL,), 50.0)
 
@@ -60,11 +60,11 @@ def test_unknown_and_missing_names_are_named() -> None:
 
 
 def test_a_free_parameterization_is_checked_against_its_limits() -> None:
-    fixed = SearchSpace((InputRange("u", 0.0, 1.0, 3),), (), 10.0)
+    fixed = SearchSpace((InputRange("u", 0.0, 1.0, control_points=3),), (), 10.0)
     steps = Candidate({"u": Signal((0.0, 0.5, 9.0), (0.0, 1.0, 0.5), "constant")})
     with pytest.raises(CandidateError, match="expected 3 evenly spaced control points"):
         fixed.admit(steps)
-    free = SearchSpace((InputRange("u", 0.0, 1.0, 3, free=Freedom(3, 0.4)),), (), 10.0)
+    free = SearchSpace((InputRange("u", 0.0, 1.0, control_points=3, free=Freedom(3, 0.4)),), (), 10.0)
     assert free.admit(steps).signals["u"].interpolation == "constant"
     with pytest.raises(CandidateError, match="at most 3"):
         free.admit(Candidate({"u": Signal((0.0, 1.0, 2.0, 3.0), (0.0,) * 4)}))
@@ -81,7 +81,15 @@ def test_equal_simulations_have_equal_keys() -> None:
     assert a.key != SPACE.decode(SPACE.bounds[:, 1]).key
 
 
-GEAR = InputRange("gear", 1.0, 7.0, 3, "constant", kind="enumeration", items=(("a", 1), ("b", 3), ("c", 7)))
+GEAR = InputRange(
+    "gear",
+    1.0,
+    7.0,
+    control_points=3,
+    interpolation="constant",
+    kind="enumeration",
+    items=(("a", 1), ("b", 3), ("c", 7)),
+)
 COUNT = ParameterRange("count", 0.5, 3.5, kind="integer")
 
 

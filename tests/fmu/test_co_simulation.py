@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import plain, stepper
+from falsifier.fmu import stepper
 from falsifier.fmu.description import Description, Slot
 from falsifier.fmu.ports import make_ports
+from tests.fmu import plain
 from tests.fmu.fixtures import local, ramp, run
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]

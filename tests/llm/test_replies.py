@@ -15,8 +15,8 @@ from falsifier.llm.replies import ReplyForm
 FREE = Freedom(max_control_points=200, min_interval=0.1)
 SPACE = SearchSpace(
     (
-        InputRange("throttle", 0.0, 100.0, 3, "linear", 0.05, FREE),
-        InputRange("brake", 0.0, 325.0, 2, "constant", None, None),
+        InputRange("throttle", 0.0, 100.0, control_points=3, interpolation="linear", hold=0.05, free=FREE),
+        InputRange("brake", 0.0, 325.0, control_points=2, interpolation="constant", hold=None, free=None),
     ),
     (ParameterRange("mass", 900.0, 1100.0),),
     10.0,

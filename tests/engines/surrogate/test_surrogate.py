@@ -35,7 +35,7 @@ def oscillator_problem(formula: str) -> Problem:
     info = ModelInfo(
         "oscillator", variables=(Variable("u", causality="input"), Variable("x", causality="output"))
     )
-    space = SearchSpace((InputRange("u", -1.0, 1.0, 5, free=Freedom(200, 0.05)),), (), 20.0)
+    space = SearchSpace((InputRange("u", -1.0, 1.0, control_points=5, free=Freedom(200, 0.05)),), (), 20.0)
     experiment = Experiment(20.0, 0.02, ("x",))
     return Problem(FunctionModel(_oscillator, info), Requirement("R", parse(formula)), space, experiment)
 

@@ -203,7 +203,9 @@ class TestMP5:
         assert "13 of 17" in changing
 
     def test_parameters_are_plain_numbers(self) -> None:
-        problem = lag_problem(parameters=(ParameterRange("x0", -0.5, 1 / 3, 0.0, "m", "start"),))
+        problem = lag_problem(
+            parameters=(ParameterRange("x0", -0.5, 1 / 3, nominal=0.0, unit="m", description="start"),)
+        )
         standing, changing = told(
             problem, "MP5", [evaluate(problem, problem.space.decode([0, 0, 0, 0, 0.25]))]
         )
@@ -283,7 +285,7 @@ def test_an_evaluation_without_trajectory_is_told_from_its_verdict() -> None:
 
 
 def test_long_inputs_do_not_fill_the_prompt() -> None:
-    space = SearchSpace((InputRange("u", -1.0, 1.0, 400, "constant"),), (), 10.0)
+    space = SearchSpace((InputRange("u", -1.0, 1.0, control_points=400, interpolation="constant"),), (), 10.0)
     problem = replace(lag_problem(), space=space, requirement=Requirement("R", parse("G[0,10] (x <= 0.9)")))
     standing, _ = told(problem, "MP5")
     assert "400 control points at t = 0, 0.025, 0.05, ..., 9.975 s" in standing

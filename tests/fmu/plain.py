@@ -1,7 +1,4 @@
-"""The loops of stepping.py without a compiler: slower by one to two orders of magnitude, equal in outcome.
-
-They run where numba is not installed, and the tests compare the compiled loops with them.
-"""
+"""The loops of stepping.py without a compiler, in plain Python: what the compiled ones are compared with."""
 
 import ctypes
 from collections.abc import Callable
