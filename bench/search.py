@@ -1,9 +1,10 @@
 """How many simulations do the engines need? Measured beside the published numbers.
 
-Each run is a search by the public API until a violation is confirmed or the budget is used up. FR is the number of falsified runs, S the mean number of simulations over them. Seeds 100
-to 109 were not used while the engines were made. Dwell is the shortest time between two changes of a
-counterexample's inputs and switches their number, medians over the counterexamples: they say how plausible
-an input of a free parameterization is. Every counterexample is confirmed.
+Each run is a search by the public API until a violation is confirmed or the budget is used up. FR is the
+number of falsified runs, S the mean number of simulations over them. Seeds 100 to 109 were not used while
+the engines were made. Dwell is the shortest time between two changes of a counterexample's inputs and
+switches their number, medians over the counterexamples: they say how plausible an input of a free
+parameterization is.
 
     python bench/search.py                                    # default engine, free parameterization
     python bench/search.py --parameterization fixed --requirements CC1 CC2
