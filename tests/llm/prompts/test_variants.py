@@ -146,7 +146,7 @@ class TestMP5:
         problem, evaluation = transmission()
         _, changing = told(problem, "MP5", [evaluation])
         assert "robustness +0.418" in changing
-        assert "was worst at 20 s, where speed = 119.581 <= 120" in changing
+        assert "was lowest at 20 s: speed = 119.581 is below 120" in changing
         assert "all signals at t = 20 s: speed = 119.581 mph, rpm = " in changing
         assert "gear: 1, then 2 from 2.56 s, 3 from 6.16 s, 4 from 12.32 s" in changing
         assert "values every 2.5 s from t = 0:" in changing
