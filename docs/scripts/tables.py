@@ -73,6 +73,10 @@ def _type(said: Mapping[str, Any]) -> str:
     """What a value is, in the words of TOML."""
     if "$ref" in said:
         name = said["$ref"].rpartition("/")[2]
+        if name not in _SECTIONS:
+            raise PluginError(
+                f"docs/spec.md has no table of {name}: add it, and say in {__file__} where it is"
+            )
         what, place = _SECTIONS[name]
         return f"[{what}](#{place})"
     if "anyOf" in said:
