@@ -32,7 +32,7 @@ class Grid:
 
     @classmethod
     def over(cls, horizon: float, stop_time: float, *, cells: int, shortest: float) -> "Grid":
-        """Return a grid of ``cells`` cells over the horizon, fewer if they would be under ``shortest`` s."""
+        """Return a grid of ``cells`` cells over the horizon, fewer if needed for cells of ``shortest`` s."""
         horizon = min(horizon, stop_time) if horizon > 0 else stop_time
         count = max(1, min(cells, round(horizon / shortest)))
         step = horizon / count
