@@ -66,7 +66,7 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
         (["run", "AT1", "--budget", "many"], "many"),
         (["run", "AT1", "--effort", "low"], "need --llm"),
         (["run", "gone.toml"], "no such spec file"),
-        (["run", "gone.fmu", "--stl", "G (x >= 0)"], "there is no file gone.fmu"),
+        (["run", "gone.fmu", "--stl", "G (x >= 0)"], "gone.fmu: no such file"),
         (["run", "gone.fmu"], "--stl"),
         (["resume", "nowhere"], "not a run directory"),
         (["info", "gone.fmu"], "there is no file gone.fmu"),
