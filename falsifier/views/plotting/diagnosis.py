@@ -1,4 +1,4 @@
-"""Picture of how a formula came to its value: windows within windows, down to the critical time."""
+"""Figure of how a formula gets its value: nested time windows down to the critical time."""
 
 from typing import TYPE_CHECKING
 
@@ -17,15 +17,15 @@ _BAR, _ROW = 0.025, 0.11
 
 
 def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
-    """The deciding quantity, and below it the window of each operator on the way to the critical time.
+    """Plot the deciding quantity, and below it the window of each operator on the path to the critical time.
 
     Args:
-        problem: what was required.
+        problem: the problem with the requirement.
         evaluation: an evaluation with its trajectory.
-        ax: where to draw; None: a figure of its own.
+        ax: where to draw; None: a new figure.
 
     Raises:
-        ValueError: when the evaluation has no trajectory.
+        ValueError: if the evaluation has no trajectory.
     """
     from matplotlib.transforms import blended_transform_factory
 
