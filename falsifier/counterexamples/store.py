@@ -179,7 +179,7 @@ def counterexample_file(path: Path) -> Path:
         )
     if not found:
         raise SpecError(
-            "this run found no confirmed counterexample; expected a run that falsified its requirement",
+            "contains no confirmed counterexample; expected the directory of a run that found one",
             file=str(path),
         )
     return found[0]
