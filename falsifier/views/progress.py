@@ -49,10 +49,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                 case Exchanged():
                     progress.update(task, note=f"LLM replied, {event.spent.tokens} tokens so far")
                 case Confirmed():
-                    c = event.confirmation
-                    progress.console.print(
-                        f"violation {c.outcome}: {c.reason}", highlight=False, markup=False
-                    )
+                    progress.console.print(_confirmed(event), highlight=False, markup=False)
                 case _:
                     pass
 
@@ -93,7 +90,7 @@ class PlainDisplay:
             ):
                 self._line(f"simulation {event.index + 1}: {note(event)}")
             case Confirmed():
-                self._line(f"violation {event.confirmation.outcome}: {event.confirmation.reason}")
+                self._line(_confirmed(event))
             case _:
                 pass
 
@@ -152,6 +149,12 @@ class NotebookLine:
             self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
         else:
             self._handle.update(line)
+
+
+def _confirmed(event: Confirmed) -> str:
+    """What came of a violation; several requirements may share the search, so it is named."""
+    found = event.confirmation
+    return f"{found.problem.name}: violation {found.outcome}: {found.reason}"
 
 
 def _title(event: RunStarted) -> str:
