@@ -67,7 +67,7 @@ class PlainScoreboard:
     def __call__(self, progress: Progress) -> None:
         """Write a line per run that ended since the last call."""
         ended = {r.name: str(r.status) for r in progress.runs if r.status not in ("waiting", "running")}
-        if not self._begun:
+        if not self._begun:  # runs that ended before this start get no line
             self._begun, self._ended = True, ended
             self._write(f"{counted(len(progress.runs), 'run')}, {progress.finished} already finished")
         for run in progress.runs:
