@@ -217,6 +217,7 @@ class _Loop:
                 candidates = self.ask(turn, batch)
             except LimitReached as reached:
                 return self.failure_text() if self.all_failed() else str(reached)
+            # One by one, as they finish: what an interruption leaves of a batch is counted and recorded.
             for evaluation in self.steps.evaluate(turn.problem, candidates):
                 judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
                 self.note(turn, evaluation, judged)
