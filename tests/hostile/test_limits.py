@@ -45,7 +45,7 @@ def test_a_price_that_lifts_the_limit_on_the_cost_is_refused(price: str, tmp_pat
     with pytest.raises(SpecError, match="finite, non-negative"):
         Price(sent, received)
     with pytest.raises(ValidationError):
-        LLMSettings(llm="openai/m", price=(sent, received))
+        LLMSettings(name="openai/m", price=(sent, received))
     result = falsifier("run", "AT1", "--llm", "openai/m", "--budget", "1", "--price", price, cwd=tmp_path)
     assert result.code == 2
     assert f"--price {price}: prices must be finite and not negative" in result.err

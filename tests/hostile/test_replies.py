@@ -1,4 +1,4 @@
-"""Replies that a language model should not send: rejected with a reason, in a time that grows with the length."""
+"""Replies that an LLM should not send: rejected with a reason, in a time proportional to their length."""
 
 import json
 import time
