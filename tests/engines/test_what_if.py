@@ -11,9 +11,7 @@ import pytest
 from falsifier.engines.hybrid import Hybrid, Settings
 from falsifier.engines.llm import make_llm_engine, preview_tool
 from falsifier.engines.protocol import Engine
-from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
-from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
@@ -304,43 +302,3 @@ class TestResume:
 
     def calls(self, directory: Path) -> list[Exchange]:
         return [e for e in recorded_exchanges(read_journal(directory)) if e.reply and e.reply.tool_calls]
-
-
-class TestForesight:
-    """What the surrogate foretells."""
-
-    def trained(self, formula: str = FORMULA) -> tuple[Problem, Surrogate]:
-        made = lag_problem(formula, free=True, parameters=0)
-        engine = Surrogate(made, seed=1, settings=HASTY)
-        drive(engine, lambda c: evaluate(made, c), rounds=10)
-        return made, engine
-
-    @pytest.mark.parametrize(
-        "formula",
-        [
-            "G[0,10] (y <= 9)",
-            "F[2,8] (y >= 9)",
-            "G[0,10] (y <= 9 and u0 >= -9)",
-            "G[0,5] (F[0,2] (y <= 1.5)) or y > 20",
-            "not F[0,10] (y > 9)",
-        ],
-    )
-    def test_verdicts_are_those_of_the_simulation(self, formula: str) -> None:
-        made, engine = self.trained(formula)
-        found = [made.space.decode(point) for point in ([0.5, 1.5, 1.0, -1.0], [-1.5, 0.2, 1.9, 1.0])]
-        for foretold, candidate in zip(engine.foresee(found), found, strict=True):
-            true = evaluate(made, candidate).verdict
-            assert true is not None
-            assert foretold.robustness == pytest.approx(true.robustness, abs=0.4)
-            assert foretold.predicate == true.predicate
-            assert foretold.critical_time == pytest.approx(true.critical_time, abs=1.0)
-        assert 0 <= engine.recent_error < 1
-
-    def test_asking_changes_nothing(self) -> None:
-        (made, one), (_, other) = self.trained(), self.trained()
-        one.foresee([made.space.decode([1.0] * 4)])
-        assert [c.key for c in one.ask(3)] == [c.key for c in other.ask(3)]
-
-    def test_nothing_is_foretold_from_nothing(self) -> None:
-        made = problem()
-        assert Surrogate(made, seed=0, settings=HASTY).foresee([made.space.decode([0.0] * 4)]) == []

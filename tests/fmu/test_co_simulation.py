@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import stepper
-from falsifier.fmu.description import Description, Slot
-from falsifier.fmu.ports import make_ports
 from tests.fmu import plain
 from tests.fmu.fixtures import local, ramp, run
 
@@ -130,16 +127,3 @@ def test_events_inside_of_steps(name: str) -> None:
     assert got["bounces"][got.index(0.45)] == 0 and got["bounces"][got.index(0.5)] == 1
     flight = 0.5 - np.sqrt(2 / 9.81)
     assert got["v"][got.index(0.5)] == pytest.approx(0.7 * np.sqrt(2 * 9.81) - 9.81 * flight, abs=0.12)
-
-
-def test_a_negated_alias_has_the_other_sign() -> None:
-    info = ModelInfo("M", fmi_version="1.0")
-    slots = {"a": Slot(0, "Real"), "b": Slot(0, "Real", negated=True)}
-    ports = make_ports(Description(info, "", {}, slots), ["a", "b"], {"Real": 1})
-    memory = ports.memory[1]
-    memory[0] = 2.5
-    loops, place = stepper.loops(), ports.table[2]
-    assert [loops.fetch(place + 32 * k) for k in (0, 1)] == [2.5, -2.5]
-    assert [plain.fetch(place + 32 * k) for k in (0, 1)] == [2.5, -2.5]
-    loops.put(place + 32, 4.0)
-    assert memory[0] == -4.0

@@ -1,6 +1,5 @@
 """What is said of compiling, and where machine code is kept."""
 
-import logging
 import os
 import subprocess
 import sys
@@ -10,7 +9,6 @@ from pathlib import Path
 import numba
 import pytest
 
-from falsifier.evaluation.workers import local_executor
 from falsifier.fmu import isolation
 from falsifier.fmu.compiling import on_long_compilation
 from falsifier.fmu.nursery import REAP
@@ -67,23 +65,6 @@ def test_what_the_nursery_says_is_logged_and_is_not_the_answer(
     assert nursery.reap(1) == 7
     nursery.close()
     assert [record.getMessage() for record in caplog.records] == ["compiling"]
-
-
-def level() -> int:
-    """Level of the logger that says it, in the process that is asked."""
-    return logging.getLogger("falsifier.fmu").level
-
-
-def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
-    logger = logging.getLogger("falsifier.fmu")
-    before = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with local_executor(2) as executor:
-            assert executor is not None
-            assert executor.submit(level).result() == logging.ERROR
-    finally:
-        logger.setLevel(before)
 
 
 def test_the_loops_are_kept_in_a_temporary_folder_where_no_other_can_be_written(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
-from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
 from falsifier.llm.retry import Gate, RetryingChat
 from falsifier.llm.scripted import ScriptedChat
@@ -107,21 +106,3 @@ def test_server_restarts_while_asked() -> None:
     assert reply.text == "back"
     assert reply.attempts == 4
     assert len(server.received) == 4
-
-
-def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
-    refused = Step(status=400, message="response_format is not supported")
-    with serving(refused, refused, Step("in words"), Step("again")) as server:
-        chat = LadderChat(LiteLLMChat("openai/m", api_base=server.url))
-        first, second = chat.complete(REQUEST), chat.complete(REQUEST)
-    kinds = [r.body.get("response_format", {}).get("type") for r in server.received]
-    assert kinds == ["json_schema", "json_object", None, None]
-    assert first.parameters["mode"] == "prompt"
-    assert second.text == "again"
-
-
-def test_ladder_ends_at_its_last_rung() -> None:
-    refused = Step(status=400, message="grammar is not supported")
-    with serving(refused, refused, refused) as server, pytest.raises(ChatError, match="grammar"):
-        LadderChat(LiteLLMChat("openai/m", api_base=server.url)).complete(REQUEST)
-    assert len(server.received) == 3

@@ -1,15 +1,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines import make_engine
 from falsifier.engines.surrogate import Settings, Surrogate
-from falsifier.engines.surrogate.arms import choose_arm, quality
-from falsifier.engines.surrogate.opening import opening
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
@@ -90,44 +87,6 @@ def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
     engine.tell([evaluate(problem, candidate)])
     assert engine.history.objective is not None and engine.history.objective.is_relaxed
     assert simulations_until_violation(problem, seed=1, budget=20) is not None
-
-
-def test_opening_follows_the_form_of_the_requirement() -> None:
-    settings = Settings()
-    plain = opening(settings, has_inputs=True, windows=(), needs_several=False)
-    assert plain == ("constant", "constant")
-    nested = opening(settings, has_inputs=True, windows=(2.0,), needs_several=True)
-    assert nested == ("switching", "constant", "switching", "constant")
-    joint = opening(settings, has_inputs=True, windows=(), needs_several=True)
-    assert joint == ("stepping", "stepping")
-    assert opening(settings, has_inputs=False, windows=(), needs_several=True) == ()
-
-
-def test_arms_are_judged_by_their_latest_ranks() -> None:
-    arms = ["a", "a", "b", "b"]
-    costs = [4.0, 3.0, 1.0, 2.0]
-    assert quality("b", arms, costs, window=2) > 0.5 > quality("a", arms, costs, window=2)
-    assert quality("c", arms, costs, window=2) == 0.5
-    rng = np.random.default_rng(0)
-    drawn = [choose_arm({"a": 0.1, "b": 0.9}, rng, least=0.1) for _ in range(400)]
-    assert 0.05 < drawn.count("a") / 400 < 0.15
-
-
-def test_predictions_without_simulation_rank_inputs() -> None:
-    problem = lag_problem("G[0,10] (y <= 9)", free=True, parameters=0)
-    engine = Surrogate(problem, seed=0)
-    assert engine.foresee(engine.ask(2)) == []
-    for _ in range(6):
-        (candidate,) = engine.ask()
-        engine.tell([evaluate(problem, candidate)])
-    constants = [
-        engine.layout.candidate(engine.layout.constant([level]), origin="t", rationale="t")
-        for level in (0.0, 0.5, 1.0)
-    ]
-    predicted = [verdict.robustness for verdict in engine.foresee(constants)]
-    true = [evaluate(problem, c).robustness for c in constants]
-    assert predicted == pytest.approx(true, abs=1.0)
-    assert predicted == sorted(predicted, reverse=True)
 
 
 def test_parallel_candidates_differ() -> None:

@@ -1,0 +1,34 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.counterexamples.regression import check
+from falsifier.counterexamples.store import Database
+from falsifier.errors import SimulationError
+from tests.problems import lag_problem, never
+
+
+def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 0.5)")
+    database = Database(tmp_path)
+    first = check(problem, engine="uniform", budget=100, database=database)
+    assert first.counterexample is not None
+    assert first.result is not None
+    assert first.counterexample.evaluation.candidate.signals["u"].values == (1.0,) * 4
+    assert first.file is not None
+    second = check(problem, engine="uniform", budget=100, database=database)
+    assert second.result is None
+    assert second.file == first.file
+    assert [r.status for r in second.replayed] == ["violates"]
+    mended = replace(problem, parameters={"gain": 0.4})
+    third = check(mended, engine="uniform", budget=5, database=database)
+    assert (third.counterexample, third.file) == (None, None)
+    assert [r.status for r in third.replayed] == ["does not violate"]
+    assert third.result is not None
+    assert third.result.spent.simulations == 5
+
+
+def test_a_check_that_cannot_simulate_is_an_error() -> None:
+    with pytest.raises(SimulationError, match="all 10 simulations failed"):
+        check(lag_problem(function=never), engine="uniform")
