@@ -103,7 +103,7 @@ def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
     (repository / "tests" / "test_lag.py").write_text(
         """
 import pytest
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 def test_holds(falsifier_check):
     checked = falsifier_check(lag_problem("G[0,10] (x <= 2)"), budget=7)

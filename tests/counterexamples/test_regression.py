@@ -6,7 +6,8 @@ import pytest
 from falsifier.counterexamples.regression import check
 from falsifier.counterexamples.store import Database
 from falsifier.errors import SimulationError
-from tests.problems import lag_problem, never
+from falsifier.testing import lag_problem
+from tests.problems import never
 
 
 def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Path) -> None:
@@ -31,4 +32,4 @@ def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Pat
 
 def test_a_check_that_cannot_simulate_is_an_error() -> None:
     with pytest.raises(SimulationError, match="all 10 simulations failed"):
-        check(lag_problem(function=never), engine="uniform")
+        check(lag_problem(response=never), engine="uniform")

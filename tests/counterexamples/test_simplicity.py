@@ -4,7 +4,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.simplicity import digits, rest_value, rounder, simplicity
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 FREE = Freedom(max_control_points=20, min_interval=0.1)
 

@@ -15,7 +15,8 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search.run import falsify
 from falsifier.stl import parse
-from tests.problems import lag_problem, never
+from falsifier.testing import lag_problem
+from tests.problems import never
 from tests.stepped import euler_problem
 
 SPEC = """
@@ -99,7 +100,7 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
     coarse = euler_problem("G[1,1] (x <= 0.65)")
     found = violation(coarse)
     assert replay(to_store(found), coarse).status == "fragile"
-    broken = lag_problem(function=never)
+    broken = lag_problem(response=never)
     with pytest.raises(SimulationError, match="out of order"):
         replay(to_store(found), broken)
 

@@ -27,3 +27,18 @@ def test_walk_ends_after_all_corners_and_knows_when_it_is_settled() -> None:
         walk.learn(levels, float(sum(levels)))
     assert len(seen) == 4
     assert walk.settled
+
+
+def test_a_failed_corner_is_tried_once_and_never_built_upon() -> None:
+    rng = np.random.default_rng(3)
+    walk = CornerWalk(3)
+    assert not walk.settled
+    first = walk.next(rng)
+    assert first is not None
+    walk.learn(first, None)
+    second = walk.next(rng)
+    assert second is not None
+    walk.learn(second, 1.0)
+    third = walk.next(rng)
+    assert third not in (None, first, second)
+    assert sum(a != b for a, b in zip(second, third or (), strict=True)) == 1, "the best one is built upon"

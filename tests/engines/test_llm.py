@@ -30,9 +30,8 @@ from falsifier.search.journal import holds_run, read_journal
 from falsifier.search.records import ExchangeRecord
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
-from falsifier.testing import EngineContract
+from falsifier.testing import EngineContract, lag_problem
 from tests.llm.server import Step, serving
-from tests.problems import lag_problem
 
 
 def reply(values: Sequence[float], rationale: str = "because") -> str:
@@ -347,7 +346,7 @@ def counting_script(seed: int) -> Callable[[ChatRequest], str]:
         for key in ("signals", "parameters"):
             if key in one["properties"]:
                 names = one["properties"][key]["items"]["properties"]["name"]["enum"]
-                value = 4 * share - 2
+                value = 2 * share - 1
                 found[key] = [
                     {"name": n, "values": [value, -value, value, 0]}
                     if key == "signals"

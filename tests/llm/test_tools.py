@@ -12,7 +12,7 @@ from falsifier.llm.prompts import VARIANTS
 from falsifier.llm.replies import ReplyForm
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.stl import Verdict
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 
 class Foreteller:

@@ -18,7 +18,8 @@ from falsifier.search.journal import read_journal
 from falsifier.search.loop import Live, search
 from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
 from falsifier.search.run import falsify
-from tests.problems import broken, lag_problem, never
+from falsifier.testing import lag_problem
+from tests.problems import broken, never
 from tests.search.support import run
 
 
@@ -55,7 +56,7 @@ def test_robustness_zero_is_no_violation() -> None:
 
 
 def test_failed_simulations_are_evaluations_with_a_reason() -> None:
-    result = run(lag_problem("G[0,10] (x <= 2)", function=broken), budget=12)
+    result = run(lag_problem("G[0,10] (x <= 2)", response=broken), budget=12)
     failed = [e for e in result.evaluations if e.status == "failed"]
     assert failed
     assert len(failed) < 12
@@ -63,7 +64,7 @@ def test_failed_simulations_are_evaluations_with_a_reason() -> None:
 
 
 def test_a_model_that_always_fails_ends_the_run_early() -> None:
-    result = run(lag_problem(function=never), budget=1000)
+    result = run(lag_problem(response=never), budget=1000)
     assert result.status == "failed"
     assert result.spent.simulations == 10
     assert "RuntimeError: out of order" in result.reason

@@ -7,7 +7,7 @@ from falsifier.engines import make_engine
 from falsifier.errors import JournalError
 from falsifier.search.journal import read_journal
 from falsifier.search.run import resume
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 from tests.search.support import run
 
 

@@ -20,8 +20,8 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.testing import lag_problem
 from tests.command import ROOT
-from tests.problems import lag_problem
 
 AT_INPUTS = {
     "held": Candidate(

@@ -10,7 +10,7 @@ from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.inputs import input_table, start_values
 from falsifier.counterexamples.export.tables import write_json
 from falsifier.problem.loading import load_problem
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 
 def test_steps_stand_where_the_simulation_set_them() -> None:

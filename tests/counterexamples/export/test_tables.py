@@ -7,7 +7,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.inputs import input_table
 from falsifier.counterexamples.export.tables import matlab_name, write_mat, write_ssv
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 
 def test_the_ssv_is_valid_and_reads_back(tmp_path: Path) -> None:

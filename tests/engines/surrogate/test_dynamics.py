@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics, StartState
-from falsifier.testing import lag_problem
+from falsifier.testing import FREE, START, lag_problem
 from tests.engines.surrogate.support import SETTINGS, history_of
 
 
@@ -10,7 +10,7 @@ from tests.engines.surrogate.support import SETTINGS, history_of
 def test_dynamics_predict_an_unseen_input_from_a_few_trajectories(
     dynamics: type[FourierDynamics] | type[DeviationDynamics],
 ) -> None:
-    history = history_of(lag_problem(free=True, inputs=2), simulations=12)
+    history = history_of(lag_problem(free=FREE, inputs=2, parameters=[START]), simulations=12)
     traces = [s.trace for s in history.samples]
     fitted = dynamics(traces[:-2], [0, 1, 2], SETTINGS, np.random.default_rng(0))
     start = StartState(traces[:-2])

@@ -3,22 +3,15 @@ import pytest
 from falsifier.engines.surrogate import Surrogate
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
-from falsifier.testing import drive, lag_problem
-from tests.engines.test_hybrid import HASTY
-
-# y follows u0 with a lag of 1 s, and the input's range ends at 2: never violated, and easy to predict.
-FORMULA = "G[0,10] (y <= 9)"
-
-
-def problem() -> Problem:
-    return lag_problem(FORMULA, free=True, parameters=0)
+from falsifier.testing import drive
+from tests.engines.support import HASTY, wide_problem
 
 
 class TestForesight:
     """What the surrogate foretells."""
 
-    def trained(self, formula: str = FORMULA) -> tuple[Problem, Surrogate]:
-        made = lag_problem(formula, free=True, parameters=0)
+    def trained(self, formula: str = "G[0,10] (x <= 9)") -> tuple[Problem, Surrogate]:
+        made = wide_problem(formula)
         engine = Surrogate(made, seed=1, settings=HASTY)
         drive(engine, lambda c: evaluate(made, c), rounds=10)
         return made, engine
@@ -26,16 +19,16 @@ class TestForesight:
     @pytest.mark.parametrize(
         "formula",
         [
-            "G[0,10] (y <= 9)",
-            "F[2,8] (y >= 9)",
-            "G[0,10] (y <= 9 and u0 >= -9)",
-            "G[0,5] (F[0,2] (y <= 1.5)) or y > 20",
-            "not F[0,10] (y > 9)",
+            "G[0,10] (x <= 9)",
+            "F[2,8] (x >= 9)",
+            "G[0,10] (x <= 9 and u >= -9)",
+            "G[0,5] (F[0,2] (x <= 1.5)) or x > 20",
+            "not F[0,10] (x > 9)",
         ],
     )
     def test_verdicts_are_those_of_the_simulation(self, formula: str) -> None:
         made, engine = self.trained(formula)
-        found = [made.space.decode(point) for point in ([0.5, 1.5, 1.0, -1.0], [-1.5, 0.2, 1.9, 1.0])]
+        found = [made.space.decode(point) for point in ([2.0, 2.0, -2.0, -2.0], [-1.5, 0.2, 1.9, 1.0])]
         for foretold, candidate in zip(engine.foresee(found), found, strict=True):
             true = evaluate(made, candidate).verdict
             assert true is not None
@@ -50,12 +43,12 @@ class TestForesight:
         assert [c.key for c in one.ask(3)] == [c.key for c in other.ask(3)]
 
     def test_nothing_is_foretold_from_nothing(self) -> None:
-        made = problem()
+        made = wide_problem()
         assert Surrogate(made, seed=0, settings=HASTY).foresee([made.space.decode([0.0] * 4)]) == []
 
 
 def test_predictions_without_simulation_rank_inputs() -> None:
-    problem = lag_problem("G[0,10] (y <= 9)", free=True, parameters=0)
+    problem = wide_problem()
     engine = Surrogate(problem, seed=0)
     assert engine.foresee(engine.ask(2)) == []
     for _ in range(6):

@@ -4,11 +4,11 @@ import pytest
 from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.layout import planning_layout, region_layouts
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
-from falsifier.testing import lag_problem
+from falsifier.testing import FREE, START, lag_problem
 
 
 def test_layouts_keep_to_the_allowed_parameterization() -> None:
-    free, fixed = lag_problem(free=True, inputs=2), lag_problem(inputs=2)
+    free, fixed = (lag_problem(free=free, inputs=2, parameters=[START]) for free in (FREE, None))
     grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
     rng = np.random.default_rng(0)
     for problem in (free, fixed):

@@ -5,11 +5,11 @@ from falsifier.engines.surrogate import Settings
 from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.layout import planning_layout
 from falsifier.engines.surrogate.planning import plan
-from falsifier.testing import lag_problem
+from falsifier.testing import FREE, lag_problem
 
 
 def test_a_plan_finds_the_best_point_and_prefers_simple_ones_that_are_nearly_as_good() -> None:
-    problem = lag_problem(free=True, parameters=0)
+    problem = lag_problem(free=FREE)
     grid = Grid.over(10.0, 10.0, cells=20, shortest=0.05)
     layout = planning_layout(problem.space, grid)
     target = (np.arange(20) < 7).astype(float)

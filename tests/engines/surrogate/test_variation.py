@@ -3,11 +3,11 @@ import numpy as np
 from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.layout import planning_layout
 from falsifier.engines.surrogate.variation import mutations
-from falsifier.testing import lag_problem
+from falsifier.testing import FREE, lag_problem
 
 
 def test_changes_near_the_critical_time_leave_what_comes_later_alone() -> None:
-    problem = lag_problem(free=True, parameters=0)
+    problem = lag_problem(free=FREE)
     grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
     layout = planning_layout(problem.space, grid)
     parents = np.full((1, 100), 0.5)

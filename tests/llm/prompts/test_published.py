@@ -4,8 +4,8 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.testing import lag_problem
 from tests.llm.prompts.support import told
-from tests.problems import lag_problem
 
 
 def test_published_variants_tell_the_ten_most_recent_in_order() -> None:

@@ -16,8 +16,8 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
+from falsifier.testing import lag_problem
 from tests.llm.prompts.support import told, transmission
-from tests.problems import lag_problem
 
 
 def test_variants_only_add_parts_up_to_mp4() -> None:

@@ -5,8 +5,8 @@ import pytest
 from falsifier.core.space import ParameterRange
 from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.testing import lag_problem
 from falsifier.views.plotting import plot_robustness_map, save_figure
-from tests.problems import lag_problem
 
 # x(10) of x' = u - x, x(0) = x0, by Euler with 0.1 s: u + (x0 - u) 0.9**100. The range of u is 2 wide.
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
