@@ -8,7 +8,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
 from falsifier.counterexamples.simplicity import digits, simplicity
-from falsifier.errors import SpecError
+from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import half_step
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
@@ -43,7 +43,7 @@ def assert_local_minimum(problem: Problem, shrunk: Shrunk) -> None:
         for proposal in propose(problem, shrunk.evaluation.candidate):
             try:
                 candidate = problem.space.admit(proposal)
-            except Exception:
+            except CandidateError:
                 continue
             if simplicity(problem, candidate) < limit:
                 violated = evaluate(problem, candidate).violated
