@@ -2,17 +2,30 @@
 
 import os
 from collections.abc import Mapping
-from time import sleep
+from pathlib import Path
 
 import numpy as np
 
 from falsifier.problem.problem import Problem
 from falsifier.testing import Array, lag, lag_problem
+from tests.patience import wait_until
+
+# Names an environment variable, "COUNT FOLDER": what is held there after so many simulations have begun.
+HOLD = "FALSIFIER_TESTS_HOLD"
+BEGUN, RELEASE = "begun", "release"
 
 
-def slow(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Take long enough that a campaign can be killed in the middle."""
-    sleep(0.01)
+def held(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Wait for the folder's file ``release`` once enough simulations have begun in all processes together.
+
+    So a campaign can be killed in the middle, however slow the process is that kills it.
+    """
+    if HOLD in os.environ:
+        count, _, folder = os.environ[HOLD].partition(" ")
+        with (Path(folder) / BEGUN).open("ab") as file:
+            file.write(b".")
+        if (Path(folder) / BEGUN).stat().st_size > int(count):
+            wait_until((Path(folder) / RELEASE).exists)
     return lag(times, inputs, parameters)
 
 
@@ -59,14 +72,14 @@ def unusable() -> Problem:
     return lag_problem(response=never, name="UNUSABLE")
 
 
-def slow_hard() -> Problem:
-    """Falsified by random inputs now and then, and slow."""
-    return lag_problem("G[0,10] (x <= 0.85)", response=slow, name="SLOW")
+def held_hard() -> Problem:
+    """Falsified by random inputs now and then; can be held."""
+    return lag_problem("G[0,10] (x <= 0.85)", response=held, name="HELD-HARD")
 
 
-def slow_impossible() -> Problem:
-    """Never falsified, and slow."""
-    return lag_problem("G[0,10] (x <= 2)", response=slow, name="SLOWER")
+def held_impossible() -> Problem:
+    """Never falsified; can be held."""
+    return lag_problem("G[0,10] (x <= 2)", response=held, name="HELD-NEVER")
 
 
 def worker_killer() -> Problem:

@@ -11,6 +11,8 @@ from jupyter_client.kernelspec import KernelSpec
 from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
 
+from tests.patience import HANG
+
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 # Bytes of all notebooks together, outputs included.
@@ -39,7 +41,9 @@ def test_a_notebook_runs_from_start_to_end(
         monkeypatch.setenv(name, str(tmp_path / name.lower()))
     notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     resources = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(notebook, kernel_manager_class=ThisPython, timeout=120, resources=resources).execute()
+    NotebookClient(
+        notebook, kernel_manager_class=ThisPython, timeout=int(HANG), resources=resources
+    ).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
 
 

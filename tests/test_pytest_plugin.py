@@ -12,6 +12,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from tests.command import ROOT
+from tests.patience import HANG
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
 SPEC = """
@@ -41,7 +42,7 @@ def run_pytest(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANG,
         check=False,
     )
 
@@ -132,10 +133,10 @@ def test_typo(falsifier_check):
     assert "pytest_falsifier.py" not in done.stdout
 
 
-def test_importing_the_plugin_costs_little_and_loads_nothing_of_the_package() -> None:
+def test_importing_the_plugin_loads_nothing_else() -> None:
     code = (
-        "import pytest, sys, time; start = time.process_time(); import pytest_falsifier; "
-        "print(time.process_time() - start, {'falsifier', 'numpy'} & {m.split('.')[0] for m in sys.modules})"
+        "import pytest, sys; before = set(sys.modules); import pytest_falsifier; "
+        "print(*(set(sys.modules) - before))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -144,6 +145,4 @@ def test_importing_the_plugin_costs_little_and_loads_nothing_of_the_package() ->
         text=True,
         check=True,
     )
-    seconds, modules = done.stdout.split(maxsplit=1)
-    assert float(seconds) < 0.05
-    assert modules.strip() == "set()"
+    assert done.stdout.split() == ["pytest_falsifier"]

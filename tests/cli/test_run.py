@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.search.journal import read_journal
 from tests.command import ROOT, falsifier, listen_to_interrupts
+from tests.patience import HANG, wait_until
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
 
@@ -90,7 +90,7 @@ def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:
 
 def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from falsifier.cli import main; main()", "run", "AT1"]
-    options = ["--engine", "uniform", "--budget", "5000", "--out", "run"]
+    options = ["--engine", "uniform", "--budget", "1000000", "--out", "run"]
     process = subprocess.Popen(
         [*command, *options],
         cwd=tmp_path,
@@ -101,13 +101,9 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
         preexec_fn=listen_to_interrupts,
     )
     journal = tmp_path / "run" / "journal.jsonl"
-    until = time.monotonic() + 60
-    while time.monotonic() < until and not (
-        journal.exists() and journal.read_text().count('"evaluated"') > 5
-    ):
-        time.sleep(0.05)
+    wait_until(lambda: journal.exists() and journal.read_text().count('"evaluated"') > 5)
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=60)
+    out, _ = process.communicate(timeout=HANG)
     assert process.returncode == 130
     assert "interrupted" in out
     kept = sum(r.kind == "evaluated" for r in read_journal(tmp_path / "run"))

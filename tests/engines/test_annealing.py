@@ -6,6 +6,7 @@ import numpy as np
 from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation
 from tests.engines.support import NamedEngine, assert_batch_differs, best_of, bowl, box_problem
+from tests.patience import HANG
 
 
 class TestContract(NamedEngine):
@@ -42,5 +43,5 @@ def test_an_engine_that_nobody_holds_any_more_ends_its_thread() -> None:
     assert thread.name == "annealing"
     del engine
     gc.collect()
-    thread.join()
+    thread.join(HANG)
     assert not thread.is_alive()

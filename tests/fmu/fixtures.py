@@ -7,6 +7,7 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
+from tests.patience import HANG
 
 FOLDER = Path(__file__).parents[1] / "fixtures" / "fmus"
 
@@ -36,7 +37,7 @@ def run(
     parameters: Mapping[str, float] | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
-    time_limit: float = 60.0,
+    time_limit: float = HANG,
 ) -> Trajectory:
     """Simulate once."""
     experiment = Experiment(stop, interval, tuple(outputs), step_size, tolerance, time_limit)

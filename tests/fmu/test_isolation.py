@@ -4,9 +4,9 @@ import os
 import pickle
 import re
 import signal
+import socket
 import subprocess
 import sys
-import time
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +17,7 @@ from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel, worker
 from falsifier.fmu.isolation import REGISTRY
 from falsifier.fmu.library import Library
+from tests import patience
 from tests.command import listen_to_interrupts
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated, local, run
@@ -31,7 +32,7 @@ def misdeeds() -> Iterator[FmuModel]:
     model.close()
 
 
-def commit(model: FmuModel, misdeed: int, *, time_limit: float = 60.0) -> SimulationError:
+def commit(model: FmuModel, misdeed: int, *, time_limit: float = patience.HANG) -> SimulationError:
     with pytest.raises(SimulationError) as caught:
         run(model, ("y",), parameters={"misdeed": misdeed}, time_limit=time_limit)
     assert run(model, ("y",))["y"].tolist() == list(range(11)), "the next simulation runs"
@@ -75,10 +76,8 @@ def test_ending_with_the_last_step_is_a_full_trajectory() -> None:
 
 def test_an_endless_loop_is_stopped_at_the_time_limit(misdeeds: FmuModel) -> None:
     run(misdeeds, ("y",))
-    started = time.perf_counter()
     error = commit(misdeeds, HANG, time_limit=0.3)
     assert error.status == "timeout" and "time limit of 0.3 s" in str(error)
-    assert time.perf_counter() - started < 3.0
 
 
 def test_messages_of_failed_and_of_successful_simulations_are_kept(misdeeds: FmuModel) -> None:
@@ -96,7 +95,7 @@ def test_a_worker_that_dies_between_simulations_is_replaced_without_blame(misdee
     (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == misdeeds.sha256]
     assert fmu._worker is not None
     os.kill(fmu._worker.pid, signal.SIGKILL)
-    time.sleep(0.05)
+    assert fmu._worker.sock.recv(1, socket.MSG_PEEK) == b"", "it is gone"
     assert run(misdeeds, ("y",))["y"][-1] == 10
 
 
@@ -226,11 +225,9 @@ def script(body: str, **environment: str) -> subprocess.Popen[str]:
     )
 
 
-def leftovers(folder: Path) -> list[str]:
-    deadline = time.monotonic() + 10
-    while time.monotonic() < deadline and list(folder.glob("falsifier-fmu-*")):
-        time.sleep(0.05)
-    return [p.name for p in folder.glob("falsifier-fmu-*")]
+def assert_nothing_is_left(folder: Path) -> None:
+    """Wait until the folders of the processes are gone, which happens after the last of them has ended."""
+    patience.wait_until(lambda: not list(folder.glob("falsifier-fmu-*")))
 
 
 @pytest.mark.parametrize("ending", ["", "go(1)", "os.kill(os.getpid(), 9)", "os._exit(3)"])
@@ -238,7 +235,7 @@ def test_folders_and_processes_are_gone_however_the_process_ends(tmp_path: Path,
     with script("print('ran', flush=True)\n" + ending, TMPDIR=str(tmp_path)) as process:
         assert process.stdout is not None
         assert process.stdout.read() == "ran\n"
-    assert leftovers(tmp_path) == []
+    assert_nothing_is_left(tmp_path)
 
 
 def test_a_forked_copy_starts_workers_of_its_own(tmp_path: Path) -> None:
@@ -253,7 +250,7 @@ print(go(), flush=True)
     with script(body, TMPDIR=str(tmp_path)) as process:
         assert process.stdout is not None
         assert process.stdout.read() == "10.0\n10.0\n"
-    assert leftovers(tmp_path) == []
+    assert_nothing_is_left(tmp_path)
 
 
 def test_fmu_processes_see_no_secrets(tmp_path: Path) -> None:
@@ -275,8 +272,8 @@ for pid in (fmu._worker.pid, REGISTRY._nursery._process.pid):
 def test_interrupting_a_simulation_leaves_no_stale_answer() -> None:
     body = """
 import signal, threading
-threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     go(2)
 except KeyboardInterrupt:
     print("interrupted", go())
