@@ -5,7 +5,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test lint types pytest fmus clean
+.PHONY: demo test lint types pytest notebooks fmus clean
 
 demo: .venv/installed
 	@$(BIN)/falsifier run AT1 --out runs/demo-$$(date +%Y%m%d-%H%M%S); test $$? -eq 1
@@ -21,6 +21,10 @@ types: .venv/test
 
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest
+
+# Executes the notebooks and stores their outputs; the tests only execute them.
+notebooks: .venv/test
+	$(BIN)/python -m tests.notebooks
 
 # Rebuilds every FMU in fmus/ from modelica/; the exporter has an environment of its own, because its parser and
 # the monitor's want different versions of one library.
