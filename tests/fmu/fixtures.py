@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
@@ -9,6 +10,8 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
 from tests.patience import HANG
 
+# How a model-exchange FMU is simulated, for type checkers.
+ME: Final = "model-exchange"
 FOLDER = Path(__file__).parents[1] / "fixtures" / "fmus"
 
 

@@ -1,4 +1,4 @@
-"""Co-simulation of the test FMUs, compiled and plain, against what the models are by their equations."""
+"""Co-simulation of the test FMUs against what the models are by their equations."""
 
 import numpy as np
 import pytest
@@ -11,15 +11,6 @@ from tests.fmu import plain
 from tests.fmu.fixtures import local, ramp, run
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
-OUTPUTS = {
-    **{name: ("x", "y") for name in LAGS},
-    **{name: ("h", "v", "bounces") for name in ("Ball_2", "Ball_3")},
-    **{name: ("sampled", "count", "x") for name in ("Ticker_2", "Ticker_3")},
-    "Arrays_3": ("x[2]", "y[1]", "A[1,2]"),
-    "VanDerPol_3": ("x", "v"),
-}
-
-
 Floats = NDArray[np.float64]
 
 
@@ -53,21 +44,6 @@ def test_a_smaller_communication_step_keeps_the_output_grid(name: str) -> None:
 def test_start_values_and_parameters_are_set_before_the_start(name: str) -> None:
     got = run(local(name), ("x",), parameters={"x": 4.0, "T": 0.5})
     np.testing.assert_allclose(got["x"], 4.0 * np.exp(-got.times / 0.5), atol=1e-5)
-
-
-@pytest.mark.parametrize("name", sorted(OUTPUTS))
-def test_plain_loops_do_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = local(name)
-    inputs = {v.name: Signal.evenly((0.0, 2.0, -1.0, 1.0), stop_time=2.0) for v in model.info.inputs}
-
-    def outcome() -> Floats:
-        model.close()
-        got = run(model, OUTPUTS[name], stop=2.0, interval=0.05, signals=inputs, step_size=0.01)
-        return np.stack([got[n] for n in got.names])
-
-    compiled = outcome()
-    monkeypatch.setattr(stepper, "loops", lambda: plain)
-    np.testing.assert_array_equal(outcome(), compiled)
 
 
 @pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
