@@ -2,7 +2,10 @@ import shutil
 from pathlib import Path
 
 from falsifier.core.files import bundled
+from falsifier.fmu import read_info
+from falsifier.fmu.archive import this_platform
 from tests.command import ROOT, falsifier
+from tests.fmu.fixtures import path as fixture
 
 
 def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
@@ -64,3 +67,23 @@ def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) 
     assert done.code == 3
     assert "scheduled execution is not supported" in done.err
     assert not (tmp_path / "Scheduled_3.toml").exists()
+
+
+def test_info_says_how_far_half_the_step_moves_the_outputs(tmp_path: Path) -> None:
+    done = falsifier("info", str(fixture("Lag_2")), "--check", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "y moves by at most" in done.out
+
+
+def test_build_writes_an_fmu_for_this_platform(tmp_path: Path) -> None:
+    shutil.copy(fixture("Lag_2sources"), tmp_path / "lag.fmu")
+    done = falsifier("build", "lag.fmu", "-o", "built.fmu", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert this_platform() in read_info(tmp_path / "built.fmu").platforms
+    missing = falsifier("build", "no.fmu", "-o", "x.fmu", cwd=tmp_path)
+    assert missing.code == 2 and not (tmp_path / "x.fmu").exists()
+
+
+def test_schemas_of_records_are_printed_too(tmp_path: Path) -> None:
+    for what in ("manifest", "journal", "campaign"):
+        assert falsifier("schema", "--of", what, cwd=tmp_path).json

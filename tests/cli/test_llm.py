@@ -3,7 +3,7 @@ from pathlib import Path
 
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
-from tests.llm.server import serving
+from tests.llm.server import Step, serving
 
 
 def test_the_printed_prompt_is_what_is_sent(tmp_path: Path) -> None:
@@ -39,3 +39,17 @@ def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path
     item = tool["parameters"]["properties"]["candidates"]["items"]
     assert item["properties"]["signals"]["items"]["properties"]["name"]["enum"] == ["u1", "u2"]
     assert "throttle" not in text
+
+
+def test_a_prompt_of_fewer_samples_needs_a_run(tmp_path: Path) -> None:
+    done = falsifier("prompt", "AT1", "--samples", "1", cwd=tmp_path)
+    assert (done.code, "--run" in done.err) == (2, True)
+
+
+def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:
+    with serving(Step("ready")) as server:
+        done = falsifier("llm", "check", "openai/mine", "--api-base", server.url, cwd=tmp_path, env=ENV)
+    assert done.code == 0, done.err
+    for part in ("openai/mine", "'ready'", "120 tokens", "OPENAI_API_KEY"):
+        assert part in done.out
+    assert ENV["OPENAI_API_KEY"] not in done.out + done.err

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.engines.gaussian_process import GaussianProcess, distances, fit_lengths, matern, standardised
 
 
 def test_process_interpolates_and_is_unsure_far_away() -> None:
@@ -28,3 +28,22 @@ def test_evidence_prefers_the_right_length_scale() -> None:
 def test_one_huge_cost_does_not_hide_small_differences() -> None:
     targets = standardised(np.array([1.0, 1.1, 1.2, 1e9]))
     assert np.diff(targets).min() > 0.1
+
+
+def test_correlation_falls_from_one_with_the_distance() -> None:
+    found = matern(np.array([0.0, 0.5, 1.0, 2.0, 50.0]))
+    assert found[0] == 1.0
+    assert (np.diff(found) < 0).all()
+    assert found[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_distances_are_euclidean() -> None:
+    x, z = np.random.default_rng(0).random((2, 4, 3))
+    expected = np.linalg.norm(x[:, None] - z[None], axis=2)
+    np.testing.assert_allclose(distances(x, z), expected, atol=1e-12)
+    assert distances(x, x).diagonal() == pytest.approx(np.zeros(4), abs=1e-7)
+
+
+def test_equal_costs_are_no_trouble() -> None:
+    assert np.isfinite(standardised(np.full(5, 3.0))).all()
+    assert np.isfinite(standardised(np.array([2.0]))).all()

@@ -1,5 +1,10 @@
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
+from falsifier.errors import SpecError
 from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem
 from falsifier.problem.starter import starter_spec
@@ -25,3 +30,25 @@ def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) 
     assert "# 1 = first, 2 = second, 3 = third\n[inputs.in_Enumeration]\nrange = [1, 3]\n" in text
     assert "[inputs.in_Boolean]\nrange = [0, 1]\n" in text
     assert "[inputs.in_Int8]\nrange = [0, 1]  # the FMU gives no min and max: put" in text
+
+
+def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> None:
+    info = read_info(fmu_path("Ball_2"))
+    bare = replace(info, stop_time=None, step_size=None, description="")
+    text = starter_spec(fmu_path("Ball_2"), bare)
+    assert "# the FMU gives none" in text
+    (tmp_path / "ball.toml").write_text(text)
+    problem = load_problem(str(tmp_path / "ball.toml"))
+    assert problem.space.inputs == ()
+    assert len(problem.space.parameters) == 1, "without inputs a parameter is searched"
+
+
+def test_an_fmu_without_outputs_has_nothing_to_require() -> None:
+    info = read_info(fmu_path("Lag_2"))
+    with pytest.raises(SpecError, match="no output"):
+        starter_spec(fmu_path("Lag_2"), replace(info, variables=info.inputs))
+
+
+def test_names_that_toml_cannot_have_bare_are_quoted() -> None:
+    text = starter_spec(fmu_path("Arrays_3"), read_info(fmu_path("Arrays_3")))
+    assert set(tomllib.loads(text)["inputs"]) == {"u[1]", "u[2]"}

@@ -21,3 +21,22 @@ def test_traces_beyond_the_horizon_teach_too() -> None:
     history = history_of(lag_problem("G[0,2] (x <= 3)", free=FREE), simulations=1)
     trace: Trace = history.samples[0].trace
     assert trace.inputs.shape[0] > history.grid.cells
+
+
+@pytest.mark.parametrize(
+    ("horizon", "stop", "cells", "shortest", "expected"),
+    [
+        (10.0, 10.0, 50, 0.05, (0.2, 50, 50)),
+        (2.0, 10.0, 50, 0.05, (0.05, 40, 200)),  # cells would be shorter than the shortest
+        (2.0, 100.0, 10, 0.1, (0.2, 10, 200)),  # twenty horizons are enough
+        (0.0, 10.0, 50, 0.1, (0.2, 50, 50)),  # a formula of one moment
+        (30.0, 10.0, 50, 0.1, (0.2, 50, 50)),  # no longer than the simulation
+        (0.1, 10.0, 50, 1.0, (0.1, 1, 20)),
+    ],
+)
+def test_a_grid_divides_the_horizon_evenly(
+    horizon: float, stop: float, cells: int, shortest: float, expected: tuple[float, int, int]
+) -> None:
+    grid = Grid.over(horizon, stop, cells=cells, shortest=shortest)
+    assert (grid.step, grid.cells, grid.all_cells) == (pytest.approx(expected[0]), *expected[1:])
+    assert grid.middles == pytest.approx((np.arange(grid.cells) + 0.5) * grid.step)
