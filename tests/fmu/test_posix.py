@@ -3,15 +3,14 @@ import select
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from falsifier.fmu import posix
+from tests.patience import HANG, wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="these are services of Linux")
-PATIENCE = 60.0
 
 
 def in_child(code: str, **environment: str) -> str:
@@ -22,23 +21,17 @@ def in_child(code: str, **environment: str) -> str:
         stdout=subprocess.PIPE,
         text=True,
         check=False,
-        timeout=PATIENCE,
+        timeout=HANG,
     )
     return done.stdout
 
 
 def is_gone(pid: int) -> bool:
-    """Whether a process has ended; waits for it."""
-    until = time.monotonic() + PATIENCE
-    while time.monotonic() < until:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-        except OSError:
-            return True
-        if state in "ZX":
-            return True
-        time.sleep(0.01)
-    return False
+    """Whether a process has ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
 
 
 @LINUX
@@ -127,13 +120,13 @@ print(posix.children())
     *ended, kept, lived = first.split()
     assert lived == "True"
     assert second == "[]"
-    assert all(is_gone(int(pid)) for pid in (*ended, kept))
+    wait_until(lambda: all(is_gone(int(pid)) for pid in (*ended, kept)))
 
 
 def test_a_group_is_ended() -> None:
     process = subprocess.Popen(["sh", "-c", "sleep 1000 & sleep 1000"], start_new_session=True)
     posix.end_group(process.pid)
-    assert process.wait(PATIENCE) == -signal.SIGKILL
+    assert process.wait(HANG) == -signal.SIGKILL
     posix.end_group(process.pid)
 
 
@@ -151,7 +144,8 @@ os.read(reading, 1)
 print(pid, flush=True)
 os.kill(me, signal.SIGKILL)
 """
-    assert is_gone(int(in_child(code)))
+    pid = int(in_child(code))
+    wait_until(lambda: is_gone(pid))
 
 
 @LINUX
@@ -161,7 +155,7 @@ def test_a_life_becomes_readable_when_the_process_ends() -> None:
     assert life is not None
     assert select.select([life], [], [], 0)[0] == []
     process.kill()
-    assert select.select([life], [], [], PATIENCE)[0] == [life]
+    assert select.select([life], [], [], HANG)[0] == [life]
     process.wait()
     os.close(life)
     assert posix.open_life(process.pid) is None

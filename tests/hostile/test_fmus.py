@@ -4,7 +4,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel, posix
 from falsifier.fmu.isolation import REGISTRY
+from tests import patience
 from tests.fmu.fixtures import isolated, local, path, run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
@@ -39,7 +39,6 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs a
         RESIZE,
     ),
 ) = range(13)
-PATIENCE = 60.0
 NAMES = ["Hostile_1cs", "Hostile_2", "Hostile_3"]
 
 
@@ -62,13 +61,9 @@ def still_simulates(model: FmuModel) -> bool:
 
 
 def have_ended(pids: list[int]) -> bool:
-    """Whether all of these processes have ended; waits for them."""
-    until = time.monotonic() + PATIENCE
-    while time.monotonic() < until:
-        if not any(Path(f"/proc/{pid}").exists() for pid in pids):
-            return True
-        time.sleep(0.01)
-    return False
+    """Wait until all of these processes have ended."""
+    patience.wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))
+    return True
 
 
 def children(log: tuple[str, ...]) -> list[int]:

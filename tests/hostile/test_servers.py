@@ -29,13 +29,12 @@ from tests.hostile.servers import (
     sends,
     trickles,
 )
+from tests.patience import HANG
 from tests.problems import lag_problem
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="a question"),))
 HEAD = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\n"
 CHUNKED = HEAD + b"transfer-encoding: chunked\r\n\r\n"
-# Far more than anything here takes; what does not end by itself has not ended by then either.
-PATIENCE = 60.0
 
 ENDLESS: dict[str, Behaviour] = {
     "silence": hangs(),
@@ -72,7 +71,7 @@ def ended(action: Callable[[], Any]) -> list[Any]:
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
-    thread.join(PATIENCE)
+    thread.join(HANG)
     return outcome
 
 
@@ -82,7 +81,7 @@ def test_a_request_ends_in_time_and_is_cut(behaviour: str) -> None:
         chat = LiteLLMChat("openai/m", api_base=server.url, timeout=0.5)
         (error,) = ended(lambda: chat.complete(REQUEST))
         assert isinstance(error, ChatError)
-        assert server.gone.wait(PATIENCE)
+        assert server.gone.wait(HANG)
 
 
 def run(url: str, **budget: Any) -> Result:
@@ -98,7 +97,7 @@ def test_the_seconds_of_a_run_hold(behaviour: str) -> None:
         assert isinstance(result, Result), result
         assert (result.status, result.reason) == ("not falsified", "the time limit of 1 s is reached")
         assert server.requests
-        assert server.gone.wait(PATIENCE)
+        assert server.gone.wait(HANG)
 
 
 @pytest.mark.parametrize(
@@ -166,10 +165,10 @@ def test_any_response_is_a_reply_or_an_error_that_says_so(data: bytes) -> None:
 
 def test_a_reply_that_never_ends_is_refused_by_its_size() -> None:
     with misbehaving(in_turn(sends(HEAD + b"\r\n"), trickles_of(b" " * 65536))) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url, timeout=10 * PATIENCE)
+        chat = LiteLLMChat("openai/m", api_base=server.url, timeout=HANG)
         (error,) = ended(lambda: chat.complete(REQUEST))
         assert "more than 16 MiB" in str(error)
-        assert server.gone.wait(PATIENCE)
+        assert server.gone.wait(HANG)
 
 
 def trickles_of(block: bytes) -> Behaviour:
