@@ -22,9 +22,9 @@ from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
 from tests.command import falsifier
 from tests.hostile.servers import Behaviour, answers, misbehaving
-from tests.problems import lag_problem
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="a question of some words"),))
 WRONG_PRICES = ["nan:nan", "nan:1", "1:inf", "-1:2", "0.25:-2", "-inf:0"]

@@ -17,6 +17,7 @@ from falsifier.llm.messages import ChatReply, ChatRequest, Message
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
 from tests.hostile.servers import (
     GOOD,
     Behaviour,
@@ -30,7 +31,6 @@ from tests.hostile.servers import (
     trickles,
 )
 from tests.patience import HANG
-from tests.problems import lag_problem
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="a question"),))
 HEAD = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\n"
