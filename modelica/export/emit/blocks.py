@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from ..flat.ir import Assert, Branch, Condition, Outputs, Reinit, Section, Set, Statement
 from ..order.contents import Solved
-from ..order.layout import C_TYPES, System
+from ..order.layout import System, c_type
 from ..order.sort import Block
 from ..read.syntax import ExportError
 from .expressions import Mode, Printer, c_name, c_string
@@ -95,7 +95,7 @@ class Emitter:
             c for c in self.system.model.functions[item.function].components if c.causality == "output"
         ]
         for k, (target, component) in enumerate(zip(item.targets, components, strict=True)):
-            ctype = C_TYPES[component.type_name]  # type: ignore[index]
+            ctype = c_type(component.type_name)
             if target is None:
                 if component.dimensions:
                     raise ExportError(item.place, "an array output cannot be left out")

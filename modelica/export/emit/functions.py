@@ -7,7 +7,7 @@ from ..flat.evaluate import Evaluator
 from ..flat.instance import Scope
 from ..flat.ir import FlatModel, Type
 from ..flat.tensors import type_of
-from ..order.layout import C_TYPES, Layout
+from ..order.layout import Layout, c_type
 from ..read.syntax import (
     Assign,
     Body,
@@ -70,7 +70,7 @@ class FunctionWriter(Expressions):
         parameters = ["Model *m"]
         lines: list[str] = []
         for item in self.cls.components:
-            ctype = C_TYPES[type_of(item)]
+            ctype = c_type(type_of(item))
             if item.variability == "constant":
                 continue
             if item.causality == "input":
@@ -87,7 +87,7 @@ class FunctionWriter(Expressions):
         if "goto" in "\n".join(lines):
             lines.append("finish:;")
         lines += self.results()
-        result = C_TYPES[type_of(self.single)] if self.single else "void"
+        result = c_type(type_of(self.single)) if self.single else "void"
         text = "    (void)m;\n" + "".join(f"    {line}\n" for line in lines)
         return f"static {result} {c_name(self.cls.full_name)}({', '.join(parameters)})", text
 
@@ -195,7 +195,7 @@ class FunctionWriter(Expressions):
             raise ExportError(place, "the two sides of ':=' have different numbers of dimensions")
         size = " * ".join(value.dims)
         check = f"same_size(m, {count}, {size});"
-        source, goal = C_TYPES[value.type], C_TYPES[target.type]
+        source, goal = c_type(value.type), c_type(target.type)
         return [
             check,
             f"{{ const {source} *from = {value.text}; {goal} *to = {target.text}; int n = {count};",
@@ -217,7 +217,7 @@ class FunctionWriter(Expressions):
             if ref is None:
                 if output.dimensions:
                     raise ExportError(place, "an array output cannot be left out here")
-                lines.append(f"{C_TYPES[type_of(output)]} unused_{k};")
+                lines.append(f"{c_type(type_of(output))} unused_{k};")
                 pointers.append(f"&unused_{k}")
                 continue
             target = self.target(ref)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..read.syntax import Call, ExportError, Place
 from . import fold
-from .ir import Der, Floor, Initial, Lit, Op, Pre, Scalar, Tensor, Var
+from .ir import NUMBERS, Der, Floor, Initial, Lit, Op, Pre, Scalar, Tensor, Var
 from .tensors import scalar_tensor, tensor
 
 if TYPE_CHECKING:
@@ -100,6 +100,8 @@ def recompute(name: str, known: tuple[Lit, ...], place: Place) -> Scalar:
         return fold.real(known[0].value)
     if name == "integer":
         return Lit(int(known[0].value // 1), "Integer")
+    if name == "ordinal":
+        return Lit(known[0].value, "Integer")
     return fold.arithmetic(name, known, place)
 
 
@@ -150,6 +152,8 @@ def _rounding(evaluator: Evaluator, node: Call) -> Tensor:
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
         arg, place = args[0], node.place
+        if arg.type not in NUMBERS:
+            raise ExportError(place, f"'{node.name}' needs a number, not {arg.type}")
         if arg.type == "Integer":
             return arg
         if node.name == "ceil":
@@ -216,12 +220,24 @@ def _pre(evaluator: Evaluator, node: Call) -> Tensor:
 def _change(evaluator: Evaluator, node: Call) -> Tensor:
     item = _variable(evaluator, node).items[0]
     assert isinstance(item, Var)
-    if item.type == "Real":
-        raise ExportError(node.place, f"'{node.name}' of a Real is not supported")
+    if item.type == "Real" or (node.name == "edge" and item.type != "Boolean"):
+        raise ExportError(node.place, f"'{node.name}' of {item.type} is not supported")
     before = Pre(item.name, item.type)
     if node.name == "edge":
         return scalar_tensor(Op("and", (item, Op("not", (before,), "Boolean")), "Boolean"))
     return scalar_tensor(Op("<>", (item, before), "Boolean"))
+
+
+def _ordinal(evaluator: Evaluator, node: Call) -> Tensor:
+    """The place of an item in its enumeration, from 1."""
+
+    def make(args: tuple[Scalar, ...]) -> Scalar:
+        arg = args[0]
+        if arg.type not in evaluator.model.enumerations:
+            raise ExportError(node.place, f"'Integer' needs an enumeration, not {arg.type}")
+        return Lit(arg.value, "Integer") if isinstance(arg, Lit) else Op("ordinal", (arg,), "Integer")
+
+    return _map(evaluator, node, make)
 
 
 def _without_events(evaluator: Evaluator, node: Call) -> Tensor:
@@ -309,6 +325,7 @@ _CALLS: dict[str, Known] = {
     "der": _der,
     "pre": _pre,
     "edge": _change,
+    "Integer": _ordinal,
     "change": _change,
     "noEvent": _without_events,
     "smooth": _without_events,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..read.syntax import Body, Equal, ExportError, For, If, Item, Place, Run, Several, When
 from . import fold
 from .evaluate import Evaluator
-from .ir import Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var
+from .ir import Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var, alike
 from .parts import TRUE, assertion, loop_values, outputs, refuse_when, with_index
 from .whens import when_equation
 
@@ -38,7 +38,7 @@ def _equal(left: Tensor, right: Tensor, place: Place, model: FlatModel) -> None:
     if left.dims != right.dims:
         raise ExportError(place, f"the sides of '=' have sizes {list(left.dims)} and {list(right.dims)}")
     for a, b in zip(left.items, right.items, strict=True):
-        if (a.type == "Boolean") != (b.type == "Boolean"):
+        if not alike(a.type, b.type):
             raise ExportError(place, f"'=' between {a.type} and {b.type}")
         for one, other in ((a, b), (b, a)):
             real = other.type == "Real" and not isinstance(other, (Var, Der))

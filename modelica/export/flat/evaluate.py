@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import prod
 
-from ..read.library import find_class, find_constant
+from ..read.library import enumeration, find_class, find_constant, lookup
 from ..read.syntax import (
     ArrayOf,
     Call,
@@ -179,6 +179,8 @@ class Evaluator:
             return self.member(self.scope.node, ref.parts, ref.place)
         if str(ref) == "time":
             return scalar_tensor(Time())
+        if (item := self.enumeration_item(ref)) is not None:
+            return item
         found = find_constant(str(ref), self.scope.cls)
         if found is None or any(part.subscripts for part in ref.parts[:-1]):
             raise ExportError(ref.place, f"there is no variable '{ref}' in '{self.scope.cls.full_name}'")
@@ -186,6 +188,18 @@ class Evaluator:
         if component.variability != "constant":
             raise ExportError(ref.place, f"'{ref}' is neither a variable of the model nor a constant")
         return self.subscript(self.package_constant(component, owner), ref.parts[-1].subscripts, ref.place)
+
+    def enumeration_item(self, ref: Ref) -> Tensor | None:
+        """`Colour.red`, None where the name before the last dot is no enumeration."""
+        names = [part.name for part in ref.parts]
+        cls = enumeration(lookup(".".join(names[:-1]), self.scope.cls)) if len(names) > 1 else None
+        if cls is None:
+            return None
+        items = [name for name, _ in cls.literals]
+        if names[-1] not in items or any(part.subscripts for part in ref.parts):
+            raise ExportError(ref.place, f"'{cls.name}' has no item '{names[-1]}', only {', '.join(items)}")
+        self.model.enumerations[cls.full_name] = cls
+        return scalar_tensor(Lit(items.index(names[-1]) + 1, cls.full_name))
 
     def package_constant(self, component: Component, owner: Class) -> Tensor:
         """The value of a constant that is declared in a package."""

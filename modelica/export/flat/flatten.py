@@ -65,6 +65,7 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
     parametric = leaf.variability in ("parameter", "constant")
     binding = evaluator.binding(leaf).items if parametric else None
     starts = _attribute(leaf, "start", leaf.type, evaluator)
+    lowest = Lit(1, leaf.type) if leaf.type in model.enumerations else None
     numbers = {key: _attribute(leaf, key, leaf.type, evaluator) for key in ("min", "max", "nominal")}
     texts = {key: _text(leaf, key) for key in ("unit", "displayUnit", "quantity")}
     fixed = _attribute(leaf, "fixed", "Boolean", evaluator)
@@ -90,7 +91,7 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
             maximum=known["max"],
             nominal=known["nominal"],
             fixed=bool(fixed and evaluator.static(fixed.items[k], place).value),
-            start=starts.items[k] if starts else None,
+            start=starts.items[k] if starts else lowest,
             binding=binding[k] if binding else None,
         )
 

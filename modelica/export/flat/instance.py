@@ -119,13 +119,22 @@ class Node:
     """An instance of a model."""
 
     def __init__(
-        self, cls: Class, prefix: str, mods: Mods, evaluator: Evaluator, *, public: bool = True
+        self,
+        cls: Class,
+        prefix: str,
+        mods: Mods,
+        evaluator: Evaluator,
+        *,
+        public: bool = True,
+        place: Place | None = None,
     ) -> None:
         self.cls = cls
         self.prefix = prefix
         self.evaluator = evaluator
         self.public = public
         self.elements: dict[str, tuple[Component, Class, Mods]] = {}
+        if cls.partial:
+            raise ExportError(place or cls.place, f"'{cls.full_name}' is partial and cannot be instantiated")
         self.classes: list[Class] = []
         self._children: dict[str, Leaf | Node | NodeArray] = {}
         self._open: set[str] = set()
@@ -181,8 +190,11 @@ class Node:
                 if type_name in BUILTIN_TYPES:
                     break
                 cls = find_class(type_name, cls.parent or cls, component.place)
+            if cls.literals:
+                type_name = cls.full_name
+                self.evaluator.model.enumerations[type_name] = cls
         public = self.public and component.public
-        if type_name in BUILTIN_TYPES:
+        if type_name in BUILTIN_TYPES or type_name in self.evaluator.model.enumerations:
             return self._leaf(
                 component, type_name, self._dims(dims_text, mods, scope, component), mods, public=public
             )
@@ -193,11 +205,13 @@ class Node:
         dims = self._dims(dims_text, mods, scope, component)
         flat = self.prefix + name
         if not dims:
-            return Node(cls, flat + ".", mods, self.evaluator, public=public)
+            return Node(cls, flat + ".", mods, self.evaluator, public=public, place=component.place)
         nodes = []
         for index in product(*(range(1, n + 1) for n in dims)):
             label = f"{flat}[{','.join(map(str, index))}]."
-            nodes.append(Node(cls, label, mods.element(index), self.evaluator, public=public))
+            nodes.append(
+                Node(cls, label, mods.element(index), self.evaluator, public=public, place=component.place)
+            )
         return NodeArray(dims, nodes)
 
     def _leaf(
@@ -209,10 +223,9 @@ class Node:
             if name not in ATTRIBUTES:
                 raise ExportError(mod.place or component.place, f"'{type_name}' has no attribute '{name}'")
         top = self.prefix == ""
-        kind: Type = type_name  # type: ignore[assignment]
         leaf = Leaf(
             name=self.prefix + component.name,
-            type=kind,
+            type=type_name,
             dims=dims,
             component=component,
             variability=component.variability,

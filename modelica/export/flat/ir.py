@@ -8,7 +8,15 @@ from typing import Literal
 
 from ..read.syntax import Class, Place
 
-Type = Literal["Real", "Integer", "Boolean"]
+Type = str
+"""`Real`, `Integer`, `Boolean`, or the full name of an enumeration."""
+
+NUMBERS = frozenset(["Real", "Integer"])
+
+
+def alike(one: Type, other: Type) -> bool:
+    """Whether two values can be compared, chosen between or be equal: both numbers, or of one type."""
+    return one == other or {one, other} == NUMBERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,6 +298,7 @@ class FlatModel:
     equations: list[Flat] = field(default_factory=list)
     initial_equations: list[Equation] = field(default_factory=list)
     functions: dict[str, Class] = field(default_factory=dict)
+    enumerations: dict[str, Class] = field(default_factory=dict)
     structural: set[str] = field(default_factory=set)
     conditions: int = 0
     stop_time: float | None = None

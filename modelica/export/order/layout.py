@@ -26,7 +26,10 @@ from .contents import Solved, values, when_targets
 from .parameters import fixed_names
 from .sort import Block
 
-C_TYPES: dict[Type, str] = {"Real": "double", "Integer": "int", "Boolean": "int"}
+
+def c_type(kind: Type) -> str:
+    """The C type of a value."""
+    return "double" if kind == "Real" else "int"
 
 
 def literal(value: float, kind: Type) -> str:
@@ -52,7 +55,7 @@ class Layout:
 
     def table(self, texts: tuple[str, ...], kind: Type) -> str:
         """The name of a constant array with these elements."""
-        key = (C_TYPES[kind], *texts)
+        key = (c_type(kind), *texts)
         return self.tables.setdefault(key, f"table_{len(self.tables) + 1}")
 
     def table_text(self) -> str:

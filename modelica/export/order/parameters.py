@@ -38,6 +38,10 @@ def calculated_starts(model: FlatModel) -> list[Variable]:
             and variable.start is not None
             and not isinstance(variable.start, Lit)
         ):
+            if variable.causality == "input":
+                raise ExportError(
+                    variable.place, f"the start value of the input '{variable.name}' needs to be a literal"
+                )
             _known_names(variable.start, variable, model)
             found.append(variable)
     return found

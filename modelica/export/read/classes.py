@@ -51,10 +51,15 @@ class ClassReader(BodyReader):
         """One class with everything in it."""
         place = self.place(ctx)
         kind = ctx.class_prefixes().class_type().getText()
+        partial = bool(ctx.class_prefixes().PARTIAL())
         spec = ctx.class_specifier()
         form = type(spec).__name__
         name = spec.IDENT()[0].getText() if isinstance(spec.IDENT(), list) else spec.IDENT().getText()
+        if form == "Class_spec_enumContext":
+            return Class(name, kind, self.comment(spec.comment()), place, literals=self.literals(spec, name))
         if form == "Class_spec_baseContext":
+            if prefix := spec.base_prefix().getText():
+                raise ExportError(place, f"'{prefix}' in the short definition of '{name}' is not supported")
             target = self.ref(spec.component_reference())
             modifier = self.class_modification(spec.class_modification())
             result = Class(name, kind, self.comment(spec.comment()), place)
@@ -63,9 +68,20 @@ class ClassReader(BodyReader):
             return result
         if form != "Class_spec_compContext":
             raise ExportError(place, f"this form of class definition is not supported ('{name}')")
-        result = Class(name, kind, self.strings(spec.string_comment()), place)
+        result = Class(name, kind, self.strings(spec.string_comment()), place, partial=partial)
         self.composition(spec.composition(), result)
         return result
+
+    def literals(self, ctx: Any, name: str) -> tuple[tuple[str, str], ...]:
+        """Names and descriptions of the items of an enumeration."""
+        items = ctx.enum_list().enumeration_literal() if ctx.enum_list() else ()
+        if not items:
+            raise ExportError(self.place(ctx), f"the enumeration '{name}' needs a list of its items")
+        found = tuple((item.IDENT().getText(), self.comment(item.comment())) for item in items)
+        for k, (item, _) in enumerate(found):
+            if item in (other for other, _ in found[:k]):
+                raise ExportError(self.place(items[k]), f"'{item}' is declared twice in '{name}'")
+        return found
 
     def composition(self, ctx: Any, owner: Class) -> None:
         """The body of a class."""

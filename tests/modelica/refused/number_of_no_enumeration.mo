@@ -1,0 +1,4 @@
+model M
+  Integer n = Integer(2.5);  // error: 'Integer' needs an enumeration
+equation
+end M;
