@@ -58,8 +58,10 @@ def export(source: Path, name: str, target: Path, *, version: int, platforms: tu
         ExportError: with file and line of what is wrong or not supported.
     """
     system, code = translate(source, name)
-    description = fmi2(system, c_files(2)) if version == 2 else fmi3(system)
-    build(Contents(model_identifier(system), version, description, code, sizes_h(system)), target, platforms)
+    implicit = system.implicit
+    description = fmi2(system, c_files(2, implicit=implicit)) if version == 2 else fmi3(system)
+    contents = Contents(model_identifier(system), version, description, code, sizes_h(system), implicit)
+    build(contents, target, platforms)
 
 
 def export_all(folder: Path, names: list[str], platforms: tuple[str, ...]) -> None:

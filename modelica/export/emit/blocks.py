@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..flat.ir import Assert, Branch, Condition, Outputs, Reinit, Section, Set, Statement
+from ..flat.ir import Assert, Branch, Condition, DelayLine, Outputs, Reinit, Section, Set, Statement
 from ..order.contents import Solved
 from ..order.layout import System, c_type
 from ..order.sort import Block
@@ -30,6 +30,10 @@ class Emitter:
                 return [line for name in block.defines for line in self.entry(name)] + self.statements(
                     statements
                 )
+            case DelayLine(position=position, out=out):
+                line = self.system.layout.lines.index(item)
+                slot = self.system.layout.slots[out.name]
+                return [f"{slot} = line_read(m, {line}, {self.printer.text(position)});"]
             case Assert():
                 return self.statement(item) if self.mode != "initial" else []
             case _:

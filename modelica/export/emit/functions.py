@@ -6,6 +6,7 @@ from ..flat import builtin
 from ..flat.evaluate import Evaluator
 from ..flat.instance import Scope
 from ..flat.ir import FlatModel, Type
+from ..flat.parts import assertion_message
 from ..flat.tensors import type_of
 from ..order.layout import Layout, c_type
 from ..read.syntax import (
@@ -26,7 +27,6 @@ from ..read.syntax import (
     Ref,
     Run,
     Several,
-    Text,
     While,
 )
 from .expressions import c_name, c_string
@@ -140,8 +140,8 @@ class FunctionWriter(Expressions):
                 return [f"while ({self.boolean(condition)}) {{", *self.indented(body), "}"]
             case Jump(kind, _):
                 return ["break;"] if kind == "break" else ["goto finish;"]
-            case Run(call, place) if call.name == "assert" and isinstance(call.arguments[1], Text):
-                message = c_string(f"{place}: {call.arguments[1].value}")
+            case Run(call, place) if call.name == "assert":
+                message = c_string(f"{place}: {assertion_message(call)}")
                 return [f"if (!{self.boolean(call.arguments[0])}) model_fail(m, {message});"]
         raise ExportError(item.place, "this statement is not supported in a function")
 

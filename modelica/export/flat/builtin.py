@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..read.syntax import Call, ExportError, Place
 from . import fold
+from .delays import delay
 from .ir import NUMBERS, Der, Floor, Initial, Lit, Op, Pre, Scalar, Tensor, Var
 from .tensors import scalar_tensor, tensor
 
@@ -312,6 +313,7 @@ def _sample(evaluator: Evaluator, node: Call) -> Tensor:
 
 
 _CALLS: dict[str, Known] = {
+    "delay": delay,
     "abs": _plain,
     "sign": _plain,
     "floor": _rounding,
@@ -344,10 +346,9 @@ _CALLS: dict[str, Known] = {
 
 
 _REFUSED = {
-    "delay": "'delay' is not supported; sample the signal and keep a list of its values",
     "terminate": "'terminate' is not supported",
     "terminal": "'terminal' is not supported",
-    "spatialDistribution": "'spatialDistribution' is not supported",
+    "spatialDistribution": "'spatialDistribution' can only stand in '(a, b) = spatialDistribution(...)'",
     "homotopy": "'homotopy' is not supported",
     "semiLinear": "'semiLinear' is not supported",
     "cardinality": "'cardinality' is not supported",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ..read.syntax import Body, Equal, ExportError, For, If, Item, Place, Run, Several, When
+from ..read.syntax import Body, Call, Equal, ExportError, For, If, Item, Place, Run, Several, When
 from . import fold
+from .delays import spatial_distribution
 from .evaluate import Evaluator
-from .ir import Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var, alike
+from .ir import DelayLine, Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var, alike, is_delayed
 from .parts import TRUE, assertion, loop_values, outputs, refuse_when, with_index
 from .whens import when_equation
 
@@ -15,6 +16,8 @@ def equation(item: Item, here: Evaluator, model: FlatModel) -> None:
     match item:
         case Equal(left, right, place):
             _equal(here.value(left), here.value(right), place, model)
+        case Several(right=Call(name="spatialDistribution")):
+            model.equations.extend(spatial_distribution(here, item))
         case Several():
             model.equations.append(outputs(item, here))
         case For(index, over, body, place):
@@ -84,7 +87,9 @@ def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str
     made, found = model.equations[before:], {}
     del model.equations[before:]
     for item in made:
-        if isinstance(item, Equation) and isinstance(item.left, (Var, Der)):
+        if isinstance(item, DelayLine) or (isinstance(item, Equation) and _of_a_delay(item)):
+            model.equations.append(item)
+        elif isinstance(item, Equation) and isinstance(item.left, (Var, Der)):
             key = item.left.name if isinstance(item.left, Var) else f"der({item.left.name})"
             found[key] = item
         elif isinstance(item, Outputs) and all(t and t[0].startswith("$call") for t in item.targets):
@@ -94,3 +99,7 @@ def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str
                 item.place, "an equation inside of 'if' needs the form 'x = ...' or 'der(x) = ...'"
             )
     return found
+
+
+def _of_a_delay(item: Equation) -> bool:
+    return isinstance(item.left, Var) and is_delayed(item.left.name)

@@ -31,6 +31,8 @@ from .calls import arguments, function_outputs, lifted
 from .instance import Bound, Leaf, Node, NodeArray, Scope
 from .ir import (
     Cond,
+    DelayLine,
+    Equation,
     FlatModel,
     FunctionCall,
     Lit,
@@ -46,7 +48,7 @@ from .ir import (
 )
 from .tensors import element, fitted, scalar_tensor, selected, stacked, tensor, type_of
 
-Sink = Callable[[Outputs], None]
+Sink = Callable[[Outputs | Equation | DelayLine], None]
 
 
 class Evaluator:
@@ -54,7 +56,8 @@ class Evaluator:
 
     Attributes:
         events: relations make events (off inside of `noEvent`, of when bodies and of initial values).
-        sink: takes calls of functions with arrays or several outputs, which are pulled out of expressions.
+        sink: takes what is pulled out of expressions: calls of functions with arrays or several outputs, and
+            delay lines with their equations.
     """
 
     def __init__(
@@ -345,6 +348,17 @@ class Evaluator:
             case Cond(condition, then, otherwise, _):
                 return self.static(then if self.static(condition, place).value else otherwise, place)
         raise ExportError(place, "this value needs to be known before simulation")
+
+    def parametric(self, value: Scalar) -> bool:
+        """Whether a value is known when the simulation starts: made of parameters and literals."""
+        match value:
+            case Lit():
+                return True
+            case Var(name, _):
+                return name in self.leaves and self.leaves[name][0].variability in ("parameter", "constant")
+            case Op(_, args, _):
+                return all(self.parametric(arg) for arg in args)
+        return False
 
     def static_integer(self, expr: Expr, place: Place) -> int:
         """A size or another whole number that must be known before simulation."""

@@ -12,10 +12,11 @@ from .ir import Equation, FlatModel, Lit, Pre, Tensor, Type, Var, Variable
 from .tensors import fitted
 
 SOLVER_SETTINGS = {
-    "method": ("fixed", "adaptive"),
+    "method": ("fixed", "adaptive", "implicit"),
     "step": None,
     "maxStep": None,
     "checks": None,
+    "delayPoints": None,
     "repeatTicks": ("never", "unseen", "always"),
 }
 """Names of solver settings with the words that they can be; None stands for a number."""
@@ -70,6 +71,12 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
     texts = {key: _text(leaf, key) for key in ("unit", "displayUnit", "quantity")}
     fixed = _attribute(leaf, "fixed", "Boolean", evaluator)
     discrete = leaf.variability == "discrete" or leaf.type != "Real"
+    if parametric and fixed and not all(evaluator.static(item, place).value for item in fixed.items):
+        raise ExportError(
+            place, f"the parameter '{leaf.name}' needs a value: 'fixed = false' is not supported"
+        )
+    if leaf.causality == "input" and not leaf.public:
+        raise ExportError(place, f"the input '{leaf.name}' is protected: nobody could set it")
     for k, name in enumerate(leaf.scalars()):
         known = {
             key: evaluator.static(value.items[k], place).value if value else None
@@ -81,7 +88,7 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
             variability="parameter" if parametric else "discrete" if discrete else "continuous",
             causality=leaf.causality or "local",  # type: ignore[arg-type]
             public=leaf.public and leaf.variability != "constant",
-            final=leaf.component.final or leaf.variability == "constant",
+            final=leaf.component.final or leaf.mods.final or leaf.variability == "constant",
             place=place,
             description=leaf.description,
             unit=texts["unit"],
@@ -167,6 +174,8 @@ def _initial_equation(made: object, model: FlatModel) -> Equation:
 def _experiment(cls: Class, model: FlatModel) -> None:
     settings = {name: mod for name, mod in cls.annotation.inner}
     experiment = dict(settings.get("experiment", Modifier()).inner)
+    if _number(experiment, "StartTime"):
+        raise ExportError(experiment["StartTime"].place, "'StartTime' needs to be 0")
     model.stop_time = _number(experiment, "StopTime")
     model.interval = _number(experiment, "Interval")
     model.tolerance = _number(experiment, "Tolerance")
@@ -177,10 +186,10 @@ def _experiment(cls: Class, model: FlatModel) -> None:
             )
         value = _literal(mod.value, mod.place)
         words = SOLVER_SETTINGS[name]
-        if (words is None and isinstance(value, (str, bool))) or (words and value not in words):
-            raise ExportError(
-                mod.place, f"'{name}' needs " + (f"one of {', '.join(words)}" if words else "a number")
-            )
+        positive = not isinstance(value, (str, bool)) and value > 0
+        if value not in words if words else not positive:
+            needed = f"one of {', '.join(words)}" if words else "a number above 0"
+            raise ExportError(mod.place, f"'{name}' needs {needed}")
         model.solver[name] = value
 
 

@@ -51,6 +51,7 @@ class Mods:
     value: Bound | None = None
     inner: dict[str, Mods] = field(default_factory=dict)
     each: bool = False
+    final: bool = False
     place: Place | None = None
 
     def element(self, indices: tuple[int, ...]) -> Mods:
@@ -60,18 +61,22 @@ class Mods:
         value = self.value and Bound(
             self.value.expr, self.value.scope, self.value.place, self.value.indices + indices
         )
-        return Mods(value, {k: m.element(indices) for k, m in self.inner.items()}, place=self.place)
+        inner = {k: m.element(indices) for k, m in self.inner.items()}
+        return Mods(value, inner, final=self.final, place=self.place)
 
 
 def scoped(modifier: Modifier, scope: Scope, place: Place) -> Mods:
     """Attach a scope to a modifier."""
     at = modifier.place or place
     value = Bound(modifier.value, scope, at) if modifier.value is not None else None
-    return Mods(value, {n: scoped(m, scope, at) for n, m in modifier.inner}, modifier.each, modifier.place)
+    inner = {n: scoped(m, scope, at) for n, m in modifier.inner}
+    return Mods(value, inner, modifier.each, modifier.final, modifier.place)
 
 
 def merge(outer: Mods, inner: Mods) -> Mods:
-    """The outer modifier wins."""
+    """The outer modifier wins, unless the inner one is final."""
+    if inner.final and (outer.value or outer.inner):
+        raise ExportError(outer.place, "this is final and cannot be modified")
     names = {**inner.inner, **outer.inner}
     merged = {
         name: merge(outer.inner[name], inner.inner[name])
@@ -79,7 +84,8 @@ def merge(outer: Mods, inner: Mods) -> Mods:
         else names[name]
         for name in names
     }
-    return Mods(outer.value or inner.value, merged, outer.each, outer.place or inner.place)
+    final = outer.final or inner.final
+    return Mods(outer.value or inner.value, merged, outer.each, final, outer.place or inner.place)
 
 
 @dataclass(slots=True)
@@ -146,6 +152,10 @@ class Node:
                 )
 
     def _collect(self, cls: Class, mods: Mods) -> None:
+        if cls.alias_of:
+            raise ExportError(
+                cls.place, f"the short definition of '{cls.name}' can only be that of components"
+            )
         if cls.kind not in ("model", "block", "class", "record", "package", "function"):
             raise ExportError(cls.place, f"'{cls.kind} {cls.name}' cannot be instantiated")
         for base, modifier in base_classes(cls):

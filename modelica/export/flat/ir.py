@@ -234,6 +234,35 @@ class Assert:
 
 
 @dataclass(frozen=True, slots=True)
+class DelayLine:
+    """`out` is what `value` was where `key` stood at `position`.
+
+    Attributes:
+        span: how far behind `key` positions reach.
+        seeds: distances behind the first key and values: what is in the line at the start, beginning with
+            what comes out first. Without seeds, that is the first value.
+    """
+
+    key: Var
+    value: Var
+    position: Var
+    out: Var
+    span: Scalar
+    seeds: tuple[tuple[Scalar, Scalar], ...]
+    place: Place
+
+    @property
+    def first(self) -> Scalar:
+        """What comes out at the start."""
+        return self.seeds[0][1] if self.seeds else self.value
+
+
+def is_delayed(name: str) -> bool:
+    """Whether a name is that of a variable of a delay line."""
+    return name.startswith("$delay")
+
+
+@dataclass(frozen=True, slots=True)
 class Set:
     """Statement `name := value`."""
 
@@ -262,7 +291,7 @@ class Section:
     place: Place
 
 
-Flat = Equation | Condition | Outputs | Reinit | Assert | Section
+Flat = Equation | Condition | Outputs | DelayLine | Reinit | Assert | Section
 
 
 @dataclass(slots=True)

@@ -6,6 +6,7 @@ arguments, which would turn errors into wrong FMUs.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -199,8 +200,7 @@ class ClassReader(BodyReader):
             if any(part.subscripts for part in name.parts):
                 raise ExportError(place, f"a subscript in the modifier of '{name}' is not supported")
             inner = self.modification(change.modification(), place)
-            each = bool(node.EACH())
-            inner = Modifier(inner.value, inner.inner, inner.place, each)
+            inner = replace(inner, each=bool(node.EACH()), final=bool(node.FINAL()))
             for part in reversed(name.parts[1:]):
                 inner = Modifier(None, ((part.name, inner),), place)
             entries.append((name.parts[0].name, inner))

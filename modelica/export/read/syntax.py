@@ -223,6 +223,7 @@ class Modifier:
     inner: tuple[tuple[str, Modifier], ...] = ()
     place: Place | None = None
     each: bool = False
+    final: bool = False
 
 
 @dataclass(frozen=True, slots=True)
