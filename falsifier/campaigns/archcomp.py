@@ -52,6 +52,7 @@ _NAMES = {
     "NNx": ("NN", "NNx"),
     "F16": ("F16", "F16a"),
     "SC": ("SC", "SCa"),
+    "AFC27": ("AFC_normal", "(AFC27 0.008)"),
 }
 # By how much a robustness may miss 0 in a re-simulation and the counterexample still counts.
 _TOLERANCES = (
@@ -61,6 +62,8 @@ _TOLERANCES = (
     (r"NN.*", 0.1),
     (r"CC.*", 1.0),
     (r"SC", 0.05),
+    (r"AFC27", 8e-4),
+    (r"AFC29|AFC33", 7e-4),
 )
 # Seconds: from this step on an input is piecewise constant; closer samples are used as they are.
 _COARSE = 1.0
