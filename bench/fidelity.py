@@ -72,6 +72,9 @@ ROWS = {
         Row(("AFC29",), samples=1500),
         Row(("AFC33",), samples=1500),
     ],
+    "PulseMeter": [Row(("PulseMeter",), samples=200000)],
+    "ChargerHandshake": [Row(("ChargerHandshake",), samples=200000)],
+    "HeaterLimpHome": [Row(("HeaterLimpHome",), samples=200000)],
 }
 
 

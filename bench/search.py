@@ -34,6 +34,9 @@ SYSTEMS = {
     "F16": ("F16",),
     "SC": ("SC",),
     "AFC": ("AFC27", "AFC29", "AFC33"),
+    "PulseMeter": ("PulseMeter",),
+    "ChargerHandshake": ("ChargerHandshake",),
+    "HeaterLimpHome": ("HeaterLimpHome",),
 }
 # Requirements for which the published tools need hundreds of simulations.
 LONG = {"CC4": 1500, "CCx": 1500}

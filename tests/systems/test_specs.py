@@ -16,6 +16,9 @@ SYSTEMS = {
     "F16": ("F16", 3, None),
     "SC": ("SC", 18, 20),
     "PM": ("PM", 10, 5),
+    "PulseMeter": ("PulseMeter", 24, None),
+    "ChargerHandshake": ("ChargerHandshake", 16, None),
+    "HeaterLimpHome": ("HeaterLimpHome", 20, None),
 }
 PUBLISHED = ("AT", "CC", "NN", "F16", "SC")
 
@@ -67,6 +70,13 @@ def test_each_piece_of_the_pedal_lasts_five_seconds() -> None:
             space = load_problem(name, profile=profile).space
             assert [d.time for d in space.dimensions if d.name == "pedal"] == list(range(0, last + 5, 5))
     assert load_problem("AFC33").space.bounds[0].tolist() == [61.2, 81.2]
+
+
+def test_commands_are_those_of_the_enumeration() -> None:
+    [command] = load_problem("ChargerHandshake").space.inputs
+    names = ["Wait", "Lock", "Unlock", "Precharge", "Close", "Open", "Reset"]
+    assert [name for name, _ in command.items] == names
+    assert (command.low, command.high) == (1, 7)
 
 
 def test_requirement_named_as_its_system_is_meant_by_that_name() -> None:
