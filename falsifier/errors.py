@@ -1,28 +1,28 @@
-"""The one tree of errors.
+"""All errors that the package raises on purpose.
 
-A message names the thing that is wrong, what was expected and what to do. ``exit_code`` is what the
-command line ends with: 2 for wrong usage or a wrong file, 3 when a simulator, a language model or the
-machine failed.
+A message names the thing that is wrong, what was expected and what to do. ``exit_code`` is the exit code of
+the command line: 2 for wrong usage or a wrong file, 3 if a simulation, a language model or the machine
+failed.
 """
 
 import difflib
 from collections.abc import Iterable
 from typing import Literal
 
-# Characters of a rejected value in a message.
+# Maximum number of characters of a rejected value in a message.
 _SHOWN_INPUT = 60
 
 FailureStatus = Literal["failed", "crashed", "timeout"]
 
 
 class FalsifierError(Exception):
-    """Base of all errors that this package raises on purpose."""
+    """Base of all errors that the package raises on purpose."""
 
     exit_code = 2
 
 
 class SpecError(FalsifierError):
-    """A spec file or an option is wrong; the message starts with ``file: key:`` where there is one."""
+    """A spec file or an option is wrong; the message starts with ``file: key:`` if they are known."""
 
     def __init__(self, message: str, *, file: str | None = None, key: str | None = None) -> None:
         self.file = file
@@ -31,7 +31,7 @@ class SpecError(FalsifierError):
 
 
 class FormulaError(FalsifierError):
-    """A requirement's text is not exactly one STL formula, or cannot be judged on the given signals."""
+    """A requirement's text is not exactly one STL formula, or cannot be evaluated on the given signals."""
 
 
 class CandidateError(FalsifierError):
@@ -45,11 +45,12 @@ class ModelError(FalsifierError):
 
 
 class SimulationError(FalsifierError):
-    """One simulation gave no full trajectory.
+    """A simulation did not produce a complete trajectory.
 
     Attributes:
-        status: ``failed`` (the model said so, or gave NaN or inf), ``crashed``, ``timeout``.
-        time: simulated time in s that was reached, where known.
+        status: ``failed`` (the model reported an error, or an output was NaN or inf), ``crashed`` or
+            ``timeout``.
+        time: simulated time reached, in s, if known.
         log: messages of the model during this simulation.
     """
 
@@ -69,24 +70,24 @@ class SimulationError(FalsifierError):
         super().__init__(message)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Keep the keyword arguments when the error travels between processes."""
+        """Preserve the keyword arguments: exceptions are otherwise unpickled from ``args`` alone."""
         return _simulation_error, (str(self), self.status, self.time, self.log)
 
 
 class MonitorError(FalsifierError):
-    """A trajectory cannot be judged: NaN, unequal lengths, missing signal, too short for the formula."""
+    """A trajectory cannot be evaluated: NaN, unequal lengths, missing signal, too short for the formula."""
 
     exit_code = 3
 
 
 class ChatError(FalsifierError):
-    """The language model could not be reached, or gave no usable reply."""
+    """The language model could not be reached or did not give a usable reply."""
 
     exit_code = 3
 
 
 class ChatSetupError(ChatError):
-    """The language model cannot be asked as it was named: unknown provider, missing key."""
+    """The language model cannot be called with these settings: unknown provider, missing key."""
 
     exit_code = 2
 
@@ -96,7 +97,7 @@ class JournalError(FalsifierError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """End of an error message that lists the known names, the nearest one first.
+    """Return the end of an error message: the most similar known name, if any, and the known names.
 
     >>> did_you_mean("sped", ["rpm", "speed"])
     "did you mean 'speed'? Known: rpm, speed"
@@ -108,7 +109,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def rejected(message: str, given: object) -> str:
-    """Message of a validator, with what was given where it only says what was expected.
+    """Return a validator's message, with the rejected value added if it states only what was expected.
 
     >>> rejected("Input should be 'free' or 'fixed'", "fixd")
     "Input should be 'free' or 'fixed', got 'fixd'"

@@ -1,6 +1,6 @@
-"""Contracts: what every engine must keep, as tests to inherit from, and small systems to test on.
+"""Tests that every engine must pass, ready to inherit, and small problems to test on.
 
-A test module for an engine of your own::
+A test module for your own engine::
 
     class TestMine(EngineContract):
         def make(self, problem, seed):
@@ -31,15 +31,16 @@ INTERVAL = 0.05
 def lag_problem(
     formula: str = "G[0,10] (y <= 3)", *, free: bool = False, inputs: int = 1, parameters: int = 1
 ) -> Problem:
-    """A first-order lag ``y' = sum of inputs - y`` from ``y(0) = sum of parameters``, and its ``mode``.
+    """Problem with a first-order lag ``y' = sum of inputs - y``, ``y(0) = sum of parameters``.
 
-    Inputs ``u0, u1, ...`` and parameters ``p0, ...`` range over [-2, 2]; ``mode`` is 1 where y > 1, else 0.
+    Inputs ``u0, u1, ...`` and parameters ``p0, ...`` range over [-2, 2]. The second output, ``mode``, is 1
+    while y > 1 and 0 otherwise.
 
     Args:
         formula: the requirement over y, mode and the inputs.
         free: whether the parameterization of the inputs is free.
-        inputs: how many inputs.
-        parameters: how many parameters.
+        inputs: number of inputs.
+        parameters: number of parameters.
     """
     names = tuple(f"u{i}" for i in range(inputs))
     freedom = Freedom(max_control_points=100, min_interval=0.05) if free else None
@@ -67,7 +68,12 @@ def lag_problem(
 
 
 def simulated(problem: Problem, margin: Callable[[NDArray[np.float64]], float]) -> Judge:
-    """Judge candidates of a lag problem by simulation; ``margin`` maps y, shape (n,), to the robustness."""
+    """Return a function that evaluates candidates of a lag problem by simulation.
+
+    Args:
+        problem: a lag problem.
+        margin: maps the samples of y, shape (n,), to the robustness.
+    """
 
     def judge(candidate: Candidate) -> Evaluation:
         trajectory = problem.model.simulate(candidate.signals, candidate.parameters, problem.experiment)
@@ -79,7 +85,7 @@ def simulated(problem: Problem, margin: Callable[[NDArray[np.float64]], float]) 
 
 
 def drive(engine: Engine, judge: Judge, *, rounds: int, n: int = 1) -> list[Candidate]:
-    """Ask and tell for some rounds of n candidates; return all candidates in order."""
+    """Ask for n candidates and tell their evaluations, ``rounds`` times; return all candidates in order."""
     asked: list[Candidate] = []
     for _ in range(rounds):
         candidates = engine.ask(n)
@@ -89,7 +95,7 @@ def drive(engine: Engine, judge: Judge, *, rounds: int, n: int = 1) -> list[Cand
 
 
 class EngineContract:
-    """Inherit and define ``make``; pytest then runs every ``test_`` method for your engine."""
+    """Inherit from this class and define ``make``; pytest then runs every ``test_`` method on your engine."""
 
     rounds = 12
 
@@ -98,7 +104,7 @@ class EngineContract:
         raise NotImplementedError
 
     def problems(self) -> Sequence[Problem]:
-        """Fixed, free, parameters only, two inputs."""
+        """Problems to test on: fixed, free, parameters only, two inputs."""
         return (
             lag_problem(),
             lag_problem(free=True),
@@ -107,7 +113,7 @@ class EngineContract:
         )
 
     def test_candidates_are_admitted_by_the_space(self) -> None:
-        """All candidates lie in the box, within the allowed parameterization, and bear origin and reason."""
+        """Candidates are within their ranges and allowed parameterizations, with origin and rationale."""
         for problem in self.problems():
             engine = self.make(problem, seed=1)
             for candidate in drive(engine, simulated(problem, _below_three), rounds=self.rounds):
@@ -125,7 +131,7 @@ class EngineContract:
             assert keys[0] != keys[2]
 
     def test_asks_for_as_many_as_wanted(self) -> None:
-        """``ask(n)`` gives n candidates, also again before anything was told."""
+        """``ask(n)`` returns n candidates, even if nothing has been told since the last call."""
         problem = lag_problem(free=True)
         engine = self.make(problem, seed=5)
         judge = simulated(problem, _below_three)
@@ -137,7 +143,7 @@ class EngineContract:
         assert len(engine.ask(2)) == 2
 
     def test_accepts_foreign_evaluations(self) -> None:
-        """Candidates that it never proposed, with a parameterization of their own, may be told."""
+        """``tell`` accepts candidates that the engine did not propose, with other control points."""
         problem = lag_problem(free=True)
         judge = simulated(problem, _below_three)
         foreign = [
@@ -149,7 +155,7 @@ class EngineContract:
         assert len(drive(engine, judge, rounds=self.rounds)) == self.rounds
 
     def test_survives_failures(self) -> None:
-        """Evaluations without verdict or trajectory are no reason to stop."""
+        """The engine continues after evaluations without verdict or trajectory."""
         problem = lag_problem()
         judge = simulated(problem, _below_three)
         count = 0
@@ -164,14 +170,14 @@ class EngineContract:
             assert len(drive(engine, failing, rounds=self.rounds)) == self.rounds
 
     def test_survives_a_plateau(self) -> None:
-        """A robustness that is the same everywhere does not make it repeat one candidate."""
+        """If every candidate has the same robustness, the engine does not repeat one candidate."""
         problem = lag_problem()
         engine = self.make(problem, seed=8)
         asked = drive(engine, simulated(problem, lambda y: 0.5), rounds=self.rounds)
         assert len({c.key for c in asked}) > self.rounds / 2
 
     def test_resumes_by_replay(self) -> None:
-        """A new instance that replays the calls goes on with the same candidates."""
+        """After the same calls, a new instance continues with the same candidates."""
         problem = lag_problem(free=True)
         judge = simulated(problem, _below_three)
         first, second = self.make(problem, seed=9), self.make(problem, seed=9)

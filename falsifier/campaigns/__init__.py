@@ -1,12 +1,12 @@
-"""Many runs: requirements x methods x seeds, resumable, on this machine or on a cluster.
+"""Campaigns: runs of requirements x methods x seeds, resumable, on this machine or on a cluster.
 
 ::
 
     request = CampaignRequest(runs=cross(problems, methods, seeds=range(10), budget=Budget(1500)))
     run_campaign(request, Path("runs/nightly"), jobs=4)
 
-A campaign is a directory with one run directory for each run. What is finished is read from those
-directories and from nowhere else, so a campaign that was killed goes on where they end.
+A campaign is a directory with one run directory per run. These run directories are the only record of what is
+finished, so a campaign that was killed can be resumed from them.
 """
 
 from falsifier.campaigns.directory import is_worked_on

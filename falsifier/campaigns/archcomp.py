@@ -1,10 +1,10 @@
 """The competition's validation format: counterexamples as rows of a CSV file, and their re-simulation.
 
-Columns and rules are those of the ARCH-COMP falsification category, as its participants' exporters write
-them and FalStar's validator (``Validation.scala``) reads them: ``input`` is the matrix
-``[t0 u1 u2; t1 u1 u2; ...]``, ``parameters`` the vector ``[p1 p2 ...]``. An input that is given every second
-or less often is piecewise constant; a denser one is used as it is. A violation that does not happen again
-still counts where it misses by no more than the requirement's tolerance.
+Columns and rules are those of the ARCH-COMP falsification category, as written by its participants' exporters
+and read by FalStar's validator (``Validation.scala``): ``input`` is the matrix ``[t0 u1 u2; t1 u1 u2; ...]``,
+``parameters`` the vector ``[p1 p2 ...]``. An input sampled once per second or less often is piecewise
+constant; a denser one is interpolated linearly. A counterexample that is not reproduced is still accepted if
+its robustness is below the requirement's tolerance.
 """
 
 import csv
@@ -21,6 +21,7 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.campaigns.suites import bundled_target
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
+from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
@@ -45,7 +46,7 @@ COLUMNS = (
 )
 BUDGET = 1500
 _PROFILES = {"1": None, "2": "instance2"}
-# Their names of our requirements: (system, property).
+# The competition's names of our requirements: (system, property).
 _NAMES = {
     "NN": ("NN", "(NN 0.005 0.03)"),
     "NNb": ("NN", "(NN 0.005 0.04)"),
@@ -54,7 +55,7 @@ _NAMES = {
     "SC": ("SC", "SCa"),
     "AFC27": ("AFC_normal", "(AFC27 0.008)"),
 }
-# By how much a robustness may miss 0 in a re-simulation and the counterexample still counts.
+# A counterexample is accepted if its re-simulated robustness is below this value.
 _TOLERANCES = (
     (r"AT1", 1.2),
     (r"AT2", 10.0),
@@ -65,27 +66,27 @@ _TOLERANCES = (
     (r"AFC27", 8e-4),
     (r"AFC29|AFC33", 7e-4),
 )
-# Seconds: from this step on an input is piecewise constant; closer samples are used as they are.
+# An input with at least this step in s is piecewise constant; all others are exported with the dense step.
 _COARSE = 1.0
 _DENSE_STEP = 0.05
-# Share of a range by which a printed value may leave it.
+# Share of a range by which a value may lie outside it because of rounding when it was printed.
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One run of a validation file.
+    """One row of a validation file, which describes one run.
 
     Attributes:
-        number: of the row, from 1.
+        number: number of the row, from 1.
         requirement: our name of the property.
         instance: ``1`` or ``2``.
-        input: times in s in the first column, then one column an input, shape (n, 1 + inputs).
-        parameters: in the order of the problem.
-        falsified: what the tool says.
-        simulations: how many it took.
-        robustness: what the tool says, where it does.
-        stop_time: end of the simulation in s, where given.
+        input: times in s in the first column, then one column per input, shape (n, 1 + inputs).
+        parameters: parameter values in the order of the problem.
+        falsified: whether the tool claims a counterexample.
+        simulations: number of simulations used.
+        robustness: robustness that the tool claims, if stated.
+        stop_time: end of the simulation in s, if stated.
     """
 
     number: int
@@ -101,13 +102,13 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What became of one claimed counterexample.
+    """Result of re-simulating one claimed counterexample.
 
     Attributes:
         row: the claim.
-        holds: whether it counts.
-        robustness: of the re-simulation, None where there was none.
-        reason: in words.
+        holds: whether the claim is accepted.
+        robustness: robustness of the re-simulation; None if there was none.
+        reason: the result in words.
     """
 
     row: Row
@@ -117,10 +118,10 @@ class Finding:
 
 
 def export(directory: Path) -> str:
-    """All runs of a campaign, or the one of a run directory, in the validation format.
+    """Export all runs of a campaign, or a single run, in the validation format.
 
     Raises:
-        JournalError: when the directory is neither, or is damaged.
+        JournalError: if the directory is neither, or is damaged.
     """
     buffer = StringIO()
     writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
@@ -130,10 +131,10 @@ def export(directory: Path) -> str:
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Read a validation file; further columns are ignored.
+    """Read a validation file; other columns are ignored.
 
     Raises:
-        SpecError: naming the row and the column that cannot be understood.
+        SpecError: naming the row that is invalid, and why.
     """
     csv.field_size_limit(10**9)  # a dense input is longer than the csv module's default allows
     with path.open(newline="", encoding="utf-8") as file:
@@ -144,24 +145,24 @@ def validate(rows: Iterable[Row], *, budget: int = BUDGET, find: Finder | None =
     """Re-simulate all claimed counterexamples.
 
     Args:
-        rows: of a file.
-        budget: more simulations than that make a claim invalid.
-        find: problem of a requirement, an instance and a stop time; None: the bundled ones.
+        rows: rows of a file.
+        budget: maximum number of simulations; a claim that used more is rejected.
+        find: returns the problem for a requirement, an instance and a stop time; None: the bundled ones.
     """
     return [_checked(row, budget, find or bundled_problem) for row in rows if row.falsified]
 
 
 def bundled_problem(requirement: str, instance: str, stop_time: float | None) -> Problem:
-    """Bundled problem of a row.
+    """Load the bundled problem of a row.
 
     Raises:
-        SpecError: when there is none of that name, or the stop time is too short for the requirement.
+        SpecError: if there is none of that name, or the stop time is too short for the requirement.
     """
     return load_problem(bundled_target(requirement), profile=_PROFILES[instance], stop_time=stop_time)
 
 
 def tolerance(requirement: str) -> float:
-    """By how much a re-simulated robustness may be positive; 0 for AT5x, F16 and unknown requirements."""
+    """Upper limit of an accepted re-simulated robustness; 0 for AT5x, F16 and unknown requirements."""
     return next((value for name, value in _TOLERANCES if re.fullmatch(name, requirement)), 0.0)
 
 
@@ -190,7 +191,7 @@ def _exported(run: Run) -> dict[str, object]:
 
 
 def _sampled(signals: Mapping[str, Signal], stop_time: float) -> Matrix:
-    """Control points of signals that are constant for a second and longer, else dense samples."""
+    """Control points if all signals are piecewise constant with long pieces, otherwise dense samples."""
     if not signals:
         return np.empty((0, 1))
     times = np.unique([t for signal in signals.values() for t in signal.times])
@@ -235,10 +236,10 @@ def _our_name(property_: str) -> str:
 
 
 def _matrix(text: str) -> Matrix:
-    """Matrix of MATLAB text; empty text is an empty matrix.
+    """Parse a matrix in MATLAB notation; empty text is an empty matrix.
 
     Raises:
-        ValueError: for anything that is not a number, and rows of unequal length.
+        ValueError: for anything that is not a number, and for rows of unequal length.
     """
     rows = [re.split(r"[\s,]+", row.strip()) for row in text.strip("[] \t\n").split(";") if row.strip()]
     numbers = [[float(v) for v in row] for row in rows]
@@ -248,7 +249,10 @@ def _matrix(text: str) -> Matrix:
 def _checked(row: Row, budget: int, find: Finder) -> Finding:
     if row.simulations > budget:
         return Finding(
-            row, holds=False, robustness=None, reason=f"{row.simulations} simulations, over {budget}"
+            row,
+            holds=False,
+            robustness=None,
+            reason=f"used {row.simulations} simulations, more than the limit of {budget}",
         )
     try:
         problem = find(row.requirement, row.instance, row.stop_time)
@@ -258,27 +262,28 @@ def _checked(row: Row, budget: int, find: Finder) -> Finding:
     evaluation = evaluate(problem, candidate)
     robustness = evaluation.robustness
     if robustness is None:
-        return Finding(row, holds=False, robustness=None, reason=f"cannot be simulated: {evaluation.reason}")
+        return Finding(row, holds=False, robustness=None, reason=f"simulation failed: {evaluation.reason}")
     if robustness < 0:
-        return Finding(row, holds=True, robustness=robustness, reason="violates again")
+        return Finding(row, holds=True, robustness=robustness, reason="reproduced")
     allowed = tolerance(row.requirement)
     if robustness < allowed:
-        return Finding(row, holds=True, robustness=robustness, reason=f"within the tolerance of {allowed:g}")
-    return Finding(row, holds=False, robustness=robustness, reason="does not violate")
+        reason = f"accepted, within the tolerance of {allowed:g}"
+        return Finding(row, holds=True, robustness=robustness, reason=reason)
+    return Finding(row, holds=False, robustness=robustness, reason="not reproduced")
 
 
 def _candidate(row: Row, problem: Problem) -> Candidate:
-    """Candidate of a row, within the problem's ranges.
+    """Make the candidate of a row.
 
     Raises:
-        ValueError: naming what has the wrong number or leaves its range.
+        ValueError: if the number of inputs or parameters is wrong, or a value is outside its range.
     """
     inputs, parameters = problem.space.inputs, problem.space.parameters
     columns = max(row.input.shape[1] - 1, 0) if len(row.input) else 0
     if columns != len(inputs) or len(row.parameters) != len(parameters):
         raise ValueError(
-            f"{columns} inputs and {len(row.parameters)} parameters; "
-            f"expected {len(inputs)} and {len(parameters)}"
+            f"contains {counted(columns, 'input')} and {counted(len(row.parameters), 'parameter')}, expected "
+            f"{len(inputs)} and {len(parameters)}"
         )
     signals = {}
     for i, r in enumerate(inputs, start=1):

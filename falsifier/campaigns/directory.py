@@ -2,9 +2,9 @@
 
 ::
 
-    campaign.json     what was asked for, and with which versions and files; written once
-    runs/NAME/        one run directory for each run
-    stop              there while a campaign is being stopped; its text says why
+    campaign.json     what was requested, with which versions and files; written once
+    runs/NAME/        one run directory per run
+    stop              exists while the campaign is being stopped; contains the reason
     lock              held while a process works on this campaign
 """
 
@@ -25,7 +25,7 @@ from falsifier.search.request import RunRequest
 CAMPAIGN = "campaign.json"
 STOP = "stop"
 _LOCK = "lock"
-# How long in s to wait for the lock: who looks whether it is held holds it for a moment.
+# Time in s to wait for the lock: is_worked_on() holds it for a moment.
 _LOCK_PATIENCE = 0.5
 
 
@@ -37,10 +37,10 @@ class CampaignRecord(BaseModel):
     falsifier: str = Field(description="Version of this package.")
     python: str
     platform: str
-    packages: dict[str, str] = Field(description="Versions of the packages that decide numbers.")
+    packages: dict[str, str] = Field(description="Versions of the packages that influence the numbers.")
     started: str = Field(description="Date and time in UTC.")
     request: CampaignRequest
-    hashes: dict[str, str] = Field(description="SHA-256 by path of all FMUs and specs.")
+    hashes: dict[str, str] = Field(description="SHA-256 of all FMUs and specs, by path.")
 
     @property
     def runs(self) -> dict[str, RunRequest]:
@@ -49,7 +49,7 @@ class CampaignRecord(BaseModel):
 
 
 def is_campaign(directory: Path) -> bool:
-    """Whether a directory holds a campaign."""
+    """Whether a directory contains a campaign."""
     return (directory / CAMPAIGN).exists()
 
 
@@ -62,12 +62,12 @@ def read_campaign(directory: Path) -> CampaignRecord:
     """Read campaign.json.
 
     Raises:
-        JournalError: when there is none, or it cannot be understood.
+        JournalError: if there is none, or it is invalid.
     """
     try:
         return CampaignRecord.model_validate_json((directory / CAMPAIGN).read_bytes())
     except FileNotFoundError:
-        raise JournalError(f"{directory}: not a campaign directory, it has no {CAMPAIGN}") from None
+        raise JournalError(f"{directory}: not a campaign directory: it contains no {CAMPAIGN}") from None
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
@@ -75,7 +75,7 @@ def read_campaign(directory: Path) -> CampaignRecord:
 
 
 def campaign_mark(directory: Path) -> str:
-    """Hash by which a worker knows that it sees the very same directory; empty where there is no campaign."""
+    """Hash that shows a worker whether it sees the same directory; empty if there is no campaign."""
     path = directory / CAMPAIGN
     return sha256(path.read_bytes()).hexdigest() if path.exists() else ""
 
@@ -86,12 +86,12 @@ def run_directory(directory: Path, name: str) -> Path:
 
 
 def run_directories(directory: Path) -> list[Path]:
-    """Directories of all runs that have begun, in the campaign's order.
+    """Directories of all runs that have started, in the campaign's order.
 
-    A run directory is its own only run. A folder that is neither, but holds run directories, has those.
+    For a run directory, itself. For a folder that is neither but contains run directories, those.
 
     Raises:
-        JournalError: when the directory holds neither a campaign nor a run.
+        JournalError: if the directory contains neither a campaign nor a run.
     """
     if is_campaign(directory):
         named = read_campaign(directory).runs
@@ -101,7 +101,9 @@ def run_directories(directory: Path) -> list[Path]:
     below = sorted(path for path in directory.glob("*") if holds_run(path))
     if below:
         return below
-    raise JournalError(f"{directory}: neither a campaign nor a run: no {CAMPAIGN} and no manifest")
+    raise JournalError(
+        f"{directory}: not a run or campaign directory: it contains neither {CAMPAIGN} nor a run's manifest"
+    )
 
 
 @contextmanager
@@ -109,14 +111,17 @@ def locked(directory: Path) -> Iterator[None]:
     """Hold the campaign's lock.
 
     Raises:
-        JournalError: when another process holds it.
+        JournalError: if another process holds it.
     """
     directory.mkdir(parents=True, exist_ok=True)
     lock = FileLock(directory / _LOCK)
     try:
         lock.acquire(timeout=_LOCK_PATIENCE)
     except Timeout:
-        raise JournalError(f"{directory}: another process is working on this campaign") from None
+        raise JournalError(
+            f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
+            f"falsifier watch {directory}"
+        ) from None
     try:
         yield
     finally:
@@ -124,12 +129,12 @@ def locked(directory: Path) -> Iterator[None]:
 
 
 def is_worked_on(directory: Path) -> bool:
-    """Whether a process holds the campaign's lock: one that was killed, however it was, holds it no more."""
+    """Whether a process holds the campaign's lock; that of a killed process is released by the system."""
     path = directory / _LOCK
     if not path.exists():
         return False
     try:
         with FileLock(path, timeout=0):
             return False
-    except (Timeout, OSError):  # OSError: who may only read cannot tell
+    except (Timeout, OSError):  # OSError: without write access the lock cannot be tested
         return True

@@ -1,4 +1,4 @@
-"""What a campaign runs, as values: methods, requests and names."""
+"""What a campaign runs, as values: methods, requests and run names."""
 
 import re
 from collections.abc import Iterable
@@ -18,20 +18,20 @@ _HASH_DIGITS = 10
 
 @dataclass(frozen=True, slots=True, order=True)
 class Method:
-    """How runs search: what a table has one column or block of rows for.
+    """How runs search; tables have one row or column per method.
 
-    Runs that differ in any of these are never counted together.
+    Runs that differ in any of these attributes are never counted together.
 
     Attributes:
-        engine: name of the engine; empty when a language model leads the search.
+        engine: name of the engine; empty if a language model leads the search.
         llm: name of the language model, or empty.
         effort: its reasoning effort, or empty.
         variant: its prompt variant, or empty.
         parameterization: ``free`` or ``fixed``.
-        profile: of the specs, or empty.
-        anonymous: whether the LLM is told neutral names only.
-        fallback: engine that goes on when the LLM gives up, or empty.
-        together: whether several requirements took turns in one search.
+        profile: profile of the specs, or empty.
+        anonymous: whether prompts use neutral names.
+        fallback: engine to switch to if the language model fails, or empty.
+        together: whether several requirements shared one search.
     """
 
     engine: str = ""
@@ -46,27 +46,27 @@ class Method:
 
     @property
     def label(self) -> str:
-        """Name for people, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
+        """Name in tables, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
         llm = " ".join(p for p in (self.llm.rpartition("/")[2], self.effort, self.variant) if p)
         name = " + ".join(p for p in (self.engine, llm) if p) or DEFAULT_ENGINE
         apart = {
             self.parameterization: self.parameterization != "fixed",
             self.profile: bool(self.profile),
             "neutral names": self.anonymous,
-            f"then {self.fallback}": bool(self.fallback),
+            f"fallback {self.fallback}": bool(self.fallback),
             "shared search": self.together,
         }
-        return ", ".join([name, *(text for text, said in apart.items() if said)])
+        return ", ".join([name, *(text for text, applies in apart.items() if applies)])
 
 
 class CampaignRequest(BaseModel):
     """What a campaign runs and may spend.
 
     Attributes:
-        runs: every run.
-        limits: what all runs together may spend; None: no limit beside the runs' own.
-        calls: most runs with a language model at a time, on all workers together. A run asks one question
-            at a time, so this limits the provider's concurrent requests too.
+        runs: all runs.
+        limits: what all runs together may spend; None: no limit in addition to the runs' own.
+        calls: maximum number of concurrent runs that use a language model, over all workers. A run asks one
+            question at a time, so this also limits the concurrent requests to the provider.
         suite: name of the suite that the runs come from, or None.
     """
 
@@ -81,12 +81,12 @@ class CampaignRequest(BaseModel):
         """Runs by the name of their directory, in order.
 
         Raises:
-            SpecError: when one run is asked for twice.
+            SpecError: if the same run is requested twice.
         """
         runs = {run_name(request): request for request in self.runs}
         if len(runs) < len(self.runs):
             raise SpecError(
-                "this campaign asks for the same run twice: give each requirement and engine once"
+                "this campaign contains the same run twice: name each requirement and engine only once"
             )
         return runs
 
@@ -99,14 +99,14 @@ def cross(
     budget: Budget,
     asking: LLMSettings | None = None,
 ) -> tuple[RunRequest, ...]:
-    """All runs of problems x methods x seeds, in this order.
+    """Make the runs of problems x methods x seeds, in this order.
 
     Args:
-        problems: what is searched; the method decides their parameterization and profile.
-        methods: how.
-        seeds: of the engines.
-        budget: of each run.
-        asking: address, options, price and cache of language models; the method decides the rest.
+        problems: what is searched; the method determines their parameterization and profile.
+        methods: how to search.
+        seeds: seeds of the engines.
+        budget: limits of each run.
+        asking: address, options, price and cache of language models; the method determines the rest.
     """
     seeds, methods = tuple(seeds), tuple(methods)
     return tuple(
@@ -145,7 +145,7 @@ def method_of(request: RunRequest) -> Method:
 
 
 def run_name(request: RunRequest) -> str:
-    """Name of a run's directory: readable, and different for every difference in the request."""
+    """Name of a run's directory: readable, and unique by a hash of the request."""
     requirement = re.split(r"[:/]", request.problems[0].target)[-1]
     digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
     readable = f"{requirement}-{method_of(request).label}-{request.seed}"

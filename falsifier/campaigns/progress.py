@@ -1,4 +1,4 @@
-"""How far a campaign is, read from its directory: the same for who runs it and for who watches it."""
+"""Progress of a campaign, read from its directory: the same for the process that runs it and for others."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -16,17 +16,17 @@ from falsifier.search.tally import FINISHED, RunStatus, Tally
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunProgress:
-    """How far one run is.
+    """Progress of one run.
 
     Attributes:
-        name: of its directory.
-        requirement: as asked for.
+        name: name of its directory.
+        requirement: name of the requirement.
         method: how it searches.
-        seed: of its engine.
+        seed: seed of its engine.
         status: ``waiting``, ``running`` or how it ended.
         reason: why it ended.
         best: smallest robustness so far, or None.
-        spent: what it has used so far.
+        spent: what it has spent so far.
     """
 
     name: str
@@ -40,16 +40,16 @@ class RunProgress:
 
     @property
     def finished(self) -> bool:
-        """Whether nothing is left to do for it; failed and interrupted runs are not finished."""
+        """Whether nothing is left to do; failed and interrupted runs are continued when resuming."""
         return self.status in FINISHED
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a campaign is.
+    """Progress of a campaign, or of a part of it.
 
     Attributes:
-        runs: every run in the campaign's order.
+        runs: all runs in the campaign's order.
     """
 
     runs: tuple[RunProgress, ...]
@@ -66,7 +66,7 @@ class Progress:
 
     @property
     def spent(self) -> Spent:
-        """What all runs together have used; the cost is None where any is unknown."""
+        """What all runs together have spent; the cost is None if that of any run is unknown."""
         return total(run.spent for run in self.runs)
 
     def by_requirement(self) -> dict[str, "Progress"]:
@@ -84,7 +84,7 @@ class Progress:
 
 @dataclass(slots=True)
 class _Followed:
-    """A run's journal and how much of it was read."""
+    """A run's journal and the numbers read from it so far."""
 
     name: str
     request: RunRequest
@@ -99,7 +99,7 @@ class _Followed:
         self.tally, self.reader = Tally(), JournalReader(self.directory, with_candidates=False)
 
     def read(self) -> None:
-        if self.reader.shrank:  # a torn line was dropped, or the directory was replaced
+        if self.reader.shrank:  # an incomplete line was dropped, or the directory was replaced
             self.begin()
         for record in self.reader.new():
             self.tally.add(record)
@@ -121,10 +121,10 @@ class _Followed:
 
 
 class Follower:
-    """Reads what was written to a campaign's directory since the last look.
+    """Follows a campaign's directory; each look reads only what was written since the last one.
 
     Raises:
-        JournalError: when the directory is not a campaign's.
+        JournalError: if the directory contains no campaign.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -132,14 +132,14 @@ class Follower:
         self._runs = [_Followed(n, r, run_directory(directory, n)) for n, r in runs.items()]
 
     def look(self) -> Progress:
-        """How far the campaign is now."""
+        """Read what is new, and return the current progress."""
         for run in self._runs:
             run.read()
         return Progress(tuple(run.progress() for run in self._runs))
 
 
 def total(spent: Iterable[Spent]) -> Spent:
-    """Sum of what several runs have used."""
+    """Sum of what several runs have spent."""
     return reduce(_plus, spent, Spent())
 
 

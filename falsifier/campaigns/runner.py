@@ -1,4 +1,4 @@
-"""Run a campaign, or go on with one."""
+"""Runs and resumes campaigns."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -35,7 +35,7 @@ from falsifier.search.tally import read_tally
 
 Listener = Callable[[Progress], None]
 
-# A worker that died leaves its lock to the operating system, which takes a moment; seconds.
+# Time in s to wait for the lock of a worker that died: the operating system takes a moment to release it.
 _PATIENCE = 10.0
 
 
@@ -44,8 +44,8 @@ class Outcome:
     """How work on a campaign ended.
 
     Attributes:
-        progress: of all runs.
-        reason: why it stopped before all runs were finished; empty where it did not.
+        progress: progress of all runs.
+        reason: why it stopped before all runs were finished; empty if it did not.
     """
 
     progress: Progress
@@ -64,23 +64,23 @@ def run_campaign(
 
     Args:
         request: what to run and what it may spend.
-        directory: where everything is kept.
-        jobs: processes on this machine, one run each at a time.
+        directory: directory of the campaign.
+        jobs: number of processes on this machine; each carries out one run at a time.
         executor: ``dask:tcp://HOST:PORT`` to use a cluster instead.
-        listeners: called several times a second with how far the campaign is.
+        listeners: called several times per second with the progress.
 
     Raises:
-        JournalError: when the directory is in use or holds a campaign already.
-        SpecError: when a problem, an engine or the executor is not what it should be.
+        JournalError: if the directory is in use or already contains a campaign.
+        SpecError: if a problem, an engine or the executor is not valid.
         ChatError: for an unknown provider or a missing key.
-        ModelError: when an FMU cannot be used, or the cluster not be reached.
+        ModelError: if an FMU cannot be used, or the cluster cannot be reached.
     """
     _check(request.named().values(), local=executor is None)
     with locked(directory):
         if is_campaign(directory):
             raise JournalError(
-                f"{directory} already holds a campaign: choose another --out, or continue it with "
-                f"'falsifier resume {directory}'"
+                f"{directory} already contains a campaign: choose another --out, or to continue it: "
+                f"falsifier resume {directory}"
             )
         problems = _load(request.named().values())
         record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
@@ -97,17 +97,17 @@ def resume_campaign(
     limits: Budget | None = None,
     listeners: Iterable[Listener] = (),
 ) -> Outcome:
-    """Go on with a campaign: finished runs stay as they are, others continue where their journals end.
+    """Continue a campaign: finished runs are kept, the others are resumed from their journals.
 
     Args:
-        directory: of the campaign.
+        directory: directory of the campaign.
         jobs: see run_campaign.
         executor: see run_campaign.
-        limits: what all runs together may spend, instead of what was said when it was started.
+        limits: what all runs together may spend; None: the limits given at the start.
         listeners: see run_campaign.
 
     Raises:
-        JournalError: when the directory is in use, holds no campaign, or an FMU or spec has changed since.
+        JournalError: if the directory is in use or contains no campaign, or an FMU or spec has changed.
         SpecError: see run_campaign.
         ModelError: see run_campaign.
     """
@@ -135,7 +135,7 @@ def _work(
     watch = _Watch(directory, record.request.limits, listeners)
     runs = watch.follower.look().runs
     unfinished = [run.name for run in runs if not run.finished]
-    for run in runs:  # the file of a run that ended at the very moment of a kill is missing
+    for run in runs:  # if the process was killed just after a run ended, the counterexample's file is missing
         if run.status == "falsified":
             keep_recorded(run_directory(directory, run.name))
     mark = campaign_mark(directory)
@@ -170,7 +170,7 @@ def _work(
 
 
 class _Watch:
-    """Looks at a campaign while it runs, tells the listeners, and stops it at its limits."""
+    """Observes a running campaign, informs the listeners, and stops the campaign at its limits."""
 
     def __init__(self, directory: Path, limits: Budget | None, listeners: tuple[Listener, ...]) -> None:
         self.follower = Follower(directory)
@@ -182,7 +182,7 @@ class _Watch:
         self._started = perf_counter()
 
     def tick(self) -> bool:
-        """Whether the campaign may go on."""
+        """Update listeners and limits; return whether the campaign may continue."""
         progress = self.follower.look()
         for listener in self._listeners:
             listener(progress)
@@ -197,15 +197,15 @@ class _Watch:
         return not self.reason
 
     def stop(self, reason: str) -> None:
-        """Tell all runs to stop where they are."""
+        """Stop all runs: workers look for this file."""
         self.reason = reason
         self._stop.write_text(f"{reason}\n", encoding="utf-8")
 
 
 def _check(requests: Iterable[RunRequest], *, local: bool) -> None:
-    """Refuse names that nobody knows and missing keys before anything is loaded or written.
+    """Reject unknown names and missing keys before anything is loaded or written.
 
-    Keys are looked for only where the runs are done on this machine: a cluster's workers have their own.
+    Keys are checked only for runs on this machine: the workers of a cluster have their own environment.
     """
     requests = tuple(requests)
     for request in requests:
@@ -221,7 +221,7 @@ def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
     """Load each problem once.
 
     Raises:
-        SpecError: when two targets have a requirement of the same name, which no table could tell apart.
+        SpecError: if two targets contain requirements of the same name: tables could not distinguish them.
     """
     problems: dict[ProblemSource, Problem] = {}
     targets: dict[str, str] = {}
@@ -230,7 +230,7 @@ def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
         other = targets.setdefault(problem.name, source.target)
         if other != source.target:
             raise SpecError(
-                f"{other} and {source.target} are both called {problem.name!r}: give one another name"
+                f"{other} and {source.target} are both named {problem.name!r}: rename one of them"
             )
     return problems
 
@@ -240,7 +240,7 @@ def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
 
 
 def _record_failure(directory: Path, task: Task, reason: str) -> None:
-    """Write into a run's journal how it failed, where its worker could not do so itself."""
+    """Record in a run's journal why it failed, if its worker could not do so."""
     tally = read_tally(directory)
     if tally.status not in ("waiting", "running"):
         return

@@ -1,4 +1,4 @@
-"""Keep an executor busy with runs, whatever becomes of its workers."""
+"""Keeps an executor busy with runs, even if its workers die."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -8,7 +8,7 @@ from falsifier.campaigns.work import Done, Missing, Task, fmu_file, run_task
 from falsifier.errors import FalsifierError
 from falsifier.evaluation.workers import Workers
 
-# Longest time in s between two looks at the campaign while runs go on.
+# Maximum time in s between two ticks while runs are in progress.
 _TICK = 0.25
 
 Report = Callable[[Task, Done], None]
@@ -16,15 +16,15 @@ Tick = Callable[[], bool]
 
 
 class Schedule:
-    """Which runs wait, which are with a worker, and which are under suspicion.
+    """Assigns runs to workers and finds out which run killed a worker.
 
-    When a worker process dies, all runs that were with workers are suspects: they go on one at a time, and
-    one that kills its worker when it is alone has failed.
+    If a worker process dies, the whole pool is lost, so every run in progress is a suspect. Suspects are
+    repeated one at a time; a run that kills its worker while running alone has failed.
 
     Args:
-        tasks: runs to do.
-        workers: who does them.
-        calls: most runs with a language model at a time.
+        tasks: runs to carry out.
+        workers: the pool.
+        calls: maximum number of concurrent runs that use a language model.
     """
 
     def __init__(self, tasks: Iterable[Task], workers: Workers, *, calls: int) -> None:
@@ -35,11 +35,12 @@ class Schedule:
         self._running: dict[Future[Done | Missing], Task] = {}
 
     def run(self, report: Report, tick: Tick) -> None:
-        """Do all runs.
+        """Carry out all runs.
 
         Args:
             report: called with each run that has ended.
-            tick: called every moment; False: start nothing more, and wait for what runs.
+            tick: called several times per second; once it returns False, no more runs are started and those
+                in progress are awaited.
         """
         proceed = tick()
         while self._running or (proceed and (self._waiting or self._suspects)):
@@ -51,7 +52,7 @@ class Schedule:
             proceed = tick() and proceed
 
     def _submit(self) -> None:
-        if self._suspects:
+        if self._suspects:  # alone, so that a dead worker identifies its run
             if not self._running:
                 self._start(self._suspects.popleft())
             return
@@ -62,7 +63,7 @@ class Schedule:
             self._start(task)
 
     def _next(self) -> Task | None:
-        """First waiting run that the limit on language models allows."""
+        """First waiting run that the limit on runs with a language model allows."""
         asking = sum(task.request.llm is not None for task in self._running.values())
         for task in self._waiting:
             if task.request.llm is None or asking < self._calls:
@@ -73,18 +74,18 @@ class Schedule:
     def _start(self, task: Task, files: dict[str, bytes] | None = None) -> None:
         try:
             self._running[self._workers.executor.submit(run_task, task, files or {})] = task
-        except BrokenExecutor:  # a worker died while nothing ran
+        except BrokenExecutor:  # a worker died while idle
             self._workers.restart()
             self._running[self._workers.executor.submit(run_task, task, files or {})] = task
 
     def _settle(self, future: Future[Done | Missing], report: Report) -> None:
         task = self._running.pop(future, None)
-        if task is None:  # withdrawn together with others
+        if task is None:  # already handled when the pool was restarted
             return
         try:
             outcome = future.result()
         except (BrokenExecutor, CancelledError) as error:
-            self._mourn(task, str(error), report)
+            self._recover(task, str(error), report)
         except FalsifierError as error:
             report(task, Done("failed", str(error)))
         except Exception as error:
@@ -97,8 +98,8 @@ class Schedule:
             else:
                 report(task, outcome)
 
-    def _mourn(self, task: Task, reason: str, report: Report) -> None:
-        """A worker died: start new ones, and find out which run it was."""
+    def _recover(self, task: Task, reason: str, report: Report) -> None:
+        """Restart the pool after a worker died; report the run if it was alone, otherwise suspect all."""
         alone = not self._running
         others = list(self._running.values())
         self._running.clear()

@@ -1,4 +1,4 @@
-"""Suites: well-known lists of requirements."""
+"""Suites: published lists of requirements."""
 
 import tomllib
 
@@ -15,8 +15,8 @@ def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]
     """Requirements of a suite.
 
     Args:
-        name: ``arch-comp``: the requirements that ``published.toml`` has numbers of, in its order.
-        profile: leave out the requirements whose spec does not offer this profile.
+        name: ``arch-comp``: the requirements in ``published.toml``, in that order.
+        profile: omit requirements whose spec does not offer this profile.
 
     Raises:
         SpecError: for an unknown name.
@@ -29,10 +29,10 @@ def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]
 
 
 def bundled_target(requirement: str) -> str:
-    """Target of a bundled requirement with its spec, like ``NN:NN``: ``NN`` alone would be the whole spec.
+    """Target of a bundled requirement including its spec, such as ``NN:NN``: ``NN`` alone is the whole spec.
 
     Raises:
-        SpecError: when there is none of that name.
+        SpecError: if there is none of that name.
     """
     return f"{find_spec(requirement)[0].stem}:{requirement}"
 

@@ -1,8 +1,8 @@
 """One run as it is sent to a worker, and what the worker does with it.
 
-A worker may be a process on this machine or on another one. The problem travels as a value; its FMU is named
-by content hash, and its bytes follow only when the worker does not have them. A worker that sees the
-campaign's directory writes there; one that does not works in a folder of its own and sends the run back.
+A worker is a process on this machine or another one. The problem is sent as a value; its FMU is identified by
+its hash, and its content is sent only if the worker does not have it. A worker that sees the campaign's
+directory writes there; otherwise it uses a local folder and sends the finished run back.
 """
 
 import os
@@ -26,26 +26,26 @@ from falsifier.search.manifest import Manifest
 from falsifier.search.request import RunRequest
 from falsifier.search.run import carry_out
 
-# A killed campaign's workers end within moments; whoever resumes it waits that long in s for their locks.
+# Time in s to wait for a run's lock: the workers of a killed campaign take a moment to end.
 _PATIENCE = 10.0
-# Shortest time in s between two looks for the stop file.
+# Minimum time in s between two checks for the stop file.
 _STOP_PERIOD = 0.2
 
-# A worker simulates one run at a time, also where its host gives it several threads: FMUs are per process.
+# A worker carries out one run at a time even if it has several threads: FMUs are loaded once per process.
 _ONE_AT_A_TIME = Lock()
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run to do.
+    """One run to carry out.
 
     Attributes:
-        name: of the run.
+        name: name of the run.
         request: what to run.
-        problem: loaded.
-        manifest: of the run.
-        campaign: directory of the campaign as its owner sees it.
-        mark: by which a worker recognises that directory.
+        problem: the loaded problem.
+        manifest: manifest of the run.
+        campaign: path of the campaign's directory on the machine that started it.
+        mark: hash by which a worker recognises that directory.
     """
 
     name: str
@@ -65,12 +65,12 @@ class Missing:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The run has ended.
+    """A run has ended.
 
     Attributes:
-        status: how.
+        status: how it ended.
         reason: why, in words.
-        packed: the run directory as a ZIP archive, where the worker could not write it in place.
+        packed: the run directory as a ZIP archive, if the worker could not write it in place.
     """
 
     status: str
@@ -79,11 +79,11 @@ class Done:
 
 
 def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
-    """Do one run, or go on with it where it was left.
+    """Carry out one run, or resume it.
 
     Args:
-        task: what to do.
-        files: contents by SHA-256 that this worker said it misses.
+        task: the run.
+        files: contents, by SHA-256, of files that this worker reported missing.
     """
     with _ONE_AT_A_TIME:
         problem = _with_local_fmu(task.problem, files)
@@ -109,13 +109,13 @@ def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
 
 
 def fmu_file(problem: Problem) -> Path | None:
-    """The problem's FMU; None for a model that is no file."""
+    """Path of the problem's FMU; None if the model is not an FMU."""
     path: Path | None = getattr(problem.model, "path", None)
     return path
 
 
 def pack(directory: Path) -> bytes:
-    """All files of a run directory as a ZIP archive."""
+    """Pack all files of a run directory into a ZIP archive."""
     buffer = BytesIO()
     with ZipFile(buffer, "w") as archive:
         for path in sorted(directory.rglob("*")):
@@ -125,7 +125,7 @@ def pack(directory: Path) -> bytes:
 
 
 def unpack(packed: bytes, directory: Path) -> None:
-    """Put a packed run directory in its place in one step, instead of what was there."""
+    """Unpack a run directory, replacing what was there; readers never see a half-written directory."""
     partial = directory.with_name(f"{directory.name}.partial")
     rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
@@ -136,7 +136,7 @@ def unpack(packed: bytes, directory: Path) -> None:
 
 
 class _StopWatch:
-    """Interrupts a run, which keeps everything it has, once the campaign's stop file is there."""
+    """Listener that interrupts a run once the campaign's stop file exists; the run can be resumed."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -150,7 +150,7 @@ class _StopWatch:
 
 
 def _with_local_fmu(problem: Problem, files: Mapping[str, bytes]) -> Problem | Missing:
-    """Return the problem with its FMU as this worker has it."""
+    """Return the problem with the path of this worker's copy of the FMU."""
     path = fmu_file(problem)
     if path is None:
         return problem
@@ -167,7 +167,7 @@ def _with_local_fmu(problem: Problem, files: Mapping[str, bytes]) -> Problem | M
 
 @lru_cache(maxsize=256)
 def _digest(path: Path, changed: int) -> str:
-    """SHA-256 of a file that was last changed at this time."""
+    """SHA-256 of a file; the modification time is part of the cache's key."""
     return sha256(path.read_bytes()).hexdigest()
 
 
@@ -179,6 +179,6 @@ def _put(path: Path, content: bytes) -> None:
 
 
 def _store() -> Path:
-    """Folder for what this worker was sent: FALSIFIER_STORE, or one of this user's for temporary files."""
+    """Folder for files sent to this worker: FALSIFIER_STORE, or a temporary folder of this user."""
     fallback = Path(gettempdir()) / f"falsifier-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
     return Path(os.environ.get("FALSIFIER_STORE") or fallback)

@@ -1,1 +1,1 @@
-"""What everything else speaks of: signals, search spaces, candidates, trajectories and models."""
+"""The values that all other packages use: signals, search spaces, candidates, trajectories, models."""

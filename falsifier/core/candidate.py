@@ -1,4 +1,4 @@
-"""Candidates: the same thing whoever proposed them, input signals and parameter values by name."""
+"""Candidates: input signals and parameter values by name, in the same form for every engine."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,8 +14,8 @@ class Candidate:
     Attributes:
         signals: input signals by name.
         parameters: parameter values by name.
-        origin: who proposed it.
-        rationale: why, in the engine's words.
+        origin: name of the engine that proposed it.
+        rationale: the engine's reason for proposing it.
     """
 
     signals: Mapping[str, Signal] = field(default_factory=dict)
@@ -25,14 +25,14 @@ class Candidate:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What is simulated, without origin and rationale: equal keys are equal simulations."""
+        """Signals and parameters without origin and rationale: equal keys give equal simulations."""
         return (
             tuple(sorted(self.signals.items(), key=lambda kv: kv[0])),
             tuple(sorted(self.parameters.items())),
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain form for journals and exports."""
+        """Return the JSON form used in journals and exports."""
         return {
             "signals": {
                 name: {
@@ -50,7 +50,7 @@ class Candidate:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Candidate":
-        """Candidate from its plain form."""
+        """Return the candidate that ``to_json`` wrote."""
         return cls(
             {
                 name: Signal(tuple(s["times"]), tuple(s["values"]), s["interpolation"], s.get("hold"))

@@ -1,13 +1,14 @@
-"""Files: written whole or not at all, and those that come with the package."""
+"""Atomic file writes, and the folders bundled with the package."""
 
 import os
 from pathlib import Path
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:
-    """Write a file in one step, so that a crash leaves the whole of it or none; return its path.
+    """Write a file atomically and return its path.
 
-    Missing folders are made; the content is on disk when this returns.
+    A crash leaves either the old file or the complete new one. Missing folders are created; the content is on
+    disk when the function returns.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
@@ -20,7 +21,7 @@ def write_whole(path: Path, content: str | bytes) -> Path:
 
 
 def bundled(folder: str) -> Path:
-    """Folder ``specs`` or ``fmus`` that came with the package: inside it, or beside it in a checkout."""
+    """Return the folder ``specs`` or ``fmus``: bundled with the package, or next to it in a checkout."""
     package = Path(__file__).resolve().parents[1]
     inside = package / folder
     return inside if inside.is_dir() else package.parent / folder

@@ -1,4 +1,4 @@
-"""What simulates: the Model protocol, what is known of a model, and Python functions as models."""
+"""Models: the Model protocol, the description of a model, and Python functions as models."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
 
-# Smallest and largest number by type name: FMI 1 and 2 have 32-bit Integers.
+# Smallest and largest number by type name; Integer (FMI 1 and 2) has 32 bits.
 _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
     "Boolean": (0, 1),
     "Integer": (-(2**31), 2**31 - 1),
@@ -26,24 +26,24 @@ _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One scalar variable of a model; elements of arrays are variables of their own (``x[1]``).
+    """One scalar variable of a model; each element of an array is a separate variable (``x[1]``).
 
     Attributes:
-        name: as formulas and spec files name it.
+        name: its name in formulas and spec files.
         kind: type of its values.
         causality: role in the model.
         variability: ``constant``, ``fixed``, ``tunable``, ``discrete`` or ``continuous``.
-        unit: unit of all numbers here, empty where unknown.
-        display_unit: unit for people, empty where none is given.
-        low: smallest value, None where unbounded.
-        high: largest value.
+        unit: unit of all numbers here, empty if unknown.
+        display_unit: unit in which the model's author wants values displayed, empty if none is given.
+        low: smallest value, None if unbounded.
+        high: largest value, None if unbounded.
         nominal: typical magnitude.
         start: start value.
         settable: whether it can be set before the simulation starts.
         is_state: whether it is a continuous state.
-        literals: names of an enumeration's values with their numbers.
-        description: what it means.
-        type: name of the type that holds its values, such as ``Int8``; empty where unknown.
+        literals: numbers of an enumeration's items by name.
+        description: its meaning, from the model.
+        type: name of its data type, such as ``Int8``; empty if unknown.
     """
 
     name: str
@@ -64,12 +64,12 @@ class Variable:
 
     @property
     def type_limits(self) -> tuple[int, int] | None:
-        """Smallest and largest number that its type holds; None for reals."""
+        """Smallest and largest number of its data type; None for reals."""
         return _TYPE_LIMITS.get(self.type)
 
     @property
     def limits(self) -> tuple[float | None, float | None]:
-        """Declared min and max; where none is declared, those of Booleans and of an enumeration's items."""
+        """Declared min and max; if none is declared, those of a Boolean or of an enumeration's items."""
         numbers = (0, 1) if self.kind == "boolean" else tuple(self.literals.values())
         low = min(numbers, default=None) if self.low is None else self.low
         high = max(numbers, default=None) if self.high is None else self.high
@@ -78,20 +78,20 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class ModelInfo:
-    """What is known of a model without simulating it.
+    """What is known about a model without simulating it.
 
     Attributes:
         name: the model's name.
-        description: what the system is, in a sentence or two.
+        description: a sentence or two about the system.
         fmi_version: ``1.0``, ``2.0``, ``3.0``; empty for models that are not FMUs.
         interfaces: how it can be simulated.
-        platforms: names of the platforms that it carries binaries for.
-        tool: what generated it.
-        stop_time: of its default experiment in s, where given.
-        step_size: of its default experiment in s, where given.
-        tolerance: relative tolerance of its default experiment, where given.
+        platforms: names of the platforms for which it contains binaries.
+        tool: the tool that generated it.
+        stop_time: stop time of its default experiment in s, if given.
+        step_size: step size of its default experiment in s, if given.
+        tolerance: relative tolerance of its default experiment, if given.
         variables: all scalar variables.
-        clocks: names of the clocks that a simulator would have to tick (FMI 3).
+        clocks: names of the clocks that the importing tool would have to tick (FMI 3).
     """
 
     name: str
@@ -116,7 +116,7 @@ class ModelInfo:
         return any(v.name == name for v in self.variables)
 
     def with_causality(self, causality: Causality) -> tuple[Variable, ...]:
-        """Variables of one role, in the model's order."""
+        """Return the variables with this causality, in the model's order."""
         return tuple(v for v in self.variables if v.causality == causality)
 
     @property
@@ -140,13 +140,13 @@ class Experiment:
     """How one simulation is run; the same for all candidates of a problem.
 
     Attributes:
-        stop_time: end in s; simulations start at 0.
-        output_interval: step of the trajectory's grid in s; stop_time is a whole multiple of it.
+        stop_time: end of the simulation in s; simulations start at 0.
+        output_interval: step of the trajectory's time grid in s; the stop time is an integer multiple of it.
         outputs: names of the variables to record.
-        step_size: communication step (co-simulation) or largest solver step (model exchange) in s; None: the
+        step_size: communication step (co-simulation) or maximum solver step (model exchange) in s; None: the
             output interval.
-        tolerance: relative tolerance handed to the model or used by the solver; None: the model's own.
-        time_limit: wall-clock seconds for one simulation.
+        tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
+        time_limit: maximum wall-clock time of one simulation in s.
     """
 
     stop_time: float
@@ -158,7 +158,7 @@ class Experiment:
 
     @property
     def samples(self) -> int:
-        """Number of samples of the trajectory, both ends included."""
+        """Number of samples of the trajectory, including both ends."""
         return round(self.stop_time / self.output_interval) + 1
 
     @property
@@ -168,11 +168,11 @@ class Experiment:
 
 
 class Model(Protocol):
-    """Something that simulates. Models are picklable descriptions; what they load stays in the process."""
+    """Something that simulates. Models are picklable descriptions; what they load stays in its process."""
 
     @property
     def info(self) -> ModelInfo:
-        """What is known of the model without simulating it."""
+        """What is known about the model without simulating it."""
         ...
 
     def simulate(
@@ -181,18 +181,18 @@ class Model(Protocol):
         """Simulate once from time 0 and return the outputs on the experiment's time grid.
 
         Args:
-            signals: an input signal for each driven input, by name; other inputs keep their start values.
-            parameters: values of parameters and of start values, by name.
+            signals: input signals by name; inputs without one keep their start values.
+            parameters: values of parameters and start values, by name.
             experiment: times, outputs and limits.
 
         Raises:
-            SimulationError: when there is no full trajectory of finite numbers, with the reason.
-            ModelError: when the model cannot be used at all.
+            SimulationError: if there is no complete trajectory of finite numbers; states the cause.
+            ModelError: if the model cannot be used at all.
         """
         ...
 
     def close(self) -> None:
-        """Release processes, libraries and folders; a later simulation opens them again."""
+        """Release processes, libraries and folders; the next simulation opens them again."""
         ...
 
 
@@ -203,8 +203,7 @@ class FunctionModel:
     Attributes:
         function: called as ``function(times, inputs, parameters)`` with the time grid, shape (n,), the
             sampled inputs by name, shape (n,) each, and the parameter values by name; returns one array of
-            shape (n,) per output name. It must be importable (no lambda) where problems travel between
-            processes.
+            shape (n,) per output name. It must be importable (no lambda) if it is to run in other processes.
         info: name, description and variables; inputs, parameters and outputs must be listed.
     """
 
@@ -217,7 +216,12 @@ class FunctionModel:
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
     ) -> Trajectory:
-        """Call the function once; see Model.simulate."""
+        """Call the function once with all inputs sampled on the experiment's time grid.
+
+        Raises:
+            SimulationError: if the function raises an exception, omits an output, or returns an array of the
+                wrong shape or a value that is not finite.
+        """
         times = experiment.times
         inputs = {name: signal.sample(times) for name, signal in signals.items()}
         try:
@@ -228,7 +232,7 @@ class FunctionModel:
         for name in experiment.outputs:
             if name not in outputs:
                 raise SimulationError(
-                    f"{self.info.name}: the function returned no output {name!r}; "
+                    f"{self.info.name}: the function did not return the output {name!r}; "
                     f"{did_you_mean(name, outputs)}"
                 )
             columns[name] = np.array(outputs[name], dtype=np.float64)
@@ -241,14 +245,14 @@ class FunctionModel:
         return Trajectory(times, columns, {v.name: v.unit for v in self.info.outputs if v.unit})
 
     def close(self) -> None:
-        """Do nothing: a function holds nothing open."""
+        """Nothing to release: a function opens no processes or files."""
 
 
 def check_finite(model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]]) -> None:
-    """Refuse NaN and inf in outputs.
+    """Reject outputs that contain NaN or inf.
 
     Raises:
-        SimulationError: naming the signal and the first time at which it is not finite.
+        SimulationError: naming the output and the first time at which it is not finite.
     """
     for name, column in columns.items():
         finite = np.isfinite(column)

@@ -1,23 +1,24 @@
-"""What may be a secret, and how it is kept out of records, messages and other processes."""
+"""Which options, variables and texts may hold secrets, and how these stay out of records and messages."""
 
 import os
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-# Options of litellm that carry a key, or may.
+# Options of litellm that carry or may carry a key.
 _OPTION_NAMES = frozenset({"api_key", "headers", "extra_headers", "default_headers", "extra_body"})
 _OPTION_NAME = re.compile(
     r"(^|_)(key|secret|password|credentials?|token|authorization|cookie)$", re.IGNORECASE
 )
-# Licence servers and run-time folders of exporting tools must stay, so variables are judged one by one.
+# FMUs may need variables of their exporting tool (licence server, runtime folder), so only variables whose
+# name or value looks like a secret are removed.
 _VARIABLE_NAME = re.compile(
     r"KEY|TOKEN|SECRET|PASS(?!IVE|AGE)|_PWD$|CREDENTIAL|AUTH|COOKIE|PRIVATE|BEARER|JWT|(^|_)PAT$"
     r"|^(AWS|AZURE|GOOGLE|OPENAI|ANTHROPIC|MISTRAL|GEMINI|COHERE|HF|GITHUB|GITLAB|VAULT|LITELLM|DATABASE)_",
     re.IGNORECASE,
 )
-# The shapes of well-known keys: OpenAI and its kin, Hugging Face, Groq, xAI, NVIDIA, Perplexity, Google,
-# GitHub, GitLab, Slack, AWS, PEM files, JSON web tokens.
+# Shapes of well-known keys: OpenAI and providers with the same format, Hugging Face, Groq, xAI, NVIDIA,
+# Perplexity, Google, GitHub, GitLab, Slack, AWS, PEM files, JSON web tokens.
 _KEY_SHAPES = (
     r"(?<![a-zA-Z0-9])(?:sk|pk|rk)-[\w*-]{8,}",
     r"\b(?:hf|gsk|pplx|nvapi|xai)[-_][\w*-]{8,}",
@@ -42,9 +43,9 @@ _IN_TEXT = re.compile(
         )
     )
 )
-# Variables of the environment whose values are taken out of texts.
+# Endings of environment variables whose values are removed from texts.
 _KEY_VARIABLES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
-# Shorter values are words that happen to be set, and taking them out would garble messages.
+# Shorter values are more likely ordinary words; removing them would garble messages.
 _SHORTEST = 6
 _REDACTED = "[redacted]"
 
@@ -59,12 +60,12 @@ def is_secret_option(name: str) -> bool:
 
 
 def without_secrets(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as they may be recorded: the values of those that may hold a secret are replaced."""
+    """Return the options as they may be recorded, with every value that may be a secret replaced."""
     return {name: _REDACTED if is_secret_option(name) else value for name, value in options.items()}
 
 
 def secrets_in(options: Mapping[str, Any]) -> list[str]:
-    """Values of the options that may hold a secret, for redact."""
+    """Return the values of all options that may hold a secret, as strings for ``redact``."""
     found: list[str] = []
     for name, value in options.items():
         if is_secret_option(name):
@@ -73,8 +74,9 @@ def secrets_in(options: Mapping[str, Any]) -> list[str]:
 
 
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
-    """Text without keys: the given ones, those in the environment, and what looks like one."""
+    """Return the text with secrets replaced: those given, those in the environment, and well-known keys."""
     environment = (v for k, v in os.environ.items() if k.upper().endswith(_KEY_VARIABLES))
+    # Longest first: a secret that contains another one would otherwise be left in pieces.
     for secret in sorted({*secrets, *environment}, key=len, reverse=True):
         if len(secret) >= _SHORTEST:
             text = text.replace(secret, _REDACTED)

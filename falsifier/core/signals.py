@@ -1,6 +1,6 @@
 """Input signals: control points, an interpolation between them, optionally sampled and held.
 
-A :class:`Signal` is the one form in which every engine, every file and every model speaks of an input::
+Engines, files and models all represent an input as a :class:`Signal`::
 
     full_throttle = Signal.evenly((100.0,) * 7, stop_time=50.0)
     full_throttle.sample(np.linspace(0, 50, 5001))
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 Interpolation = Literal["pchip", "linear", "constant"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
-# A grid time such as 0.15 = 3 * 0.05 falls short of its multiple by rounding; seconds.
+# Added before rounding down: in floating point 0.15 / 0.05 is slightly less than 3. In s, or in hold periods.
 _TIME_ROUNDING = 1e-9
 
 
@@ -32,10 +32,10 @@ class Signal:
         values: control-point values in the input's unit, as many as times.
         interpolation: ``pchip`` (scipy's PchipInterpolator), ``linear``, or ``constant`` (each value is held
             until the next control point). After the last control point its value is kept.
-        hold: sampling period in s; the interpolated signal is sampled and held with it. None: continuous.
+        hold: period in s at which the interpolated signal is sampled and held; None: it is not held.
 
     Raises:
-        ValueError: for unequal lengths, times that do not increase from 0, or values that are not finite.
+        ValueError: if the lengths differ, the times do not increase from 0, or a value is not finite.
     """
 
     times: tuple[float, ...]
@@ -68,12 +68,12 @@ class Signal:
         interpolation: Interpolation = "pchip",
         hold: float | None = None,
     ) -> "Signal":
-        """Return the signal with evenly spaced control points over [0, stop_time] (see even_times)."""
+        """Return the signal with evenly spaced control points over [0, stop_time]; see ``even_times``."""
         times = even_times(len(values), stop_time=stop_time, interpolation=interpolation)
         return cls(times, tuple(float(v) for v in values), interpolation, hold)
 
     def sample(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the given times in s, shape as times."""
+        """Return the values at the given times in s, same shape as ``times``."""
         at = np.asarray(times, dtype=np.float64)
         if len(self.times) == 1:
             return np.full(at.shape, self.values[0])
@@ -83,11 +83,11 @@ class Signal:
         return _interpolate(self, at)
 
     def pieces(self, stop_time: float) -> NDArray[np.float64]:
-        """The signal on [0, stop_time] as cubic pieces, for solvers that evaluate it at times of their own.
+        """Return the signal on [0, stop_time] as cubic pieces, for solvers that choose their own times.
 
         Returns:
             One row per piece, shape (n, 5): its start time s in s, and the coefficients of 1, (t - s),
-            (t - s)**2 and (t - s)**3. The last piece has no end.
+            (t - s)**2 and (t - s)**3. The last piece extends indefinitely.
         """
         if self.hold is not None and len(self.times) > 1:
             values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
@@ -102,7 +102,7 @@ class Signal:
         return _pchip(self.times, self.values).copy()
 
     def held(self, hold: float | None) -> "Signal":
-        """Return the same signal sampled and held with this period in s."""
+        """Return the same signal, sampled and held with this period in s; None: not held."""
         return replace(self, hold=hold)
 
     @property
@@ -119,10 +119,10 @@ class Signal:
 
 @lru_cache(maxsize=256)
 def even_times(count: int, *, stop_time: float, interpolation: Interpolation) -> tuple[float, ...]:
-    """Times in s of evenly spaced control points.
+    """Return the times in s of evenly spaced control points.
 
-    Interpolated signals have points at both ends of [0, stop_time]; constant pieces are equally long, so
-    their last point lies one piece before the end. One point is at 0.
+    Interpolated signals have control points at both ends of [0, stop_time]. Constant pieces are equally long,
+    so their last control point is one piece before the end. A single control point is at 0.
     """
     if count < 1:
         raise ValueError(f"a signal needs at least one control point, got {count}")
@@ -130,10 +130,10 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
     return tuple(stop_time * i / pieces for i in range(count))
 
 
-# A simulation and the columns of its inputs ask for the same values one after the other.
+# The same values are needed twice in succession: for the simulation and for the trajectory's input columns.
 @lru_cache(maxsize=16)
 def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
-    """Values at the first sampling instants of a held signal, shape (count,)."""
+    """Return the values at the first ``count`` sampling instants of a held signal, shape (count,)."""
     assert signal.hold is not None, "only held signals have sampling instants"
     values = _interpolate(signal, np.arange(count, dtype=np.float64) * signal.hold)
     values.flags.writeable = False
@@ -141,7 +141,7 @@ def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
 
 
 def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of a signal of two or more control points, whether or not it is held."""
+    """Return the interpolated values of a signal with two or more control points, ignoring its hold."""
     knots, values = np.asarray(signal.times), np.asarray(signal.values)
     if signal.interpolation == "linear":
         return np.asarray(np.interp(at, knots, values))
@@ -152,12 +152,12 @@ def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]
 
 @lru_cache(maxsize=256)
 def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.float64]:
-    """Pieces (see Signal.pieces) of the monotone cubic interpolant, the last one constant.
+    """Return the pieces (see ``Signal.pieces``) of the monotone cubic interpolant; the last one is constant.
 
-    Slopes after Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304, at the ends after Moler,
-    Numerical Computing with MATLAB (2004), 3.6: equal to scipy's PchipInterpolator.
+    Slopes as in Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304, end slopes as in Moler,
+    Numerical Computing with MATLAB (2004), section 3.6. The result equals scipy's PchipInterpolator.
     """
-    # Plain floats: with the few control points of a search, numpy's calls would cost more than the numbers.
+    # Plain floats: for the few control points of a search, numpy's overhead per call would dominate.
     steps = [b - a for a, b in pairwise(times)]
     secants = [(b - a) / h for (a, b), h in zip(pairwise(values), steps, strict=True)]
     slopes = _inner_slopes(steps, secants)
@@ -176,7 +176,7 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
 
 
 def _inner_slopes(steps: list[float], secants: list[float]) -> list[float]:
-    """Weighted harmonic means of the slopes on both sides; 0 at a peak, a valley or a level piece."""
+    """Return weighted harmonic means of the adjacent secants; 0 at a peak, in a valley or on a flat piece."""
     slopes = []
     for (h, next_h), (left, right) in zip(pairwise(steps), pairwise(secants), strict=True):
         if left * right <= 0.0:
@@ -188,7 +188,7 @@ def _inner_slopes(steps: list[float], secants: list[float]) -> list[float]:
 
 
 def _end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
-    """Three-point slope at an end, limited so that the curve keeps its shape."""
+    """Return the three-point slope at an end, limited to preserve the shape of the data."""
     slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
     if slope * secant <= 0.0:
         return 0.0
@@ -204,7 +204,7 @@ def _constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -
 
 
 def _evaluate(table: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of pieces at times from 0, shape as at."""
+    """Return the values of the pieces at times >= 0, same shape as ``at``."""
     order = np.searchsorted(table[1:, 0], at, side="right")
     start, c0, c1, c2, c3 = table.T
     dt = at - start[order]

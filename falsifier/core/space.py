@@ -1,7 +1,7 @@
 """Search spaces: what may be varied, by name, with ranges and parameterizations.
 
-Where every parameterization is fixed, the search space is also a named box, and ``decode``/``encode`` go back
-and forth between candidates and vectors.
+If every parameterization is fixed, the search space is also a named box; ``decode`` and ``encode`` convert
+between vectors and candidates.
 """
 
 from collections.abc import Sequence
@@ -18,18 +18,18 @@ from falsifier.errors import CandidateError, did_you_mean
 
 ValueKind = Literal["real", "integer", "boolean", "enumeration"]
 
-# How far a value may leave its range, as a share of the range, before it is refused instead of clipped:
-# bounds that were printed with six digits come back rounded outward.
+# Values outside their range by at most this share of it are clipped, others rejected: bounds that were
+# printed with six digits may come back rounded outwards.
 _ROUNDING_SHARE = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """Limits within which engines may choose an input's control points and interpolation themselves.
+    """Limits within which engines may choose an input's control points and interpolation.
 
     Attributes:
-        max_control_points: most control points.
-        min_interval: shortest time in s between two control points.
+        max_control_points: maximum number of control points.
+        min_interval: minimum time in s between two control points.
     """
 
     max_control_points: int
@@ -45,13 +45,13 @@ class InputRange:
         low: lower bound in the input's unit.
         high: upper bound.
         control_points: number of evenly spaced control points of the fixed parameterization.
-        interpolation: between control points.
+        interpolation: interpolation between the control points.
         hold: sample-and-hold period in s, or None.
-        free: limits of a free parameterization, or None where only the fixed one is allowed.
-        unit: the input's unit, empty where unknown.
-        description: what it means, from the model.
-        kind: what its values are; all but reals are whole numbers, which are held between control points.
-        items: names and numbers of an enumeration.
+        free: limits of a free parameterization, or None if only the fixed one is allowed.
+        unit: the input's unit, empty if unknown.
+        description: its meaning, from the model.
+        kind: type of its values; every type except real has integer values, held between control points.
+        items: names and numbers of an enumeration's items.
     """
 
     name: str
@@ -70,17 +70,17 @@ class InputRange:
 
 @dataclass(frozen=True, slots=True)
 class ParameterRange:
-    """One searched parameter or initial state: a plain number.
+    """One searched parameter or initial state: a single number.
 
     Attributes:
         name: the parameter's name in the model.
         low: lower bound in the parameter's unit.
         high: upper bound.
-        nominal: its value when nothing is searched, where known.
-        unit: its unit, empty where unknown.
-        description: what it means, from the model.
-        kind: what its value is; all but reals are whole numbers.
-        items: names and numbers of an enumeration.
+        nominal: its value if it is not searched, if known.
+        unit: its unit, empty if unknown.
+        description: its meaning, from the model.
+        kind: type of its value; every type except real has integer values.
+        items: names and numbers of an enumeration's items.
     """
 
     name: str
@@ -99,8 +99,8 @@ class Dimension:
     """One coordinate of the vector form.
 
     Attributes:
-        name: of the input or parameter.
-        time: of the control point in s; None for a parameter.
+        name: name of the input or parameter.
+        time: time of the control point in s; None for a parameter.
         low: lower bound.
         high: upper bound.
         unit: unit of the value.
@@ -129,12 +129,12 @@ class SearchSpace:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of inputs, then of parameters."""
+        """Names of the inputs, then of the parameters."""
         return (*(r.name for r in self.inputs), *(p.name for p in self.parameters))
 
     @property
     def fixed(self) -> "SearchSpace":
-        """The same space with only the spec's own control points allowed."""
+        """The same space, with only the control points of the spec allowed."""
         return replace(self, inputs=tuple(replace(r, free=None) for r in self.inputs))
 
     @property
@@ -151,20 +151,20 @@ class SearchSpace:
         return np.array([(d.low, d.high) for d in self.dimensions], dtype=np.float64).reshape(-1, 2)
 
     def fixed_times(self, r: InputRange) -> tuple[float, ...]:
-        """Times in s of the control points that the spec gives an input."""
+        """Return the times in s of the control points that the spec defines for an input."""
         return even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
 
     def is_fixed(self, r: InputRange, signal: Signal) -> bool:
-        """Whether a signal has the control points of the spec, rather than some of an engine's choice."""
+        """Whether a signal has the control points of the spec, not some that an engine chose."""
         return signal.interpolation == r.interpolation and signal.times == self.fixed_times(r)
 
     def decode(
         self, vector: Sequence[float] | NDArray[np.float64], *, origin: str = "", rationale: str = ""
     ) -> Candidate:
-        """Candidate of a point of the box, shape (d,).
+        """Return the candidate for a point of the box, shape (d,).
 
         Raises:
-            CandidateError: when the vector has the wrong length or leaves the box by more than rounding.
+            CandidateError: if the vector has the wrong length or is outside the box by more than rounding.
         """
         values = [float(v) for v in vector]
         expected = sum(r.control_points for r in self.inputs) + len(self.parameters)
@@ -184,7 +184,7 @@ class SearchSpace:
         return self.admit(Candidate(signals, parameters, origin, rationale))
 
     def encode(self, candidate: Candidate) -> NDArray[np.float64]:
-        """Vector form of a candidate, shape (d,); free signals are sampled at the fixed times."""
+        """Return the vector form of a candidate, shape (d,); free signals are sampled at the fixed times."""
         parts: list[float] = []
         for r in self.inputs:
             signal = candidate.signals[r.name]
@@ -199,8 +199,8 @@ class SearchSpace:
     def admit(self, candidate: Candidate) -> Candidate:
         """Return the candidate as it will be simulated.
 
-        Values within a rounding error of a bound are clipped to it; integers, Booleans and enumerations get
-        the nearest number that they can have; each input gets its hold.
+        Values outside their range by no more than a rounding error are clipped; integers, Booleans and
+        enumerations are rounded to the nearest allowed number; each input gets its hold.
 
         Raises:
             CandidateError: naming the input or parameter that is unknown, missing or outside its range, or
@@ -249,23 +249,23 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
         )
     if r.kind != "real" and signal.interpolation != "constant" and count > 1:
         raise CandidateError(
-            f"input {r.name!r}: values of kind {r.kind} cannot be interpolated with "
-            f'{signal.interpolation}: use "constant"'
+            f"input {r.name!r}: values of type {r.kind} cannot have {signal.interpolation} interpolation; "
+            f'use "constant"'
         )
     if count > r.free.max_control_points:
         raise CandidateError(
-            f"input {r.name!r}: {count} control points, at most {r.free.max_control_points} are allowed"
+            f"input {r.name!r}: {count} control points; at most {r.free.max_control_points} are allowed"
         )
     gaps = np.diff(signal.times)
     if gaps.size and gaps.min() < r.free.min_interval * (1 - 1e-6):
         k = int(gaps.argmin())
         raise CandidateError(
             f"input {r.name!r}: control points at {signal.times[k]:g} s and {signal.times[k + 1]:g} s are "
-            f"closer than {r.free.min_interval:g} s"
+            f"less than {r.free.min_interval:g} s apart"
         )
     if signal.times[-1] > stop_time * (1 + 1e-9):
         raise CandidateError(
-            f"input {r.name!r}: control point at {signal.times[-1]:g} s lies behind the stop time "
+            f"input {r.name!r}: the control point at {signal.times[-1]:g} s is after the stop time "
             f"{stop_time:g} s"
         )
 
@@ -277,7 +277,7 @@ def _are_close(times: Sequence[float], others: Sequence[float], tolerance: float
 
 
 def nearest_value(ranged: InputRange | ParameterRange, value: float) -> float:
-    """Nearest number that an input or parameter can have; the value itself where it is a real."""
+    """Return the nearest number that an input or parameter can take; for reals, the value itself."""
     if ranged.kind == "real":
         return value
     if ranged.items:

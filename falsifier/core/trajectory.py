@@ -1,4 +1,4 @@
-"""Trajectories: sampled times and named columns, as simulated."""
+"""Trajectories: sampled times and one named column per signal."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,9 +16,9 @@ class Trajectory:
 
     Attributes:
         times: sample times in s, shape (n,), from 0 with a constant step.
-        columns: one array of shape (n,) per signal, by name; Booleans and integers as numbers.
-        units: unit by signal name, where known.
-        log: what the model said while it was simulated.
+        columns: one array of shape (n,) per signal, by name; Booleans and integers are stored as floats.
+        units: units by signal name; signals without a known unit are missing.
+        log: messages of the model during the simulation.
     """
 
     times: NDArray[np.float64]
@@ -31,7 +31,7 @@ class Trajectory:
             if column.shape != self.times.shape:
                 raise MonitorError(
                     f"signal {name!r} has {column.shape[0] if column.ndim else 0} samples, "
-                    f"the time grid has {self.times.shape[0]}"
+                    f"expected {self.times.shape[0]} as in the time grid"
                 )
 
     def __len__(self) -> int:
@@ -56,22 +56,22 @@ class Trajectory:
         return float(self.times[-1] - self.times[0]) / (len(self) - 1) if len(self) > 1 else 0.0
 
     def index(self, time: float) -> int:
-        """Index of the sample nearest to this time in s."""
+        """Return the index of the sample nearest to this time in s."""
         return int(np.argmin(np.abs(self.times - time)))
 
     def at(self, time: float) -> dict[str, float]:
-        """Values of all signals at the sample nearest to this time in s."""
+        """Return the values of all signals at the sample nearest to this time in s."""
         k = self.index(time)
         return {name: float(column[k]) for name, column in self.columns.items()}
 
     def with_columns(
         self, columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str] | None = None
     ) -> "Trajectory":
-        """Return this trajectory with further columns behind its own."""
+        """Return this trajectory with further columns appended."""
         return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})}, self.log)
 
     def save(self, path: Path) -> None:
-        """Write the trajectory as a numpy archive."""
+        """Write the trajectory, without its log, to a numpy archive (``.npz``)."""
         names = np.array(self.names)
         units = np.array([self.units.get(n, "") for n in self.names])
         stacked = (
@@ -81,7 +81,7 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: Path) -> "Trajectory":
-        """Read a trajectory that save wrote."""
+        """Read a trajectory that ``save`` wrote."""
         with np.load(path, allow_pickle=False) as archive:
             names = [str(n) for n in archive["names"]]
             columns = archive["columns"]

@@ -1,4 +1,4 @@
-"""Candidates in words: the same words on the terminal, in notebooks, in reports and in notes to an LLM."""
+"""Candidates in words, the same on the terminal, in notebooks, in reports and in messages to an LLM."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,18 +8,18 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
 
-# Control points told in full; longer signals are cut in the middle.
+# Maximum number of control points shown; longer signals are abbreviated in the middle.
 _SHOWN_POINTS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What a candidate says of one input or parameter.
+    """A candidate's choice for one input or parameter.
 
     Attributes:
         role: ``input`` or ``parameter``.
-        name: of the input or parameter.
-        unit: of its values, empty where unknown.
+        name: name of the input or parameter.
+        unit: unit of its values, empty if unknown.
         text: its values in words.
     """
 
@@ -30,12 +30,12 @@ class Choice:
 
     @property
     def label(self) -> str:
-        """Name and unit."""
+        """Name, with the unit in brackets if known."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
 def choices(candidate: Candidate, space: SearchSpace | None = None) -> list[Choice]:
-    """What a candidate says, inputs first; units come from the search space."""
+    """Return a candidate's choices, inputs first; the units come from the search space."""
     units: dict[str, str] = {}
     if space is not None:
         units |= {r.name: r.unit for r in space.inputs} | {p.name: p.unit for p in space.parameters}
@@ -46,7 +46,7 @@ def choices(candidate: Candidate, space: SearchSpace | None = None) -> list[Choi
 
 
 def candidate_lines(candidate: Candidate, space: SearchSpace) -> list[str]:
-    """One aligned line per input and parameter."""
+    """Return one aligned line per input and parameter."""
     return [
         f"{c.role:<14} {c.label}{' =' if c.role == 'parameter' else ''} {c.text}"
         for c in choices(candidate, space)
@@ -54,14 +54,16 @@ def candidate_lines(candidate: Candidate, space: SearchSpace) -> list[str]:
 
 
 def in_one_line(candidate: Candidate, space: SearchSpace | None = None) -> str:
-    """A candidate in one line."""
+    """Return a candidate in one line."""
     return "; ".join(
         f"{c.label}{' =' if c.role == 'parameter' else ''} {c.text}" for c in choices(candidate, space)
     )
 
 
 def signal_text(signal: Signal) -> str:
-    """Control points of a signal, and how lively it is: a reader judges how plausible that is.
+    """Return the control points of a signal, its number of switches and its shortest dwell.
+
+    Switches and dwell help the reader judge whether the signal is plausible on the real system.
 
     >>> signal_text(Signal((0.0, 2.5), (100.0, 0.0), "constant"))
     'constant: 100 at 0 s, 0 at 2.5 s (1 switch)'
@@ -80,7 +82,7 @@ def signal_text(signal: Signal) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """A number of things, in the singular or plural.
+    """Return a count and its noun, in the singular or plural.
 
     >>> counted(1, "switch"), counted(2, "switch"), counted(0, "simulation")
     ('1 switch', '2 switches', '0 simulations')
@@ -90,7 +92,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def listed(parts: Sequence[str]) -> str:
-    """Several things as a sentence has them.
+    """Join parts as in a sentence.
 
     >>> listed(["a"]), listed(["a", "b", "c"])
     ('a', 'a, b and c')

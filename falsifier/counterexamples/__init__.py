@@ -1,1 +1,1 @@
-"""What was found: stored, simplified, explained, looked around and exported."""
+"""What is done with a counterexample: store, replay, shrink, explain, map its surroundings, export."""

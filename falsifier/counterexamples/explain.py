@@ -1,7 +1,7 @@
-"""Why a counterexample violates: what decided it, and which inputs and parameters it takes.
+"""Why a counterexample violates: what decided it, and which inputs and parameters are necessary.
 
-The way from the formula to the deciding predicate comes from the monitor. Which inputs matter comes from
-ablation: each signal, each of its stretches and each parameter is put back to rest, alone, and the model is
+The monitor provides the path from the formula to the deciding predicate. Ablation shows which inputs matter:
+each signal, each of its stretches and each parameter is reset to rest, one at a time, and the model is
 simulated again.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange
-from falsifier.core.words import candidate_lines, listed
+from falsifier.core.words import candidate_lines
 from falsifier.counterexamples.shrink import constant_signal, stretches, with_signal
 from falsifier.counterexamples.simplicity import rest_value
 from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
     from falsifier.llm.messages import Chat
 
 _NARRATOR = (
-    "You explain to a control engineer why a simulated system violates a requirement. Tell in one short "
-    "paragraph of plain text what happens over time and which inputs bring it about. Use only what you are "
-    "given; say what you merely suppose."
+    "You explain to a control engineer why a simulated system violates a requirement. Describe in one short "
+    "paragraph of plain text what happens over time and which inputs cause it. Use only the information "
+    "given, and mark assumptions as such."
 )
-# Rows of the trajectory that a language model is shown, beside the critical one.
+# Rows of the trajectory shown to a language model, in addition to the critical one.
 _ROWS = 21
-# Stretches of one signal that are put back one by one; the longest are taken.
-_MOST_STRETCHES = 12
+# Maximum number of stretches of one signal that are reset one at a time; the longest are chosen.
+_MAX_STRETCHES = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What happens when one part of a counterexample is put back.
+    """What happens if one part of a counterexample is reset.
 
     Attributes:
-        name: of the input or parameter.
-        span: begin and end in s of what was put back; None for a parameter or a whole signal.
-        instead: the value that it was put back to.
-        is_rest: whether that is the value at rest; otherwise it is the middle of the range.
-        was_rest: whether the part was at rest in the counterexample.
-        robustness: then; None when the simulation failed.
+        name: name of the input or parameter.
+        span: start and end in s of the reset part; None for a parameter or a whole signal.
+        instead: the value it was reset to.
+        is_rest: whether that is the rest value; otherwise it is the middle of the range.
+        was_rest: whether the part was already at rest in the counterexample.
+        robustness: robustness after the reset; None if the simulation failed.
     """
 
     name: str
@@ -57,24 +57,19 @@ class Effect:
 
     @property
     def needed(self) -> bool:
-        """Whether the violation vanishes without this part."""
+        """Whether the violation disappears without this part."""
         return self.robustness is not None and self.robustness >= 0
-
-    @property
-    def part(self) -> str:
-        """What was put back, in words."""
-        return f"{self.name} at rest" if self.was_rest else self.name
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What a counterexample shows.
+    """Why a counterexample violates.
 
     Attributes:
-        problem: what it violates.
+        problem: the problem whose requirement is violated.
         evaluation: the counterexample.
-        diagnosis: the way from the formula to the predicate that decided.
-        effects: of putting parts back: whole signals and parameters, then stretches.
+        diagnosis: the path from the formula to the deciding predicate.
+        effects: effects of resetting parts: whole signals and parameters, then stretches.
     """
 
     problem: Problem
@@ -84,11 +79,11 @@ class Explanation:
 
     @property
     def text(self) -> str:
-        """One paragraph."""
+        """The explanation in one paragraph."""
         requirement = self.problem.requirement
         demand = requirement.description or in_words(requirement.formula)
         sentences = [
-            f"{self.problem.name} demands: {demand.rstrip('.')}.",
+            f"{self.problem.name} requires: {demand.rstrip('.')}.",
             f"It is violated by {-self.diagnosis.robustness:.5g}: {self.diagnosis.text}",
             *self._effect_sentences(),
         ]
@@ -97,54 +92,61 @@ class Explanation:
     def _effect_sentences(self) -> Iterator[str]:
         whole = [e for e in self.effects if e.span is None]
         needed = sorted((e for e in whole if e.needed), key=lambda e: -(e.robustness or 0.0))
-        if needed:
-            yield f"It takes {listed([self._part(e) for e in needed])}."
-        idle = [e for e in whole if e.robustness is not None and not e.needed]
-        if idle:
-            yield f"It does not need {listed([self._without(e) for e in idle])}."
+        for e in needed:
+            yield f"{self._part(e)} is necessary: {self._instead(e)} robustness would be {e.robustness:+.4g}."
+        for e in whole:
+            if e.robustness is not None and not e.needed:
+                part, instead = self._part(e), self._instead(e)
+                yield f"{part} is not necessary: {instead} robustness would still be {e.robustness:+.4g}."
         for name in dict.fromkeys(e.name for e in needed):
             spans = [e for e in self.effects if e.name == name and e.span is not None]
             decisive = [e for e in spans if e.needed]
-            if decisive and len(decisive) < len(spans):
-                yield f"Of {name}, what counts is {listed([self._stretch(e) for e in decisive])}."
-        failed = [e.name for e in whole if e.robustness is None]
-        if failed:
-            yield f"Without {listed(failed)} the simulation fails."
+            if len(decisive) < len(spans):  # otherwise the whole signal matters, as stated already
+                yield from map(self._stretch, decisive)
+        for e in whole:
+            if e.robustness is None:
+                yield f"With {e.name} {self._instead(e)} the simulation fails."
 
     def _part(self, effect: Effect) -> str:
-        return f"{effect.part} ({self._instead(effect)} the robustness is {effect.robustness:+.4g})"
-
-    def _without(self, effect: Effect) -> str:
-        return f"{effect.part} ({self._instead(effect)} it is still {effect.robustness:+.4g})"
+        """The part at the start of a sentence."""
+        part = _capitalized(effect.name)
+        return f"{part} {self._rest(effect)}" if effect.was_rest else part
 
     def _stretch(self, effect: Effect) -> str:
         start, end = effect.span or (0.0, 0.0)
-        return f"{start:.4g} to {end:.4g} s ({self._instead(effect)} {effect.robustness:+.4g})"
+        return (
+            f"{_capitalized(effect.name)} is decisive from {start:.4g} to {end:.4g} s: "
+            f"{self._instead(effect)} during that time robustness would be {effect.robustness:+.4g}."
+        )
 
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
         number = f"{effect.instead:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
-        return f"at {number}, {'its rest value' if effect.is_rest else 'the middle of its range'},"
+        return f"{self._rest(effect) if effect.is_rest else 'at the middle of its range'} ({number})"
+
+    def _rest(self, effect: Effect) -> str:
+        is_parameter = any(p.name == effect.name for p in self.problem.space.parameters)
+        return "at its nominal value" if is_parameter else "at rest"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
-    """Diagnose a counterexample and put its parts back one by one.
+    """Diagnose a counterexample and reset its parts one at a time.
 
     Raises:
-        ValueError: when the evaluation has no trajectory.
+        ValueError: if the evaluation has no trajectory.
     """
     if evaluation.trajectory is None:
-        raise ValueError("a simulation that failed cannot be explained")
+        raise ValueError("a failed simulation cannot be explained: pass an evaluation with a trajectory")
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
     effects = tuple(_effects(problem, evaluation.candidate))
     return Explanation(problem, evaluation, diagnosis, effects)
 
 
 def narrate(explanation: Explanation, chat: "Chat") -> str:
-    """Have a language model tell an engineer what happens, from the findings and the trajectory alone.
+    """Let a language model describe what happens, given only the findings and the trajectory.
 
     Raises:
-        ChatError: when the LLM gives no answer.
+        ChatError: if the LLM gives no reply.
     """
     from falsifier.llm.conversation import converse
     from falsifier.llm.messages import ChatRequest, Message
@@ -157,7 +159,7 @@ def narrate(explanation: Explanation, chat: "Chat") -> str:
 
 
 def _findings(explanation: Explanation) -> str:
-    """What the language model is told: system, findings, inputs and a few rows of the trajectory."""
+    """The text for the language model: system, findings, inputs and a few rows of the trajectory."""
     problem, evaluation = explanation.problem, explanation.evaluation
     trajectory = evaluation.trajectory
     assert trajectory is not None
@@ -212,7 +214,7 @@ def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
 
 @dataclass(frozen=True, slots=True)
 class _Nominal:
-    """What an input or parameter is put back to."""
+    """The value that an input or parameter is reset to."""
 
     name: str
     value: float
@@ -224,7 +226,7 @@ class _Nominal:
 
 
 def _nominal(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]) -> _Nominal:
-    """Rest, or the middle of the range where rest is unknown or everything is at rest already."""
+    """Rest, or the middle of the range if rest is unknown or all values are at rest already."""
     rest = rest_value(problem, ranged.name)
     was_rest = rest is not None and all(v == rest for v in values)
     if rest is not None and not was_rest:
@@ -233,19 +235,24 @@ def _nominal(problem: Problem, ranged: InputRange | ParameterRange, values: tupl
 
 
 def _longest(signal: Signal) -> list[tuple[int, int]]:
-    """Stretches of equal values in time order, the longest where they are many; none where there is one."""
+    """The longest stretches of equal values, in time order; none for a constant signal."""
     found = stretches(signal.values)
     if len(found) < 2:
         return []
-    return sorted(sorted(found, key=lambda s: s[0] - s[1])[:_MOST_STRETCHES])
+    return sorted(sorted(found, key=lambda s: s[0] - s[1])[:_MAX_STRETCHES])
 
 
 def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float, float]:
-    """Time over which control points reach: between the neighbours that stay, or until the next step."""
+    """Interval in s that control points influence: between the unchanged neighbours, or to the next step."""
     finish = signal.times[end] if end < len(signal.times) else stop_time
     if signal.interpolation == "constant":
         return signal.times[first], finish
     return signal.times[max(first - 1, 0)], finish
+
+
+def _capitalized(name: str) -> str:
+    """Name at the start of a sentence; only plain words are capitalized: ``u`` is not ``U``."""
+    return name.capitalize() if len(name) > 1 and name.isalpha() and name.islower() else name
 
 
 def _robustness(problem: Problem, candidate: Candidate) -> float | None:

@@ -1,4 +1,4 @@
-"""One requirement as a test: what was found before is run first, then a bounded search looks for more."""
+"""One requirement as a test: replays stored counterexamples first, then searches within a budget."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +15,14 @@ from falsifier.search.run import falsify
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What became of a requirement.
+    """Result of a check.
 
     Attributes:
         problem: what was checked.
         counterexample: a confirmed violation, or None.
         file: where it is stored, or None.
-        replayed: what became of the stored counterexamples, up to the first that violates.
-        result: of the search; None where a stored counterexample violates.
+        replayed: results of the stored counterexamples, up to the first that still violates.
+        result: result of the search; None if a stored counterexample still violates.
     """
 
     problem: Problem
@@ -40,17 +40,18 @@ def check(
     seed: int = 0,
     database: Database | None = None,
 ) -> Checked:
-    """Run the stored counterexamples, then search; a new counterexample is shrunk and stored.
+    """Replay the stored counterexamples, then search; a new counterexample is shrunk and stored.
 
     Args:
         problem: what to check.
-        engine: name of an engine that needs no language model; None: the default one.
-        budget: of the search; shrinking may use as many simulations again.
-        seed: of the engine.
+        engine: name of an engine that does not use a language model; None: the default engine.
+        budget: limits of the search; shrinking may use the same number of simulations again.
+        seed: seed of the engine.
         database: where counterexamples are stored; None: nowhere.
 
     Raises:
-        SimulationError: when a stored counterexample cannot be simulated, or nothing of the search can.
+        SimulationError: if a stored counterexample cannot be simulated, or every simulation of the search
+            fails.
     """
     replayed: list[Replayed] = []
     for path, stored in database.fetch(problem) if database else ():
@@ -69,7 +70,7 @@ def check(
 
 
 def _smallest(problem: Problem, found: Confirmation, spent: int, budget: Budget | int) -> Confirmation:
-    """Shrunk counterexample, confirmed; the one that was found where that does not work out."""
+    """The shrunk counterexample if it is confirmed, otherwise the original."""
     limit = budget.simulations if isinstance(budget, Budget) else budget
     shrunk = shrink(problem, found.evaluation, budget=limit or 2 * spent)
     again = confirm(problem, shrunk.evaluation)

@@ -1,7 +1,7 @@
-"""The neighbourhood of a counterexample: how far its inputs may move before the violation is gone.
+"""The neighbourhood of a counterexample: how far its inputs may change before the violation disappears.
 
-What moves are the stretches of equal values of each input, and the parameters; times and interpolation stay.
-Changes are measured as shares of the ranges, the largest of them counts.
+The values of each input, one per stretch of equal values, and the parameters are changed; times and
+interpolation are not. The size of a change is the largest share of a range by which any value changes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,28 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted, listed
 from falsifier.counterexamples.shrink import stretches, with_signal
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
-# Sizes of the changes as shares of the radius: each takes its part of the samples.
+# Maximum sizes of the changes as shares of the radius; each is used for an equal part of the samples.
 _SHELLS = (0.125, 0.25, 0.5, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """Something that moves.
+    """One value that is changed.
 
     Attributes:
-        name: of the input or parameter.
+        name: name of the input or parameter.
         first: index of the stretch's first control point; None for a parameter.
-        end: index behind its last one.
-        time: of the first control point in s, None for a parameter or a constant signal.
-        value: in the counterexample.
+        end: index after its last control point; None for a parameter.
+        time: time of the first control point in s; None for a parameter or a constant signal.
+        value: value in the counterexample.
         low: lower bound.
         high: upper bound.
-        unit: of the value.
+        unit: unit of the value.
     """
 
     name: str
@@ -57,15 +58,15 @@ class RobustnessMap:
 
     Attributes:
         original: robustness of the counterexample.
-        coordinates: what moved.
+        coordinates: the values that are changed.
         radius: largest change as a share of the range.
-        values: of the coordinates, shape (samples, coordinates).
-        sizes: largest change of each sample as a share of its range, shape (samples,).
-        robustness: of each sample, NaN where the simulation failed, shape (samples,).
-        axes: indices of the two coordinates that decide most; one where there is only one.
-        grid: values of these two, one array each.
-        surface: robustness over the grid, the others unchanged, shape (len(grid[1]), len(grid[0])) or, with
-            one axis, (1, len(grid[0])).
+        values: values of the coordinates, shape (samples, coordinates).
+        sizes: size of each sample's change as a share of the range, shape (samples,).
+        robustness: robustness of each sample, shape (samples,); NaN if the simulation failed.
+        axes: indices of the two most influential coordinates; one if there is only one.
+        grid: values of these coordinates, one array each.
+        surface: robustness over the grid, with the other coordinates unchanged, shape
+            (len(grid[1]), len(grid[0])), or (1, len(grid[0])) with one axis.
     """
 
     original: float
@@ -80,20 +81,20 @@ class RobustnessMap:
 
     @property
     def persistence(self) -> tuple[tuple[float, float], ...]:
-        """Pairs of a size and the share of the samples up to it that still violate."""
+        """Pairs of a size and the share of the changes up to that size that still violate."""
         sizes = [shell * self.radius for shell in _SHELLS]
         within = [self.robustness[self.sizes <= size * (1 + 1e-9)] for size in sizes]
         return tuple((size, float((r < 0).mean())) for size, r in zip(sizes, within, strict=True) if r.size)
 
     @property
     def text(self) -> str:
-        """How far the violation reaches, in words."""
-        shares = ", ".join(f"{share:.0%} up to {size:.3g}" for size, share in self.persistence)
-        names = " and ".join(self.coordinates[i].label for i in self.axes)
-        return (
-            f"Of {len(self.robustness)} changes of all inputs at once, still violating: {shares} of the "
-            f"range; what decides most: {names}."
-        )
+        """How far the violation extends, in words."""
+        (size, share), *larger = self.persistence
+        shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
+        shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
+        names = listed([self.coordinates[i].label for i in self.axes])
+        changes = counted(len(self.robustness), "random change")
+        return f"{shares} ({changes} of all inputs at once). Most influential: {names}."
 
 
 def robustness_map(
@@ -108,20 +109,23 @@ def robustness_map(
     """Simulate around a counterexample.
 
     Args:
-        problem: what it violates.
+        problem: the problem whose requirement is violated.
         evaluation: the counterexample.
         radius: largest change as a share of the range.
-        samples: simulations with all coordinates changed at once, by a scrambled Sobol sequence.
-        points: of the grid along each of the two coordinates that decide most.
-        seed: of the sequence.
+        samples: simulations with all coordinates changed at once, from a scrambled Sobol sequence.
+        points: grid points along each of the two most influential coordinates.
+        seed: seed of the sequence.
 
     Raises:
-        SpecError: for a failed simulation, or a radius, samples or points that are not positive.
+        SpecError: for a failed simulation, a radius outside (0, 1], or too few samples or grid points.
     """
     if evaluation.robustness is None:
-        raise SpecError(f"{problem.name}: a simulation that failed has no neighbourhood")
+        raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
     if not 0 < radius <= 1 or samples < 1 or points < 2:
-        raise SpecError("expected 0 < radius <= 1, at least one sample and at least two grid points")
+        raise SpecError(
+            "robustness map: expected 0 < radius <= 1, at least one sample and at least two grid points, got "
+            f"radius {radius:g}, samples {samples}, grid {points}"
+        )
     from scipy.stats.qmc import Sobol
 
     candidate = evaluation.candidate
@@ -131,7 +135,7 @@ def robustness_map(
     )
     reach = radius * (high - low)
     unit = Sobol(len(coordinates), seed=seed).random_base2((samples - 1).bit_length())[:samples]
-    # Block by block: taken in turn, the shells would fall together with the binary digits of the sequence.
+    # One block of samples per shell: alternating shells would correlate with the bits of the Sobol sequence.
     shell = np.array(_SHELLS)[np.arange(samples) * len(_SHELLS) // samples, np.newaxis] * reach
     below, above = np.maximum(start - shell, low), np.minimum(start + shell, high)
     values = below + unit * (above - below)
@@ -160,6 +164,15 @@ def robustness_map(
         grid,
         np.array(surface).reshape(-1, points),
     )
+
+
+def _percent(size: float) -> str:
+    """Share of a range as a percentage.
+
+    >>> _percent(0.00625), _percent(0.025), _percent(1.0)
+    ('0.6 %', '2.5 %', '100 %')
+    """
+    return f"{100 * size:.{1 if size < 0.01 else 3}g} %"
 
 
 def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]:
@@ -193,7 +206,7 @@ def _robustness(
 
 
 def _deciding(changes: NDArray[np.float64], robustness: NDArray[np.float64]) -> tuple[int, ...]:
-    """Indices of the two coordinates whose ranks go most with the robustness's."""
+    """Indices of the two coordinates whose ranks correlate most with those of the robustness."""
     known = np.isfinite(robustness)
     ranks = changes[known].argsort(axis=0).argsort(axis=0) - known.sum() / 2
     level = robustness[known].argsort().argsort() - known.sum() / 2

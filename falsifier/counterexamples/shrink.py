@@ -1,9 +1,9 @@
 """Shrinking: the simplest candidate near a counterexample that still violates.
 
-A pass proposes simpler candidates, purely and in a fixed order; each is simulated and the first that violates
-replaces the current one. When no pass finds anything any more, the candidate is a local minimum of the order
-in :mod:`falsifier.counterexamples.simplicity`. Nothing is random, so the same counterexample shrinks to the
-same one.
+A pass is a pure function that proposes simpler candidates in a fixed order; each is simulated, and the first
+that violates replaces the current one. If no pass finds a simpler one, the candidate is a local minimum of
+the order in :mod:`falsifier.counterexamples.simplicity`. Nothing is random: the same counterexample always
+shrinks to the same result.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,13 +25,13 @@ Progress = Callable[[Evaluation, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Shrunk:
-    """What became of a counterexample.
+    """Result of shrinking.
 
     Attributes:
-        original: the counterexample as it was.
-        evaluation: the simplest one that was found; the original where nothing simpler violates.
-        simulations: how many were spent.
-        minimal: whether no pass can make it simpler; False when the budget ended first.
+        original: the counterexample before shrinking.
+        evaluation: the simplest violation found; the original if nothing simpler violates.
+        simulations: number of simulations used.
+        minimal: whether no pass can make it simpler; False if the budget ended first.
     """
 
     original: Evaluation
@@ -48,24 +48,25 @@ def shrink(
     margin: float = 0.0,
     progress: Progress = lambda evaluation, simulations: None,
 ) -> Shrunk:
-    """Make a counterexample as simple as possible while it violates.
+    """Make a counterexample as simple as possible such that it still violates.
 
-    Where the original violates at half the communication step too, everything that it shrinks to does so.
+    If the original violates at half the communication step too, so does the result.
 
     Args:
-        problem: what it violates.
+        problem: the problem whose requirement is violated.
         evaluation: the counterexample.
-        budget: most simulations.
-        margin: the robustness must stay at or below its negative.
+        budget: maximum number of simulations.
+        margin: the robustness must stay at or below minus this value.
         progress: called with each simpler counterexample and the number of simulations so far.
 
     Raises:
-        SpecError: when the evaluation does not violate by that margin.
+        SpecError: if the evaluation does not violate by that margin.
     """
     hunt = _Hunt(problem, budget, margin)
     start = hunt.violation(problem.space.admit(evaluation.candidate))
     if start is None:
-        raise SpecError(f"nothing to shrink: {problem.name} is not violated by {margin:g} or more")
+        violated = f"violated by {margin:g} or more" if margin else "violated"
+        raise SpecError(f"nothing to shrink: {problem.name} is not {violated}")
     best, minimal = start, False
     try:
         hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
@@ -82,12 +83,12 @@ def shrink(
 
 
 class _BudgetUsedUpError(Exception):
-    """The next simulation would be one too many."""
+    """The next simulation would exceed the budget."""
 
 
 @dataclass(slots=True)
 class _Hunt:
-    """The simulations of one shrinking, counted and never repeated."""
+    """Counts the simulations of one shrinking and never repeats one."""
 
     problem: Problem
     budget: int
@@ -97,19 +98,19 @@ class _Hunt:
     _known: dict[object, Evaluation | None] = field(default_factory=dict)
 
     def first(self, propose: Pass, best: Evaluation) -> Evaluation | None:
-        """First violation among the simpler candidates that a pass proposes."""
+        """Find the first violation among the simpler candidates that a pass proposes."""
         limit = simplicity(self.problem, best.candidate)
         for proposal in propose(self.problem, best.candidate):
             try:
                 candidate = self.problem.space.admit(proposal)
-            except CandidateError:  # outside the range or the parameterization of this problem
+            except CandidateError:  # passes may propose values outside the problem's ranges
                 continue
             if simplicity(self.problem, candidate) < limit and (found := self.violation(candidate)):
                 return replace(found, candidate=replace(candidate, origin="shrink", rationale=""))
         return None
 
     def violation(self, candidate: Candidate) -> Evaluation | None:
-        """Evaluation of a candidate if it violates as demanded."""
+        """Simulate a candidate; return its evaluation if it violates by the margin, and at half the step."""
         if candidate.key not in self._known:
             found = self._simulate(self.problem, candidate)
             violated = found.violated and found.robustness is not None and found.robustness <= -self.margin
@@ -129,7 +130,7 @@ class _Hunt:
 
 
 def at_rest(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Everything at rest and nominal; then each signal and each parameter alone."""
+    """All inputs at rest and parameters nominal together, then each of them alone."""
     rests = {name: rest for name in problem.space.names if (rest := rest_value(problem, name)) is not None}
     everything = candidate
     for name, rest in rests.items():
@@ -148,7 +149,7 @@ def constant(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
 
 
 def fewer_control_points(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each free signal without some of its control points: large blocks first, then one by one."""
+    """Each free signal without some of its control points: large blocks first, then single points."""
     for r in _free(problem):
         signal = candidate.signals[r.name]
         size = len(signal.times) // 2
@@ -160,7 +161,10 @@ def fewer_control_points(problem: Problem, candidate: Candidate) -> Iterator[Can
 
 
 def fewer_changes(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each signal without one of its changes: what follows, what precedes or the neighbour is made equal."""
+    """Each signal without one of its changes.
+
+    Everything after the change, everything before it, or only the neighbouring stretch is made equal.
+    """
     for r in problem.space.inputs:
         values = candidate.signals[r.name].values
         runs = stretches(values)
@@ -175,7 +179,7 @@ def fewer_changes(problem: Problem, candidate: Candidate) -> Iterator[Candidate]
 
 
 def fewer_values(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each value of a signal replaced, wherever it occurs, by rest, a bound or another of its values."""
+    """Each value of a signal replaced, at all its occurrences, by rest, a bound or another of its values."""
     for r in problem.space.inputs:
         values = candidate.signals[r.name].values
         for old in sorted(set(values)):
@@ -195,7 +199,7 @@ def simple_stretches(problem: Problem, candidate: Candidate) -> Iterator[Candida
 
 
 def simpler_interpolation(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each free signal as steps, then as straight lines."""
+    """Each free signal with constant, then with linear interpolation."""
     ways: tuple[Interpolation, ...] = ("constant", "linear")
     for r in _free(problem):
         for interpolation in ways:
@@ -206,7 +210,7 @@ def simpler_interpolation(problem: Problem, candidate: Candidate) -> Iterator[Ca
 
 
 def rounder_numbers(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each value, parameter and free time written with fewer digits; parameters at their bounds first."""
+    """Each parameter, value and free time with fewer digits; parameters also at their bounds."""
     for p in problem.space.parameters:
         value = candidate.parameters[p.name]
         for new in (p.low, p.high, *rounder(value)):
@@ -240,7 +244,7 @@ PASSES: tuple[Pass, ...] = (
 
 
 def constant_signal(problem: Problem, r: InputRange, value: float) -> Signal:
-    """Return the simplest signal of this value that the input's parameterization allows."""
+    """Return the simplest constant signal that the input's parameterization allows."""
     if r.free is not None:
         return Signal((0.0,), (value,), "constant", r.hold)
     return Signal.evenly(
@@ -252,13 +256,13 @@ def constant_signal(problem: Problem, r: InputRange, value: float) -> Signal:
 
 
 def stretches(values: tuple[float, ...]) -> list[tuple[int, int]]:
-    """Return first index and end index of each stretch of equal values."""
+    """Return the first index and the end index (exclusive) of each stretch of equal values."""
     starts = [0, *(k + 1 for k, (a, b) in enumerate(pairwise(values)) if a != b), len(values)]
     return list(pairwise(starts))
 
 
 def with_signal(candidate: Candidate, name: str, signal: Signal) -> Candidate:
-    """Return the candidate with another signal for one input."""
+    """Return the candidate with one input's signal replaced."""
     return replace(candidate, signals={**candidate.signals, name: signal})
 
 
@@ -273,7 +277,7 @@ def _free(problem: Problem) -> Iterator[InputRange]:
 
 
 def _with_constant(problem: Problem, candidate: Candidate, name: str, value: float) -> Candidate:
-    """Return the candidate with an input constant at a value, or a parameter at it."""
+    """Return the candidate with one input constant at a value, or one parameter set to it."""
     for r in problem.space.inputs:
         if r.name == name:
             return with_signal(candidate, name, constant_signal(problem, r, value))

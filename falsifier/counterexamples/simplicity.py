@@ -1,14 +1,14 @@
-"""The order of simplicity among candidates: which of two counterexamples says the same with less.
+"""The order of simplicity: which of two candidates is easier to understand.
 
-The first of these that differs decides:
+The first criterion that differs decides:
 
-1. fewer distinct values, signal by signal added up;
+1. fewer distinct values, summed over the signals;
 2. fewer changes of value over time;
-3. fewer signals that are ever away from rest and parameters away from nominal;
-4. fewer control points, then ``constant`` before ``linear`` before ``pchip``;
-5. rounder numbers: rest and nominal before a bound of the range before numbers with fewer digits;
-6. nearer to rest and nominal, as a share of the range; at last the numbers themselves, so that the order is
-   total: two candidates with equal keys are equal simulations.
+3. fewer signals that ever leave rest, and fewer parameters that differ from nominal;
+4. fewer control points; then ``constant`` before ``linear`` before ``pchip``;
+5. rounder numbers: rest and nominal, then a bound of the range, then numbers with few digits;
+6. closer to rest and nominal, as a share of the range; finally the numbers themselves, so that the order is
+   total: two candidates with equal keys give equal simulations.
 """
 
 from collections.abc import Iterator
@@ -25,10 +25,10 @@ _SIMPLEST_FIRST: tuple[Interpolation, ...] = ("constant", "linear", "pchip")
 
 
 def rest_value(problem: Problem, name: str) -> float | None:
-    """Value of an input at rest, or of a parameter when nothing is searched; None where it is unknown.
+    """Rest value of an input, or nominal value of a parameter; None if unknown.
 
-    An input rests at the model's start value; where that is unknown or outside the range, at 0. A parameter's
-    nominal value is the model's.
+    The rest value of an input is the model's start value, or 0 if that is unknown or outside the range. The
+    nominal value of a parameter is the model's own value.
     """
     ranged = _range(problem, name)
     known = ranged.nominal if isinstance(ranged, ParameterRange) else _start(problem, name)
@@ -61,7 +61,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
 
 
 def digits(value: float) -> int:
-    """Number of significant decimal digits that a number is written with.
+    """Number of significant decimal digits of a number.
 
     >>> digits(100.0), digits(0.05), digits(33.25)
     (1, 1, 4)
@@ -70,7 +70,7 @@ def digits(value: float) -> int:
 
 
 def rounder(value: float) -> Iterator[float]:
-    """Yield numbers near this one with fewer digits, the roundest and nearest first.
+    """Yield numbers close to this one with fewer digits, the roundest and nearest first.
 
     >>> list(rounder(33.25))[:4]
     [30.0, 40.0, 33.0, 34.0]

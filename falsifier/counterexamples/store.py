@@ -1,11 +1,11 @@
-"""Counterexamples as small files: one each, readable, kept in a repository, run again at any time.
+"""Counterexamples as small, readable files that can be kept under version control and replayed at any time.
 
 ::
 
-    counterexamples/AT.AT1/5f2c01ab.json      AT.toml's requirement AT1
+    counterexamples/AT.AT1/5f2c01ab.json      requirement AT1 of AT.toml
 
-A file says how its problem is loaded (relative to the file itself), what was simulated and what came out, so
-that it can be run again after the FMU or the requirement has changed.
+A file states how to load its problem (relative to the file itself), what was simulated and with what result,
+so that it can be replayed after the FMU or the requirement has changed.
 """
 
 import json
@@ -42,6 +42,11 @@ _STATUS: dict[Outcome, ReplayStatus] = {
     "fragile": "fragile",
     "refuted": "does not violate",
 }
+_WORDS: dict[ReplayStatus, str] = {
+    "violates": "still violated",
+    "fragile": "fragile",
+    "does not violate": "no longer violated",
+}
 
 
 class StoredCounterexample(BaseModel):
@@ -53,7 +58,7 @@ class StoredCounterexample(BaseModel):
     requirement: str
     formula: str
     problem: ProblemSource | None = Field(
-        None, description="How to load the problem, paths relative to this file; null: only code can tell."
+        None, description="How to load the problem, paths relative to this file; null: made in Python."
     )
     candidate: dict[str, Any]
     robustness: float = Field(allow_inf_nan=False)
@@ -67,14 +72,14 @@ class StoredCounterexample(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What became of a stored counterexample today.
+    """Result of replaying a stored counterexample.
 
     Attributes:
         status: ``violates`` (confirmed), ``fragile`` (only at the given communication step),
             ``does not violate``, or ``does not fit``: the problem has other inputs, ranges or control points.
-        confirmation: of today's simulation; None where it does not violate.
-        evaluation: today's simulation; None where the counterexample does not fit.
-        text: in words, with what has changed since the counterexample was stored.
+        confirmation: confirmation of the new simulation; None if it does not violate.
+        evaluation: the new simulation; None if the counterexample does not fit.
+        text: the result in words, including what has changed since the counterexample was stored.
     """
 
     status: ReplayStatus
@@ -84,14 +89,14 @@ class Replayed:
 
 
 def to_store(confirmation: Confirmation) -> StoredCounterexample:
-    """Content of the file for a confirmed or fragile violation.
+    """Make the content of the file for a confirmed or fragile violation.
 
     Raises:
-        ValueError: when the evaluation has no verdict.
+        ValueError: if the evaluation has no verdict.
     """
     problem, evaluation = confirmation.problem, confirmation.evaluation
     if evaluation.verdict is None:
-        raise ValueError("a simulation that failed is no counterexample")
+        raise ValueError("a failed simulation is not a counterexample: expected an evaluation with a verdict")
     return _content(
         RequirementRecord.of(problem.requirement),
         reloadable(problem),
@@ -128,14 +133,14 @@ def _content(
 
 
 def save(stored: StoredCounterexample, path: Path) -> Path:
-    """Write a counterexample file in one step; the problem's paths are made relative to it."""
+    """Write a counterexample file atomically, with the problem's paths relative to it; return its path."""
     request = stored.problem and _seen_from(stored.problem, path.parent)
     content = stored.model_copy(update={"problem": request}).model_dump(mode="json")
     return write_whole(path, json.dumps(content, indent=2) + "\n")
 
 
 def load(path: Path) -> StoredCounterexample:
-    """Read a counterexample file; of a run directory, the counterexample that the run found.
+    """Read a counterexample file, or the counterexample in a run directory.
 
     Raises:
         SpecError: naming the file and what is wrong with it.
@@ -151,33 +156,37 @@ def load(path: Path) -> StoredCounterexample:
 
 
 def counterexample_file(path: Path) -> Path:
-    """Path of a counterexample file, given itself or its run directory.
-
-    Runs that were killed, and those of a campaign, keep a journal only; what they found is written from it.
+    """Find a counterexample file, given its path or its run directory.
 
     Raises:
-        SpecError: when there is none, or more than one.
+        SpecError: if there is none, or more than one.
     """
     directory = path if path.is_dir() else path.parent
     if not path.is_file():
-        keep_recorded(directory)
+        keep_recorded(directory)  # the counterexample may be in the journal only
     if not path.is_dir():
         if not path.is_file():
             raise SpecError(
-                "there is no such file; give a run directory or a counterexample file", file=str(path)
+                "no such file or directory; expected a run directory or a counterexample file",
+                file=str(path),
             )
         return path
     found = sorted(path.glob("counterexample*.json"))
     if len(found) > 1:
         names = ", ".join(str(f) for f in found)
-        raise SpecError(f"this run has several counterexamples, give one of them: {names}", file=str(path))
+        raise SpecError(
+            f"this run has several counterexamples; choose one of these files: {names}", file=str(path)
+        )
     if not found:
-        raise SpecError("this run has found no confirmed counterexample", file=str(path))
+        raise SpecError(
+            "contains no confirmed counterexample; expected the directory of a run that found one",
+            file=str(path),
+        )
     return found[0]
 
 
 def file_name(requirement: str = "") -> str:
-    """Name of the counterexample's file in a run directory; of one requirement where several shared a search.
+    """Name of the counterexample's file in a run directory; with the requirement if several share a search.
 
     >>> file_name(), file_name("AT1")
     ('counterexample.json', 'counterexample-AT1.json')
@@ -186,9 +195,10 @@ def file_name(requirement: str = "") -> str:
 
 
 def keep_recorded(directory: Path) -> None:
-    """Write the counterexamples of a run directory's journal that have no file yet.
+    """Write the files of counterexamples that are only in a run directory's journal.
 
-    Runs that were killed, and those of a campaign, keep a journal only; a directory of no run is left alone.
+    Runs that were killed, and runs of a campaign, leave only a journal. A directory without a run is left
+    unchanged.
     """
     if not holds_run(directory):
         return
@@ -206,7 +216,9 @@ def keep_recorded(directory: Path) -> None:
             evaluations[name] = recorded_evaluations(directory, records, name)
         evaluation, alone = evaluations[name][record.index], described.of(name)
         if evaluation.verdict is None:
-            raise JournalError(f"{directory}: the journal has no verdict of the counterexample of {name}")
+            raise JournalError(
+                f"{directory}: the journal is damaged: the counterexample of {name} has no verdict"
+            )
         content = _content(
             alone.requirement,
             alone.request.source,
@@ -223,49 +235,54 @@ def problem_of(stored: StoredCounterexample) -> Problem:
     """Load the problem of a counterexample.
 
     Raises:
-        SpecError: when the file does not say how, or the spec cannot be loaded any more.
+        SpecError: if the problem was made in Python, or its spec can no longer be loaded.
     """
     if stored.problem is None:
         raise SpecError(
-            f"this counterexample of {stored.requirement} is of a problem made in Python: run the test that "
-            "found it"
+            f"the problem of this counterexample of {stored.requirement} was made in Python: run the script "
+            "or test that found it"
         )
     return load_source(stored.problem)
 
 
 def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
-    """Simulate a stored counterexample today, and confirm it where it violates.
+    """Simulate a stored counterexample again, and confirm it if it violates.
 
     Raises:
-        SimulationError: when the simulation fails.
+        SimulationError: if the simulation fails.
     """
     changes = "".join(f"; {change}" for change in _changes(stored, problem))
     try:
         candidate = problem.space.admit(Candidate.from_json(stored.candidate))
     except CandidateError as error:
-        return Replayed("does not fit", None, None, f"{problem.name} does not fit: {error}{changes}")
+        text = f"{problem.name}: the counterexample does not fit the problem: {error}{changes}"
+        return Replayed("does not fit", None, None, text)
     evaluation = evaluate(problem, candidate)
     if evaluation.robustness is None:
-        raise SimulationError(f"{problem.name}: the simulation {evaluation.status}: {evaluation.reason}")
+        how = "timed out" if evaluation.status == "timeout" else evaluation.status
+        raise SimulationError(f"{problem.name}: the simulation {how}: {evaluation.reason}")
     confirmation = confirm(problem, evaluation) if evaluation.violated else None
     status = _STATUS[confirmation.outcome if confirmation else "refuted"]
-    text = f"{problem.name} {status}: robustness {evaluation.robustness:+.6g}, was {stored.robustness:+.6g}"
+    text = (
+        f"{problem.name}: {_WORDS[status]}, robustness {evaluation.robustness:+.6g} "
+        f"(recorded {stored.robustness:+.6g})"
+    )
     text += f"; {confirmation.reason}" if confirmation else ""
     return Replayed(status, confirmation, evaluation, text + changes)
 
 
 @dataclass(frozen=True, slots=True)
 class Database:
-    """A folder of counterexample files, one folder a requirement.
+    """A folder of counterexample files, one folder per requirement.
 
     Attributes:
-        folder: the folder; it need not exist.
+        folder: the folder; it need not exist yet.
     """
 
     folder: Path
 
     def save(self, problem: Problem, stored: StoredCounterexample) -> Path:
-        """Write a counterexample; an equal one is written over."""
+        """Write a counterexample; one with the same candidate is overwritten."""
         key = repr(Candidate.from_json(stored.candidate).key)
         return save(stored, self._place(problem) / f"{sha256(key.encode()).hexdigest()[:8]}.json")
 
@@ -282,14 +299,14 @@ class Database:
 def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
     digest = getattr(problem.model, "sha256", None)
     if stored.fmu_sha256 is not None and digest != stored.fmu_sha256:
-        yield "the FMU has changed since"
+        yield "the FMU has changed since it was stored"
     formula = str(problem.requirement.formula)
     if formula != stored.formula:
-        yield f"the requirement was {stored.formula} then and is {formula} now"
+        yield f"the requirement has changed from {stored.formula} to {formula}"
 
 
 def _split(target: str) -> tuple[Path | None, str]:
-    """File of a problem's target, None where it is a bundled name, and the rest, with its colon."""
+    """Split a target into its file (None for a bundled name) and the rest with its colon."""
     if target.endswith((".toml", ".fmu")):
         return Path(target), ""
     file, colon, requirement = target.rpartition(":")
@@ -297,7 +314,7 @@ def _split(target: str) -> tuple[Path | None, str]:
 
 
 def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:
-    """Return the request with its file as seen from a folder."""
+    """Return the request with the path of its file relative to a folder."""
     file, requirement = _split(request.target)
     if file is None:
         return request
@@ -306,6 +323,6 @@ def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:
 
 
 def _found_from(request: ProblemSource, folder: Path) -> ProblemSource:
-    """Return the request with its file, which is given as seen from a folder, as found from here."""
+    """Return the request with its path, which is relative to a folder, made valid from here."""
     file, requirement = _split(request.target)
     return request if file is None else request.model_copy(update={"target": f"{folder / file}{requirement}"})

@@ -1,1 +1,1 @@
-"""One candidate in, one evaluation out: here, on other processes or on a cluster; and its confirmation."""
+"""Evaluation of candidates, in this process, in others or on a cluster; confirmation of violations."""

@@ -1,8 +1,9 @@
-"""Second opinions: a violation counts only when it happens again, at a finer step too, and rtamt agrees.
+"""Confirmation: a violation counts only if it recurs, also at half the step, and rtamt agrees on its sign.
 
-A violation is simulated on a fresh instance of the model at the given communication step and at half of it;
-each trajectory is judged by both monitors. The held input signals stay the same: ``hold`` belongs to the
-candidate, only how often the simulator exchanges values changes. The monitored time grid stays the same too.
+A violation is simulated again on a fresh instance of the model, at the given communication step and at half
+of it; both monitors evaluate each trajectory. The input signals stay the same, including their ``hold``,
+which is part of the candidate; only the interval at which values are exchanged with the FMU changes. The
+monitored time grid stays the same too.
 """
 
 from dataclasses import dataclass, replace
@@ -24,17 +25,17 @@ Outcome = Literal["confirmed", "fragile", "refuted"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Confirmation:
-    """What second simulations and the second monitor said of a violation.
+    """Result of repeating the simulation of a violation, and of the second monitor.
 
     Attributes:
-        problem: what it violates.
+        problem: the problem whose requirement is violated.
         evaluation: the violation as found.
-        outcome: ``confirmed``: it happened again, at half the step too, and both monitors agree on the sign;
-            ``fragile``: it happened again, but not at half the step; ``refuted``: anything else.
-        robustness: of the fresh simulation, None when it failed.
-        reference: the second monitor's robustness of the fresh simulation, None when it gave none.
-        reason: in words.
-        halved: robustness at half the communication step, None when there was no such simulation.
+        outcome: ``confirmed``: it recurred, also at half the step, and both monitors agree on the sign;
+            ``fragile``: it recurred, but not at half the step; ``refuted``: anything else.
+        robustness: robustness of the fresh simulation; None if it failed.
+        reference: the second monitor's robustness of the fresh simulation; None if it failed.
+        reason: explanation of the outcome.
+        halved: robustness at half the communication step; None if there was no such simulation or it failed.
     """
 
     problem: Problem
@@ -47,11 +48,11 @@ class Confirmation:
 
     @property
     def candidate(self) -> Candidate:
-        """The inputs and parameters that violate."""
+        """The inputs and parameters that violate the requirement."""
         return self.evaluation.candidate
 
     def plot(self) -> "Figure":
-        """Picture of the inputs and of the signals that decided, with the critical time."""
+        """Plot the inputs and the signals that decided the verdict, with the critical time."""
         from falsifier import plot
 
         return plot(self)
@@ -59,7 +60,7 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class _Opinion:
-    """One repetition: what both monitors say of it, and what speaks against it as a violation."""
+    """One repetition: both monitors' robustness, and why it is not a violation (empty if it is)."""
 
     trajectory: Trajectory | None
     robustness: float | None
@@ -68,7 +69,7 @@ class _Opinion:
 
 
 def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
-    """Simulate a violation again on fresh instances, at the given and at half the communication step."""
+    """Repeat a violation on fresh instances, at the given communication step and at half of it."""
     fresh = _repeat(problem, evaluation.candidate)
     if fresh.doubt:
         reason = f"the second simulation {fresh.doubt}"
@@ -86,11 +87,12 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     outcome: Outcome = "confirmed"
     steps = f"half the communication step ({finer.experiment.step_size:.4g} s)"
     if halved.robustness is None or fresh.robustness is None:
-        reason += f"; {steps} could not be judged: it {halved.doubt}"
+        # No verdict either way: the violation at the given step stands, and the reason states the failure.
+        reason += f"; with {steps} it {halved.doubt}"
     elif halved.doubt:
         outcome = "fragile" if halved.robustness >= 0 else "refuted"
         change = halved.robustness - fresh.robustness
-        reason = f"{reason}, but {steps} {halved.doubt}, a change of {change:+.4g}"
+        reason = f"{reason}, but with {steps} it {halved.doubt}, a change of {change:+.4g}"
     elif _same(fresh.trajectory, halved.trajectory):
         reason += "; its outputs do not depend on the communication step"
     else:
@@ -107,7 +109,7 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
 
 
 def half_step(problem: Problem) -> Problem:
-    """Return the problem simulated with half its communication step; the monitored grid stays the same."""
+    """Return the problem with half its communication step; the monitored time grid stays the same."""
     experiment = problem.experiment
     step = (experiment.step_size or experiment.output_interval) / 2
     return replace(problem, experiment=replace(experiment, step_size=step))
@@ -117,32 +119,33 @@ def other_interface(problem: Problem) -> Problem:
     """Return the problem with its FMU simulated through the other interface.
 
     Raises:
-        SpecError: when the model is no FMU or has one interface only.
+        SpecError: if the model is not an FMU or has only one interface.
     """
     from falsifier.fmu import FmuModel
 
     model = problem.model
     if not isinstance(model, FmuModel):
-        raise SpecError(f"{problem.info.name} is not an FMU: it has no second interface")
+        raise SpecError(f"{problem.info.name} is not an FMU and has no second interface")
     others = [i for i in model.info.interfaces if i != model.interface]
     if not others:
-        raise SpecError(f"{model.path.name} offers {model.interface} only: there is no second interface")
+        raise SpecError(f"{model.path.name} has no second interface; it only offers {model.interface}")
     return replace(problem, model=replace(model, interface=others[0]))
 
 
 def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = None) -> _Opinion:
-    """Simulate on a fresh instance; where the outputs are those of a known opinion, so is the judgement."""
+    """Simulate on a fresh instance; if the outputs equal those of a known opinion, return that opinion."""
+    # The next simulation then loads the model again, so nothing left over from the search can influence it.
     problem.model.close()
     again = evaluate(problem, candidate)
     if again.trajectory is None or again.robustness is None:
-        return _Opinion(None, None, None, f"gave no verdict: {again.reason}")
+        return _Opinion(None, None, None, f"failed: {again.reason}")
     if known is not None and _same(known.trajectory, again.trajectory):
         return known
     reference, doubt = _second_monitor(problem, again.trajectory)
     if not again.violated:
         doubt = f"does not violate: robustness {again.robustness:+.6g}"
     elif reference is not None and reference >= 0:
-        doubt = f"divides the monitors: {again.robustness:+.6g} here, {reference:+.6g} by rtamt"
+        doubt = f"has robustness {again.robustness:+.6g}, but rtamt computes {reference:+.6g}"
     return _Opinion(again.trajectory, again.robustness, reference, doubt)
 
 
@@ -152,7 +155,7 @@ def _second_monitor(problem: Problem, trajectory: Trajectory) -> tuple[float | N
     try:
         return reference.robustness(problem.requirement.formula, trajectory), ""
     except FalsifierError as error:
-        return None, f"could not be judged by rtamt: {error}"
+        return None, f"could not be evaluated by rtamt: {error}"
 
 
 def _same(one: Trajectory | None, other: Trajectory | None) -> bool:

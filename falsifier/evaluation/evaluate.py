@@ -1,4 +1,4 @@
-"""One candidate in, one evaluation out."""
+"""Evaluation of a candidate: simulate it and monitor the trajectory."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -25,12 +25,12 @@ class Evaluation:
     """A candidate with its verdict, or the reason why there is none.
 
     Attributes:
-        candidate: what was simulated.
-        status: ``ok``, or how the simulation ended instead.
+        candidate: the simulated candidate.
+        status: ``ok``, or how the simulation ended: ``failed``, ``crashed``, ``timeout``.
         verdict: robustness and what decided it; None unless the status is ok.
-        reason: why there is no verdict, empty otherwise.
+        reason: why there is no verdict; empty if there is one.
         trajectory: outputs, then inputs, on the output grid; None unless the status is ok.
-        seconds: wall-clock time of the simulation.
+        seconds: wall-clock time of the simulation in s.
         log: messages of the model.
     """
 
@@ -44,23 +44,23 @@ class Evaluation:
 
     @property
     def robustness(self) -> float | None:
-        """Robustness, or None without a verdict."""
+        """Robustness; None if there is no verdict."""
         return None if self.verdict is None else self.verdict.robustness
 
     @property
     def violated(self) -> bool:
-        """Whether the requirement is violated; a failed simulation violates nothing."""
+        """Whether the requirement is violated; False for a failed simulation."""
         return self.verdict is not None and self.verdict.violated
 
 
 def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
-    """Simulate one candidate and judge it.
+    """Simulate one candidate and monitor its trajectory.
 
-    A pure function of its arguments, whatever process it runs in. A simulation that fails, crashes or hangs
-    is an evaluation with a status and a reason.
+    A pure function of its arguments, in whichever process it runs. A simulation that fails, crashes or hangs
+    is returned as an evaluation with a status and a reason.
 
     Raises:
-        ModelError: when the model cannot be used at all.
+        ModelError: if the model cannot be used at all.
     """
     experiment = problem.experiment
     started = perf_counter()
@@ -85,16 +85,17 @@ def simulate(
     inputs: Mapping[str, Signal | float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Evaluation:
-    """Simulate inputs of one's own and judge them; the search space's ranges do not apply.
+    """Simulate given inputs and evaluate the requirement; the ranges of the search space do not apply.
 
     Args:
-        problem: what is simulated, and the requirement to judge by.
-        inputs: by name, a signal, or a number for a constant one; other inputs are at rest.
-        parameters: by name; others keep the problem's or the model's values.
+        problem: the model to simulate and the requirement to evaluate.
+        inputs: a signal, or a number for a constant one, by input name; other inputs keep the problem's fixed
+            values or the model's start values.
+        parameters: values by name; other parameters keep the problem's or the model's values.
 
     Raises:
-        CandidateError: for a name that is no input, or no parameter or start value that can be set.
-        ModelError: when the model cannot be used at all.
+        CandidateError: if a name is not an input, or not a parameter or start value that can be set.
+        ModelError: if the model cannot be used at all.
 
     >>> simulate(load_problem("AT1"), {"throttle": 100.0}).robustness  # doctest: +SKIP
     -0.213
@@ -118,7 +119,7 @@ def simulate(
 
 
 def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
-    """Judge a simulation that was made for another requirement of the same system."""
+    """Evaluate the problem's requirement on a trajectory that was simulated for another requirement."""
     if evaluation.trajectory is None:
         return evaluation
     try:
@@ -128,7 +129,7 @@ def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
 
 
 def monitor_for(problem: Problem) -> Monitor:
-    """Compiled monitor of the problem's requirement on its output grid, made once per process."""
+    """Return the monitor of the problem's requirement on its output grid, compiled once per process."""
     return _monitor(
         problem.requirement.formula, problem.experiment.output_interval, problem.experiment.samples
     )
@@ -142,7 +143,7 @@ def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
 def _inputs(
     problem: Problem, candidate: Candidate, outputs: Trajectory
 ) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
-    """Columns and units of the inputs on the output grid, so that formulas and plots can speak of them."""
+    """Return columns and units of the inputs on the output grid, so that formulas and plots can use them."""
     columns = {name: signal.sample(outputs.times) for name, signal in candidate.signals.items()}
     for variable in problem.info.inputs:
         value = problem.parameters.get(variable.name, variable.start)

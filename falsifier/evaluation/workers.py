@@ -1,4 +1,4 @@
-"""Where work happens: here, or on any ``concurrent.futures`` executor."""
+"""Executors for evaluations: this process, local processes or a Dask cluster."""
 
 import logging
 import sys
@@ -16,20 +16,20 @@ from falsifier.problem.problem import Problem
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
-# How long in s to wait for a cluster's scheduler.
+# Maximum time in s to wait for a cluster's scheduler.
 _CONNECT_TIMEOUT = 20
-# Logger of everything that simulates FMUs.
-_SIMULATING = "falsifier.fmu"
-# In the form of python -W: warnings that begin with this word.
+# Logger of the package that simulates FMUs; workers get the parent's level for it.
+_FMU_LOGGER = "falsifier.fmu"
+# Filter in the format of python -W: warnings whose message starts with this word.
 _TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
 def local_executor(jobs: int) -> Iterator[Executor | None]:
-    """Executor with this many processes on this machine; None for one job, which runs in this process.
+    """Open an executor with this many local processes; None for one job, which runs in this process.
 
     Raises:
-        SpecError: when jobs is not positive.
+        SpecError: if jobs is not positive.
     """
     _check_jobs(jobs)
     if jobs == 1:
@@ -41,12 +41,12 @@ def local_executor(jobs: int) -> Iterator[Executor | None]:
 
 @dataclass(slots=True)
 class Workers:
-    """An executor that can be replaced when its workers have died.
+    """An executor that can be replaced if its workers have died.
 
     Attributes:
-        executor: where to submit.
-        slots: how many tasks can run at a time right now.
-        make: makes another executor.
+        executor: the current executor.
+        slots: returns the number of tasks that can currently run at the same time.
+        make: creates another executor.
     """
 
     executor: Executor
@@ -54,22 +54,22 @@ class Workers:
     make: Callable[[], Executor]
 
     def restart(self) -> None:
-        """Replace the executor; what it was doing is lost."""
+        """Replace the executor; its unfinished tasks are lost."""
         self.executor.shutdown(wait=False, cancel_futures=True)
         self.executor = self.make()
 
 
 @contextmanager
 def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
-    """Processes on this machine, or those of a cluster.
+    """Open local worker processes, or connect to those of a cluster.
 
     Args:
-        jobs: number of processes on this machine; not used with a cluster.
+        jobs: number of local processes; not used with a cluster.
         cluster: ``dask:tcp://HOST:PORT``, the address of a Dask scheduler.
 
     Raises:
-        SpecError: for another kind of cluster, or when the package for it is not installed.
-        ModelError: when the scheduler cannot be reached.
+        SpecError: if the cluster is not a Dask address, or Dask is not installed.
+        ModelError: if the scheduler cannot be reached.
     """
     if cluster is not None:
         with _dask_workers(cluster) as workers:
@@ -86,9 +86,9 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
 def evaluate_all(
     problem: Problem, candidates: Sequence[Candidate], executor: Executor | None
 ) -> Iterator[Evaluation]:
-    """Evaluations in the order of the candidates, each as soon as it and those before it are there.
+    """Yield the evaluations in the order of the candidates, each as soon as it and those before it are done.
 
-    A worker process that dies is an evaluation with the status ``crashed``.
+    If a worker process dies, its evaluation has the status ``crashed``.
     """
     if executor is None:
         yield from (evaluate(problem, candidate) for candidate in candidates)
@@ -103,7 +103,7 @@ def evaluate_all(
 
 def _check_jobs(jobs: int) -> None:
     if jobs < 1:
-        raise SpecError(f"jobs must be 1 or more, got {jobs}")
+        raise SpecError(f"jobs must be at least 1, got {jobs}")
 
 
 def _process_pool(jobs: int) -> "ProcessPoolExecutor":
@@ -111,17 +111,17 @@ def _process_pool(jobs: int) -> "ProcessPoolExecutor":
     from multiprocessing import get_context
 
     _start_silent_tracker()
-    level = logging.getLogger(_SIMULATING).level
+    level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
         jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level,)
     )
 
 
 def _start_silent_tracker() -> None:
-    """Start the process that frees a pool's semaphores, so that it says nothing of those that a kill left.
+    """Start multiprocessing's resource tracker, which frees a pool's semaphores, without its warnings.
 
-    It frees them all the same; its warning would reach the terminal after the command has ended, and nobody
-    could do anything about it.
+    It still frees semaphores left behind by a killed process. Its warning would reach the terminal after the
+    command has ended, and the user could do nothing about it.
     """
     if sys.platform == "win32":
         return
@@ -135,17 +135,17 @@ def _start_silent_tracker() -> None:
 
 
 def _prepare_worker(log_level: int) -> None:
-    """End with the parent, however it ends, and leave Ctrl-C to it: it lets workers finish in order.
+    """Make a worker end with its parent, however that ends, and ignore Ctrl-C, which the parent handles.
 
     Args:
-        log_level: of what simulates, as in the parent.
+        log_level: the parent's level of the logger for simulations.
     """
     import os
     import signal
     from multiprocessing import parent_process
     from threading import Thread
 
-    logging.getLogger(_SIMULATING).setLevel(log_level)
+    logging.getLogger(_FMU_LOGGER).setLevel(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is None:
@@ -167,12 +167,12 @@ def _dask_workers(cluster: str) -> Iterator[Workers]:
         from distributed import Client
     except ImportError:
         raise SpecError(
-            f"--executor {cluster}: Dask is not installed; pip install 'falsifier[cluster]'"
+            f"--executor {cluster}: Dask is not installed; install it with pip install 'falsifier[cluster]'"
         ) from None
     try:
         client = Client(address, timeout=_CONNECT_TIMEOUT)
     except (OSError, ValueError) as error:
-        raise ModelError(f"--executor {cluster}: no Dask scheduler answers there: {error}") from None
+        raise ModelError(f"--executor {cluster}: cannot reach a Dask scheduler there: {error}") from None
     with client:
         yield Workers(
             client.get_executor(pure=False),

@@ -1,4 +1,4 @@
-"""FMUs: what they say of themselves, how they are stepped, and the process they run in."""
+"""FMUs: reading their description, stepping them, and isolating them in processes of their own."""
 
 from falsifier.fmu.description import read_info
 from falsifier.fmu.simulator import FmuModel

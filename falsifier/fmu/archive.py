@@ -1,4 +1,4 @@
-"""FMU archives: checked before anything in them is written to disk or loaded."""
+"""FMU archives: checked before any of their contents are written to disk or loaded."""
 
 import hashlib
 import platform
@@ -13,11 +13,12 @@ from pathlib import Path, PurePosixPath
 
 from falsifier.errors import ModelError
 
-# Far above what exporters write (a few MB, some hundred with tables), far below what fills a disk.
-_MOST_BYTES = 8 << 30
-_MOST_FILES = 100_000
-# Text deflates by 5 to 20, a file of zeros by 1000: only a bomb is both large and that dense.
-_DENSEST = 300
+# Far more than exporters write (a few MB, or several hundred with tables), far less than fills a disk.
+_MAX_BYTES = 8 << 30
+_MAX_FILES = 100_000
+# Text compresses by a factor of 5 to 20, a file of zeros by 1000: only a zip bomb is both large and this
+# dense.
+_MAX_COMPRESSION = 300
 _DENSE_FROM_BYTES = 256 << 20
 
 _SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows", "cygwin": "windows"}
@@ -30,7 +31,7 @@ _MACHINES = {
     "arm64": "aarch64",
     "aarch64": "aarch64",
 }
-# Folder names of FMI 1 and 2 in the words of FMI 3; FMI 2 has no name for ARM, tools write these.
+# FMI 3 names of the folders of FMI 1 and 2. FMI 2 defines none for ARM; tools use the FMI 3 names there.
 _OLD_PLATFORMS = {
     "linux64": "x86_64-linux",
     "linux32": "x86-linux",
@@ -42,10 +43,10 @@ _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file as hexadecimal digits.
+    """Return the SHA-256 of a file as hexadecimal digits.
 
     Raises:
-        ModelError: when the file cannot be read.
+        ModelError: if the file cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -56,10 +57,10 @@ def file_hash(path: Path) -> str:
 
 @contextmanager
 def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an FMU whose entries have been checked.
+    """Open an FMU after checking its entries.
 
     Raises:
-        ModelError: when it is not a zip file, or would write outside its folder or fill the disk.
+        ModelError: if it is not a zip archive, or would write outside its folder or fill the disk.
     """
     try:
         archive = zipfile.ZipFile(path)
@@ -73,27 +74,27 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def read_entry(path: Path, name: str) -> bytes:
-    """One file of an FMU.
+    """Return the contents of one file of an FMU.
 
     Raises:
-        ModelError: when the archive is refused or has no such file.
+        ModelError: if the archive is rejected or does not contain the file.
     """
     with open_archive(path) as archive:
         try:
             return archive.read(name)
         except KeyError:
             raise ModelError(
-                f"{path}: no {name} in the archive, so it is not an FMU; export the model again"
+                f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
         except (zipfile.BadZipFile, zlib.error, EOFError) as error:
             raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
 
 
 def extract(path: Path, folder: Path) -> None:
-    """Unpack an FMU into a folder after the checks.
+    """Unpack an FMU into a folder after checking its entries.
 
     Raises:
-        ModelError: when the archive is refused, damaged, or the disk is full.
+        ModelError: if the archive is rejected or damaged, or the disk is full.
     """
     with open_archive(path) as archive:
         try:
@@ -103,13 +104,13 @@ def extract(path: Path, folder: Path) -> None:
 
 
 def entry_names(path: Path) -> tuple[str, ...]:
-    """Names of all files in an FMU, with forward slashes."""
+    """Return the names of all files in an FMU, with forward slashes."""
     with open_archive(path) as archive:
         return tuple(archive.namelist())
 
 
 def platforms(names: Iterable[str]) -> tuple[str, ...]:
-    """Platforms that the entries carry a library for, in the words of FMI 3 (``x86_64-linux``)."""
+    """Return the FMI 3 names (``x86_64-linux``) of the platforms for which the entries contain binaries."""
     found = set()
     for name in names:
         parts = PurePosixPath(name).parts
@@ -119,14 +120,14 @@ def platforms(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def this_platform() -> str:
-    """Platform of this Python in the words of FMI 3."""
+    """Return the FMI 3 name of the platform that this Python runs on."""
     machine = platform.machine().lower()
     system = _SYSTEMS.get(sys.platform, sys.platform)
     return f"{_MACHINES.get(machine, machine)}-{system}"
 
 
 def binary_folder(fmi_version: str) -> str:
-    """Folder below ``binaries`` that an FMU of this version has for this platform."""
+    """Return this platform's folder below ``binaries`` for an FMU of this version."""
     here = this_platform()
     if fmi_version.startswith("3"):
         return here
@@ -134,30 +135,32 @@ def binary_folder(fmi_version: str) -> str:
 
 
 def library_file(fmi_version: str, identifier: str) -> PurePosixPath:
-    """Path of this platform's library inside an FMU."""
+    """Return the path of this platform's library inside an FMU."""
     suffix = _LIBRARY_SUFFIX.get(_SYSTEMS.get(sys.platform, ""), ".so")
     return PurePosixPath("binaries", binary_folder(fmi_version), identifier + suffix)
 
 
 def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
-    if len(entries) > _MOST_FILES:
+    if len(entries) > _MAX_FILES:
         raise ModelError(
-            f"{path}: refused, it holds {len(entries)} files (at most {_MOST_FILES} are unpacked)"
+            f"{path}: rejected because it contains {len(entries)} files; at most {_MAX_FILES} are allowed"
         )
     total = sum(entry.file_size for entry in entries)
-    if total > _MOST_BYTES:
+    if total > _MAX_BYTES:
         raise ModelError(
-            f"{path}: refused, it would unpack to {total / 2**30:.1f} GiB (at most {_MOST_BYTES >> 30} GiB)"
+            f"{path}: rejected because it would unpack to {total / 2**30:.1f} GiB; at most "
+            f"{_MAX_BYTES >> 30} GiB are allowed"
         )
     for name, count in Counter(entry.filename for entry in entries).items():
         if count > 1:
-            raise ModelError(f"{path}: refused, it holds {name!r} {count} times")
+            raise ModelError(f"{path}: rejected because it contains {name!r} {count} times")
     for entry in entries:
         _check_entry(path, entry)
 
 
 def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
-    # zipfile cuts names at NUL and turns backslashes on Windows only: judge the name as it was written.
+    # zipfile truncates names at NUL and converts backslashes on Windows only: check the name as it was
+    # written.
     written = entry.orig_filename.replace("\\", "/")
     if (
         written.startswith("/")
@@ -166,18 +169,18 @@ def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
         or "\0" in written
     ):
         raise ModelError(
-            f"{path}: refused, its entry {entry.orig_filename!r} would be written outside the folder it is "
-            "unpacked to"
+            f"{path}: rejected because its entry {entry.orig_filename!r} would be written outside the folder "
+            "that it is unpacked to"
         )
     if stat.S_ISLNK(entry.external_attr >> 16):
-        raise ModelError(f"{path}: refused, its entry {entry.filename!r} is a symbolic link")
+        raise ModelError(f"{path}: rejected because its entry {entry.filename!r} is a symbolic link")
     if entry.flag_bits & 0x1:
         raise ModelError(
             f"{path}: its entry {entry.filename!r} is encrypted; export the FMU without a password"
         )
-    dense = entry.file_size > _DENSEST * max(entry.compress_size, 1)
+    dense = entry.file_size > _MAX_COMPRESSION * max(entry.compress_size, 1)
     if dense and entry.file_size > _DENSE_FROM_BYTES:
         raise ModelError(
-            f"{path}: refused, its entry {entry.filename!r} grows from {entry.compress_size} to "
-            f"{entry.file_size} bytes"
+            f"{path}: rejected because its entry {entry.filename!r} grows from {entry.compress_size} to "
+            f"{entry.file_size} bytes, like a zip bomb"
         )

@@ -1,4 +1,4 @@
-"""The arrays through which a simulation gets its inputs and gives its outputs."""
+"""The arrays through which a simulation receives its inputs and returns its outputs."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from falsifier.fmu.plan import Plan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """Arrays that a plan's simulations read from and write to; they may lie in shared memory.
+    """Arrays that a plan's simulations read from and write to; they may be in shared memory.
 
     Attributes:
         parameters: values to set, shape (parameters,).
-        inputs: each input as a piecewise cubic (Signal.pieces), shape (inputs, 5 * pieces); pieces that are
-            not there start at inf.
+        inputs: each input as a piecewise cubic (``Signal.pieces``), shape (inputs, 5 * pieces); unused pieces
+            start at inf.
         outputs: recorded values by output and sample, shape (outputs, samples).
     """
 
@@ -25,13 +25,13 @@ class Room:
 
     @staticmethod
     def size(plan: Plan) -> int:
-        """Number of float64 that a plan needs."""
+        """Return the number of float64 values that a plan needs."""
         rows = len(plan.inputs) * 5 * plan.pieces + len(plan.outputs) * plan.samples
         return len(plan.parameters) + rows
 
     @classmethod
     def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
-        """Lay a plan's arrays over a flat array of at least ``size`` float64."""
+        """Return a plan's arrays as views of a flat array of at least ``size`` float64 values."""
         a = len(plan.parameters)
         b = a + len(plan.inputs) * 5 * plan.pieces
         c = b + len(plan.outputs) * plan.samples

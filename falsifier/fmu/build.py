@@ -1,4 +1,4 @@
-"""Compiling an FMU that carries its C sources for this platform."""
+"""Compiling an FMU that contains its C sources for this platform."""
 
 import importlib.util
 import shutil
@@ -17,13 +17,14 @@ from falsifier.fmu import archive
 from falsifier.fmu.description import read_description
 
 _COMPILERS = ("cc", "gcc", "clang")
+# Generated code of large models can take many minutes to compile.
 _TIME_LIMIT_SECONDS = 1800
 _SHOWN_LINES = 20
 
 
 @dataclass(frozen=True, slots=True)
 class _Sources:
-    """What one library is made of: file names below ``sources``, macros."""
+    """What one library is compiled from: file names below ``sources``, and preprocessor macros."""
 
     files: tuple[str, ...]
     defines: Mapping[str, str]
@@ -33,14 +34,14 @@ def build(path: Path, out: Path) -> Path:
     """Compile the sources of an FMU and write a copy of it with a library for this platform.
 
     Args:
-        path: of an FMU with sources.
-        out: of the FMU to write.
+        path: path of an FMU with sources.
+        out: path of the FMU to write.
 
     Returns:
         The path of the FMU that was written.
 
     Raises:
-        ModelError: when it has no sources, there is no compiler, or the sources do not compile.
+        ModelError: if it has no sources, there is no compiler, or the sources do not compile.
     """
     description = read_description(path)
     with tempfile.TemporaryDirectory(prefix="falsifier-build-") as name:
@@ -56,10 +57,10 @@ def build(path: Path, out: Path) -> Path:
 
 
 def compiler() -> list[str]:
-    """Command of a C compiler.
+    """Return the command of a C compiler.
 
     Raises:
-        ModelError: when there is none.
+        ModelError: if there is none.
     """
     for name in _COMPILERS:
         if shutil.which(name):
@@ -73,15 +74,15 @@ def compiler() -> list[str]:
 
 
 def _find_sources(path: Path, folder: Path, major: int, identifier: str) -> _Sources:
-    """Files and macros of one library as the FMU lists them, or else all C files."""
+    """Return the files and macros of one library as listed in the FMU; if none are listed, all C files."""
     listed = _listed_3(folder) if major == 3 else _listed_2(folder, identifier)
     everything = sorted(str(p.relative_to(folder / "sources")) for p in (folder / "sources").glob("*.c"))
     files = listed.files or tuple(everything)
     if not files:
-        raise ModelError(f"{path}: it carries no C sources; export it with sources, or for this platform")
+        raise ModelError(f"{path}: contains no C sources; export it with sources or for this platform")
     missing = [f for f in files if not (folder / "sources" / f).is_file()]
     if missing:
-        raise ModelError(f"{path}: its source files {', '.join(missing)} are missing; export it again")
+        raise ModelError(f"{path}: the source files {', '.join(missing)} are missing; export it again")
     return _Sources(files, listed.defines)
 
 
@@ -118,11 +119,11 @@ def _compile(path: Path, folder: Path, sources: _Sources, target: Path) -> None:
         raise ModelError(f"{path}: the compiler did not finish ({error})") from error
     if done.returncode:
         said = "\n".join(done.stderr.strip().splitlines()[:_SHOWN_LINES])
-        raise ModelError(f"{path}: its sources do not compile with {command[0]}:\n{said}")
+        raise ModelError(f"{path}: the sources do not compile with {command[0]}:\n{said}")
 
 
 def _headers() -> Path:
-    """Folder of the FMI header files that fmpy carries, for FMUs that come without them."""
+    """Return the folder of fmpy's FMI header files, for FMUs that do not contain them."""
     spec = importlib.util.find_spec("fmpy")
     if spec is None or not spec.submodule_search_locations:
         return Path(sysconfig.get_path("include"))

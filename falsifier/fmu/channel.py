@@ -1,6 +1,6 @@
 """Messages between this process, the nursery and the workers: small headers over a local stream socket.
 
-Workers run foreign code, so what they send is numbers and text, never pickles.
+Workers run untrusted code, so they reply with numbers and text, never with pickles.
 """
 
 import contextlib
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 Status = Literal["ok", "failed", "crashed", "timeout", "unusable"]
-# Being woken takes some 40 microseconds on either side, which is much beside a simulation that is over sooner
-# than this; waiting awake that long costs others little.
+# Waking up a process takes about 40 microseconds on either side, which is a lot compared with a simulation
+# shorter than this; polling for this long costs other processes little.
 QUICK_SECONDS = 500e-6
 
 _STATUSES: tuple[Status, ...] = ("ok", "failed", "crashed", "timeout", "unusable")
@@ -29,10 +29,10 @@ class Reply:
 
     Attributes:
         status: how it ended.
-        text: reason unless the status is ok.
-        time: simulated time that was reached in s, -1 where unknown.
-        more: another reply follows without a request.
-        leaving: the process ends after this reply.
+        text: the reason, if the status is not ok; otherwise the result, if the request has one.
+        time: simulated time reached, in s; -1 if unknown.
+        more: whether another reply follows without a request.
+        leaving: whether the process ends after this reply.
     """
 
     status: Status = "ok"
@@ -43,7 +43,7 @@ class Reply:
 
 
 class Closed(Exception):
-    """The other end is gone."""
+    """The other end has closed the connection."""
 
 
 def send_request(
@@ -52,7 +52,7 @@ def send_request(
     """Send one request with file descriptors.
 
     Raises:
-        Closed: when the other end is gone.
+        Closed: if the other end has closed the connection.
     """
     try:
         sock.sendall(_REQUEST.pack(kind, len(descriptors), len(payload)) + payload)
@@ -63,10 +63,10 @@ def send_request(
 
 
 def receive_request(sock: socket.socket) -> tuple[int, bytes, list[int]]:
-    """Wait for one request: kind, payload, file descriptors.
+    """Wait for one request; return its kind, payload and file descriptors.
 
     Raises:
-        Closed: when the other end is gone.
+        Closed: if the other end has closed the connection.
     """
     try:
         kind, count, length = _REQUEST.unpack(_exactly(sock, _REQUEST.size))
@@ -78,7 +78,7 @@ def receive_request(sock: socket.socket) -> tuple[int, bytes, list[int]]:
 
 
 def send_reply(sock: socket.socket, reply: Reply) -> None:
-    """Send one reply; a reader that is gone does not matter."""
+    """Send one reply; a reader that has closed the connection is ignored."""
     text = reply.text.encode("utf-8", "replace")
     header = _REPLY.pack(_STATUSES.index(reply.status), reply.more, reply.leaving, reply.time, len(text))
     with contextlib.suppress(ConnectionError):
@@ -86,13 +86,13 @@ def send_reply(sock: socket.socket, reply: Reply) -> None:
 
 
 def receive_reply(sock: socket.socket, limit: float) -> Reply:
-    """Wait for one reply.
+    """Wait for one reply, at most ``limit`` seconds.
 
     Raises:
-        TimeoutError: when nothing came within limit seconds.
-        Closed: when the other end is gone.
+        TimeoutError: if there was none.
+        Closed: if the other end has closed the connection.
     """
-    # The kernel's own time limit: with Python's a socket cannot be looked at without waiting.
+    # The kernel's timeout: after Python's settimeout, recv would wait in spite of MSG_DONTWAIT, see watch.
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _time_limit(limit))
     try:
         status, more, leaving, reached, length = _REPLY.unpack(_exactly(sock, _REPLY.size))
@@ -105,7 +105,7 @@ def receive_reply(sock: socket.socket, limit: float) -> Reply:
 
 
 def watch(sock: socket.socket, seconds: float) -> None:
-    """Wait awake for the next message, no longer than this; the processor goes to whoever else wants it."""
+    """Poll for the next message for at most this long, yielding the processor to other processes."""
     until = time.perf_counter() + seconds
     while time.perf_counter() < until:
         try:
@@ -113,13 +113,13 @@ def watch(sock: socket.socket, seconds: float) -> None:
         except BlockingIOError:
             os.sched_yield()
         except OSError:
-            return  # whoever receives next is told
+            return  # the next receive reports the error
         else:
             return
 
 
 def close_all(descriptors: list[int]) -> None:
-    """Close file descriptors that came with a request."""
+    """Close the file descriptors received with a request."""
     for descriptor in descriptors:
         with contextlib.suppress(OSError):
             os.close(descriptor)

@@ -1,4 +1,4 @@
-"""Co-simulation: the FMU brings its own solver and is told when to stop and what its inputs are."""
+"""Co-simulation: the FMU contains its own solver; it gets inputs and communication steps."""
 
 import time
 
@@ -11,12 +11,14 @@ from falsifier.fmu.library import Library
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.stepper import Stepper
 
-# Steps before the first look at the clock; looks become rarer while they come in quick succession.
+# Communication steps before the time limit is first checked. If a chunk of steps took less than
+# _QUICK_SECONDS, the next one is larger, so that checking the clock never costs a noticeable share of the
+# time.
 _FIRST_CHUNK, _CHUNK_GROWTH, _QUICK_SECONDS = 1000, 16, 0.01
 
 
 class CoSimulation(Stepper):
-    """Steps one co-simulation FMU through a plan."""
+    """Simulates a co-simulation FMU according to a plan."""
 
     def __init__(self, description: Description, library: Library, plan: Plan, room: Room) -> None:
         self._in_event_mode = description.major == 3 and description.event_mode
@@ -26,7 +28,11 @@ class CoSimulation(Stepper):
         self._addresses = [library.address(name) for name in functions]
 
     def advance(self, deadline: float) -> None:
-        """Do all communication steps; see Stepper.advance."""
+        """Do all communication steps of the plan.
+
+        Raises:
+            SimulationError: if a step fails or the deadline passes.
+        """
         plan, loops, report = self._plan, self._loops, self._report
         version = self._library.description.major
         functions = (self._library.component, *self._addresses, version, int(self._in_event_mode))
@@ -36,7 +42,7 @@ class CoSimulation(Stepper):
         self._read_first()
         step = plan.stop_time / plan.steps
         pieces, held_pieces = self._pieces(self._other_rows), self._pieces(self._held_rows)
-        # Where the loop keeps the current piece (int64) and the last value of each input.
+        # The compiled loop stores the current piece (int64) and the last value (float64) of each input here.
         memory = np.zeros(2 * len(plan.inputs))
         inputs = (
             self._inputs.table,

@@ -1,4 +1,4 @@
-"""Noticing that numba compiles for long, which it does once: later processes load what it kept."""
+"""Detects long compilations by numba; they happen once, later processes load the result from the cache."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,30 +9,30 @@ _LONG_SECONDS = 1.0
 
 @contextmanager
 def on_long_compilation(tell: Callable[[], None], after: float = _LONG_SECONDS) -> Iterator[None]:
-    """Call ``tell`` once if numba compiles within the context and is not done after so many seconds.
+    """Call ``tell`` once if numba is still compiling ``after`` seconds after its first compilation started.
 
-    What is loaded from numba's cache is not compiled. Functions are compiled one inside the other and one
-    after the other; each beginning and each end is an occasion to look at the clock.
+    Loading from numba's cache is not a compilation. Functions are compiled nested and in sequence; the clock
+    is checked at the start and the end of each.
     """
     from numba.core import event
 
-    begun: float | None = None
+    started: float | None = None
     told = False
 
-    def look() -> None:
-        nonlocal begun, told
+    def check_clock() -> None:
+        nonlocal started, told
         now = time.perf_counter()
-        begun = now if begun is None else begun
-        if not told and now - begun > after:
+        started = now if started is None else started
+        if not told and now - started > after:
             told = True
             tell()
 
     class Watcher(event.Listener):  # type: ignore[misc]
         def on_start(self, _event: object) -> None:
-            look()
+            check_clock()
 
         def on_end(self, _event: object) -> None:
-            look()
+            check_clock()
 
     with event.install_listener("numba:compile", Watcher()):
         yield

@@ -1,7 +1,7 @@
 """A model-exchange FMU as a differential equation: inputs, derivatives, event indicators, event iteration.
 
-numba's cache does not notice changes in stepping.py, whose functions are compiled into these: after changing
-them, remove ``__pycache__``.
+Functions of stepping.py are compiled into these, and numba's cache does not notice changes there: after
+changing stepping.py, delete ``__pycache__``.
 """
 
 from typing import NamedTuple
@@ -37,24 +37,25 @@ COMPLETED_STEP, ENTER_EVENT_MODE, UPDATE, ENTER_CONTINUOUS = range(7, 11)
 TIME, NEXT_STEP, NEXT_EVENT = range(3)
 COLUMN, IMPLICIT, STIFF_HITS, OTHER_HITS, EVENTS, JACOBIAN_KNOWN, INDICATORS_KNOWN = range(7)
 
-_MOST_ROUNDS = 1000
+# Rounds of one event iteration after which the FMU is considered stuck.
+_MAX_ROUNDS = 1000
 Floats = NDArray[np.float64]
 
 
 class Model(NamedTuple):
-    """What does not change during a run.
+    """What does not change during a simulation.
 
     Attributes:
-        functions: addresses and facts.
-        ports: continuous inputs (Ports.table).
-        held_ports: inputs that change at events only.
+        functions: instance, FMI version and function addresses, in the order of the constants above.
+        ports: continuous inputs (``Ports.table``).
+        held_ports: inputs that may change only at events.
         getters: recorded variables.
-        pieces: address and number per input of the continuous inputs' pieces (Signal.pieces).
-        held_pieces: the same for the inputs that change at events only.
+        pieces: address of the continuous inputs' pieces (``Signal.pieces``) and their number per input.
+        held_pieces: the same for the inputs that may change only at events.
         weights: absolute tolerance of each state, shape (states,).
         tolerance: relative tolerance.
-        stop_time: end in s.
-        max_step: largest step in s.
+        stop_time: stop time in s.
+        max_step: maximum step in s.
     """
 
     functions: tuple[int, ...]
@@ -70,22 +71,22 @@ class Model(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What changes during a run.
+    """What changes during a simulation.
 
     Attributes:
         clock: time, proposed step and next time event in s.
         counts: column to record next, method and counters.
-        piece: current piece of each continuous input, then of each event-mode input.
+        piece: current piece of each continuous input, then of each input that may change only at events.
         x: states.
-        new_x: states at the end of a tried step.
+        new_x: states at the end of a trial step.
         stages: derivatives at the stages of a step, shape (7, states).
-        work: scratch, shape (4, states).
-        jacobian: derivative of the derivatives by the states.
-        factors: triangular factors of the implicit step's matrix.
-        pivots: rows swapped in these.
+        work: scratch vectors, shape (4, states).
+        jacobian: partial derivatives of the state derivatives with respect to the states.
+        factors: LU factors of the implicit step's matrix.
+        pivots: row exchanges of the factorisation.
         z: event indicators.
         new_z: event indicators at a trial point.
-        events: structures that the FMU fills, uint8[64].
+        events: memory for the structures that the FMU fills at events, uint8[64].
     """
 
     clock: Floats
@@ -104,7 +105,7 @@ class Memory(NamedTuple):
 
 
 def make_memory(states: int, indicators: int, inputs: int) -> Memory:
-    """Memory of a run that starts at time 0."""
+    """Return the memory of a simulation that starts at time 0."""
     return Memory(
         clock=np.array([0.0, 0.0, np.inf]),
         counts=np.zeros(7, dtype=np.int64),
@@ -164,14 +165,14 @@ def _update_3(_typing, f, instance, again, end, nominals, states, defined, time)
 
 @compiled
 def copy(target, source):  # type: ignore[no-untyped-def]
-    """Copy a vector: assigning a slice would have numba compile the formatting of its error message."""
+    """Copy a vector in a loop; for a slice assignment numba would compile the formatting of its error too."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
 @compiled
 def derive(m, s, time, x, derivatives):  # type: ignore[no-untyped-def]
-    """Derivatives at a time within the current pieces of the inputs; returns the FMI status."""
+    """Get the derivatives at a time within the inputs' current pieces; return the FMI status."""
     f, n = m.functions, x.shape[0]
     status = _set_time(f[SET_TIME], f[INSTANCE], time)
     if status <= 1 and n:
@@ -184,14 +185,15 @@ def derive(m, s, time, x, derivatives):  # type: ignore[no-untyped-def]
         status = _vector(f[GET_DERIVATIVES], f[INSTANCE], derivatives.ctypes.data, n)
         for i in range(n):
             if not np.isfinite(derivatives[i]):
-                # A step into a region where the model is not defined is tried again shorter, like a discard.
+                # Treat a step into a region where the model is undefined like fmi2Discard: retry a shorter
+                # one.
                 return max(status, 2)
     return status
 
 
 @compiled
 def get_indicators(m, z):  # type: ignore[no-untyped-def]
-    """Event indicators where the FMU is now; returns the FMI status."""
+    """Get the event indicators at the FMU's current time and state; return the FMI status."""
     if not z.shape[0]:
         return 0
     return _vector(m.functions[GET_INDICATORS], m.functions[INSTANCE], z.ctypes.data, z.shape[0])
@@ -199,7 +201,7 @@ def get_indicators(m, z):  # type: ignore[no-untyped-def]
 
 @compiled
 def complete_step(m, s):  # type: ignore[no-untyped-def]
-    """Tell the FMU that a step was accepted: status, whether it wants an event, whether it ends."""
+    """Report an accepted step to the FMU; return status, whether it requests an event, whether it ends."""
     f = m.functions
     s.events[:8] = 0
     a = s.events.ctypes.data
@@ -214,7 +216,14 @@ def complete_step(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def _update(m, s):  # type: ignore[no-untyped-def]
-    """One round of event iteration, which sets the next time event: status, again, end, states changed."""
+    """Do one round of event iteration and store the next time event.
+
+    The offsets below are those of the fields in fmiEventInfo (FMI 1) and fmi2EventInfo (FMI 2), which the FMU
+    fills; FMI 3 has separate arguments.
+
+    Returns:
+        FMI status, whether another round is needed, whether to terminate, whether states changed.
+    """
     f = m.functions
     s.events[:] = 0
     a = s.events.ctypes.data
@@ -242,10 +251,10 @@ def _update(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def settle(m, s):  # type: ignore[no-untyped-def]
-    """Event iteration until nothing changes; then continuous time again. Status and where it stopped."""
+    """Iterate events until nothing changes, enter continuous time; return status and where it stopped."""
     f = m.functions
     any_change = False
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         status, again, end, changed = _update(m, s)
         if status > 1:
             return status, EVENT
@@ -269,7 +278,7 @@ def settle(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def refresh(m, s):  # type: ignore[no-untyped-def]
-    """Derivatives and indicators at the current time and state. Status and where it stopped."""
+    """Get derivatives and indicators at the current time and state; return status and where it stopped."""
     status = derive(m, s, s.clock[TIME], s.x, s.stages[0])
     if status > 1:
         return status, STEPPING
@@ -280,7 +289,7 @@ def refresh(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def handle_event(m, s):  # type: ignore[no-untyped-def]
-    """Visit event mode at the current time and state. Status and where it stopped."""
+    """Handle an event at the current time and state; return status and where it stopped."""
     f = m.functions
     if f[VERSION] > 1:
         status = call_mode(f[ENTER_EVENT_MODE], f[INSTANCE])
@@ -294,7 +303,7 @@ def handle_event(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def set_event_inputs(m, s):  # type: ignore[no-untyped-def]
-    """Set all inputs to their values at the current time; returns the FMI status."""
+    """Set all inputs to their values at the current time; return the FMI status."""
     f, time = m.functions, s.clock[TIME]
     for j in range(m.ports[3]):
         put(m.ports[2] + j * PLACE_BYTES, value_at(m.pieces, j, s.piece[j], time))
@@ -307,7 +316,7 @@ def set_event_inputs(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def next_break(m, s):  # type: ignore[no-untyped-def]
-    """Start in s of the next piece of any input."""
+    """Return the time in s at which the next piece of any input starts; inf if there is none."""
     nearest = np.inf
     for j in range(m.ports[3]):
         nearest = min(nearest, start_of(m.pieces, j, s.piece[j] + 1))
@@ -318,7 +327,7 @@ def next_break(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def enter_pieces(m, s):  # type: ignore[no-untyped-def]
-    """Go on to the pieces that begin by now; whether an input jumps there."""
+    """Switch to the pieces that have started by now; return whether an input jumps."""
     now = s.clock[TIME] + rounding(s.clock[TIME])
     jumps = False
     for j in range(m.ports[3]):

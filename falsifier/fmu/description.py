@@ -1,4 +1,4 @@
-"""What an FMU says of itself: modelDescription.xml as plain values.
+"""modelDescription.xml, the description of an FMU, as frozen values.
 
 Element and attribute names are those of the FMI standards 1.0.1, 2.0.5 and 3.0.2.
 """
@@ -17,7 +17,7 @@ from falsifier.core.model import Causality, Interface, Kind, ModelInfo, Variable
 from falsifier.errors import ModelError, did_you_mean
 from falsifier.fmu import archive
 
-# Element name -> (kind, type code). A type code is how the FMU's get and set functions pass the value.
+# Element name -> (kind, type code). The type code names the FMU's get and set functions for the value.
 _TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
     "Real": ("real", "Real"),
     "Integer": ("integer", "Integer"),
@@ -49,15 +49,15 @@ _CAUSALITIES: Mapping[str, Causality] = {
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """Where one scalar lives in the FMU.
+    """How to access one scalar in the FMU.
 
     Attributes:
         reference: value reference of the variable or, for an element, of its array.
         type: type code, e.g. ``Real``, ``Float32``, ``Boolean``.
         offset: position in the array in row-major order, 0 for scalars.
         size: number of elements of the array, 1 for scalars.
-        negated: an FMI 1 alias with the opposite sign.
-        refusal: why it cannot be set, empty where it can.
+        negated: whether it is an FMI 1 alias with the opposite sign.
+        refusal: why it cannot be set; empty if it can.
     """
 
     reference: int
@@ -70,17 +70,17 @@ class Slot:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A modelDescription.xml.
+    """Contents of a modelDescription.xml.
 
     Attributes:
-        info: what the other layers need.
+        info: what other packages need.
         token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
         identifiers: file name of the library without suffix, by interface.
-        slots: where each scalar variable lives, by name.
+        slots: how to access each scalar variable, by name.
         arrays: start values of all elements by value reference, for arrays only.
-        states: number of continuous states (FMI 1 and 2; FMI 3 tells it at run time).
+        states: number of continuous states (FMI 1 and 2; FMI 3 reports it at run time).
         indicators: number of event indicators (FMI 1 and 2).
-        event_mode: whether a co-simulation FMU can be driven in event mode (FMI 3).
+        event_mode: whether the co-simulation interface supports event mode (FMI 3).
         needs_tool: names of interfaces that need the exporting tool to be installed.
         saves_state: names of interfaces whose state can be saved and restored.
     """
@@ -102,32 +102,32 @@ class Description:
         return int(self.info.fmi_version[0])
 
     def slot(self, name: str) -> Slot:
-        """Where a variable that is a number lives.
+        """Return how to access a numeric variable.
 
         Raises:
-            ModelError: for an unknown name or a string, with the nearest names.
+            ModelError: if the name is unknown (with the most similar one) or the variable is a string.
         """
         if name not in self.slots:
             raise ModelError(f"{self.info.name}: no variable {name!r}; {did_you_mean(name, self.slots)}")
         if self.slots[name].type == "String":
-            raise ModelError(f"{self.info.name}: {name!r} is a string; only numbers can be simulated with")
+            raise ModelError(f"{self.info.name}: {name!r} is a string; use a numeric variable")
         return self.slots[name]
 
 
 def read_info(path: str | Path) -> ModelInfo:
-    """What an FMU says of itself, without loading its library.
+    """Read the description of an FMU without loading its library.
 
     Raises:
-        ModelError: when the file is not an FMU that this package understands.
+        ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
     """
     return read_description(path).info
 
 
 def read_description(path: str | Path) -> Description:
-    """Description of an FMU; read once per file content.
+    """Return the description of an FMU; a file is read again only if its content has changed.
 
     Raises:
-        ModelError: when the file is not an FMU that this package understands.
+        ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
     """
     path = Path(path)
     return describe(path, archive.file_hash(path))
@@ -135,10 +135,10 @@ def read_description(path: str | Path) -> Description:
 
 @lru_cache(maxsize=32)
 def describe(path: Path, sha256: str) -> Description:
-    """Description of an FMU with this content hash, from memory where it was read before.
+    """Return the description of an FMU whose content has this hash; cached.
 
     Raises:
-        ModelError: when the file is not an FMU that this package understands.
+        ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
     """
     text = archive.read_entry(path, "modelDescription.xml")
     try:
@@ -149,15 +149,15 @@ def describe(path: Path, sha256: str) -> Description:
 
 
 def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Description:
-    """Description of a parsed modelDescription.xml.
+    """Return the description in a parsed modelDescription.xml.
 
     Args:
         root: the ``fmiModelDescription`` element.
         name: file name for error messages.
-        platforms: what the archive carries libraries for.
+        platforms: platforms for which the archive contains binaries.
 
     Raises:
-        ModelError: for versions other than 1, 2 and 3, and for missing or wrong attributes.
+        ModelError: if the FMI version is not 1, 2 or 3, or an attribute is missing or invalid.
     """
     version = root.get("fmiVersion", "")
     if version[:1] not in ("1", "2", "3"):
@@ -280,7 +280,7 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
 
 
 def _states_2(root: Element, elements: list[Element]) -> set[int]:
-    """Positions from 1 of the continuous states (FMI 2; FMI 1 tells them at run time only)."""
+    """Return the positions, counted from 1, of the continuous states; FMI 1 does not list them."""
     states = set()
     for unknown in root.findall("ModelStructure/Derivatives/Unknown"):
         derivative = elements[int(unknown.attrib["index"]) - 1].find("Real")
@@ -306,7 +306,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         default = "continuous" if kind == "real" else "discrete"
         causality, variability, refusal = _role(element, 3, default, has_start=bool(starts))
         if element.get("clocks"):
-            refusal = "it belongs to a clock, and clocks are not supported"
+            refusal = "it belongs to a clock; clocks are not supported"
         shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
         count = prod(shape)
         starts = starts * count if len(starts) == 1 else starts
@@ -347,13 +347,13 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
 def _role(
     element: Element, major: int, default_variability: str = "continuous", *, has_start: bool
 ) -> tuple[Causality, str, str]:
-    """Causality, variability and why the variable cannot be set (empty where it can)."""
+    """Return causality, variability and why the variable cannot be set (empty if it can)."""
     causality = element.get("causality", "local")
     variability = element.get("variability", default_variability)
     if major == 1:
         if variability == "parameter":
             causality, variability = "parameter", "fixed"
-        refusal = "" if has_start or causality == "input" else "it has no start value, the model computes it"
+        refusal = "" if has_start or causality == "input" else "it has no start value; the model computes it"
     elif causality in ("parameter", "input"):
         if causality == "parameter":
             variability = element.get("variability", "fixed")
@@ -361,7 +361,7 @@ def _role(
     elif causality == "structuralParameter":
         refusal = "it is a structural parameter, which sets array sizes"
     elif causality == "calculatedParameter":
-        refusal = "it is a calculated parameter: the model computes it from other parameters, set those"
+        refusal = "it is a calculated parameter; set the parameters from which the model calculates it"
     elif causality == "independent":
         refusal = "it is the independent variable, time"
     else:

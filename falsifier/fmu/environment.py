@@ -1,4 +1,4 @@
-"""The environment that FMU processes see: everything but secrets."""
+"""The environment of the processes that run FMUs: everything except secrets."""
 
 from collections.abc import Mapping
 
@@ -6,7 +6,7 @@ from falsifier.core.secrets import scrubbed
 
 
 def worker_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Environment of the processes that FMUs run in; one thread each, they run side by side."""
+    """Return the environment of a worker: no secrets, and one thread, because workers run in parallel."""
     return {
         **scrubbed(environment),
         "OPENBLAS_NUM_THREADS": "1",

@@ -1,4 +1,4 @@
-"""Simulating in this process: for benchmarks and tests, where a crash of the FMU may be a crash of all."""
+"""Simulation in this process, for benchmarks and tests: a crash of the FMU crashes this process too."""
 
 import atexit
 import shutil
@@ -19,7 +19,7 @@ from falsifier.fmu.worker_order import Order, Reuse
 
 
 class LocalFmu:
-    """One FMU that is loaded into this process."""
+    """An FMU loaded into this process."""
 
     def __init__(self, order: Order) -> None:
         self._lock = threading.Lock()
@@ -37,7 +37,7 @@ class LocalFmu:
     def simulate(
         self, plan: Plan, fill: Callable[[Room], None]
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-        """Simulate once; see IsolatedFmu.simulate."""
+        """Simulate once in this process; arguments, result and errors as for ``IsolatedFmu.simulate``."""
         with self._lock:
             if self._plan is not plan:
                 self._room = Room.over(plan, np.zeros(Room.size(plan)))
@@ -54,7 +54,7 @@ class LocalFmu:
                 ) from None
             log = tuple(self._log)
             if self._reuse is None:
-                # A new process is not to be had here: a new instance comes nearest.
+                # A new process is impossible here; a new instance is the closest alternative.
                 found = self._session.find_reuse()
                 self._reuse = "instance" if found == "process" else found
             return self._room.outputs.copy(), log
@@ -69,7 +69,7 @@ _FMUS: dict[tuple[str, str], LocalFmu] = {}
 
 
 def fmu(order: Order) -> LocalFmu:
-    """Return the loaded FMU of this process."""
+    """Return the FMU as loaded in this process; load it if necessary."""
     key = (order.sha256, order.interface)
     if key not in _FMUS:
         _FMUS[key] = LocalFmu(order)

@@ -1,7 +1,7 @@
 """Single Runge-Kutta steps of a model-exchange FMU, explicit and implicit.
 
-Explicit: Dormand and Prince 5(4), J. Comp. Appl. Math. 6 (1980) 19-26, with the dense output and the test for
-stiffness of Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6, and II, IV.2.
+Explicit: Dormand and Prince 5(4), J. Comp. Appl. Math. 6 (1980) 19-26, with the dense output and the
+stiffness test of Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6, and II, IV.2.
 Implicit: ARK4(3)6L[2]SA-ESDIRK of Kennedy and Carpenter, Appl. Numer. Math. 44 (2003) 139-181.
 """
 
@@ -22,7 +22,7 @@ _A = np.array(
         [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
     ]
 )
-# Fifth minus fourth order.
+# Weights of the error estimate: fifth-order minus fourth-order solution.
 _E = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 _DENSE = np.array(
     [
@@ -60,17 +60,17 @@ _IE = _IB - np.array(
     ]
 )
 
-_MOST_ITERATIONS = 8
-# Newton corrections are accepted well below the error that the step may make.
+_MAX_ITERATIONS = 8
+# Newton's method stops once its correction is well below the error allowed for the step.
 _NEWTON_SHARE = 0.01
 
-# Of step_error: the step failed and is tried again, shorter.
+# Error of a step that could not be completed; it is retried with a shorter step.
 FAILED = np.inf
 
 
 @compiled
 def _norm(m, x, new_x, error):  # type: ignore[no-untyped-def]
-    """Root mean square of an error in units of the tolerance."""
+    """Return the root mean square of an error, in units of the tolerance."""
     total = 0.0
     for i in range(error.shape[0]):
         scale = m.weights[i] + m.tolerance * max(abs(x[i]), abs(new_x[i]))
@@ -80,9 +80,10 @@ def _norm(m, x, new_x, error):  # type: ignore[no-untyped-def]
 
 @compiled
 def explicit_step(m, s, h):  # type: ignore[no-untyped-def]
-    """Try a step of h from ``s.x`` with derivatives ``s.stages[0]``, to ``s.new_x``.
+    """Try a step of h from ``s.x`` with derivatives ``s.stages[0]``; store the result in ``s.new_x``.
 
-    Returns FMI status, error in units of the tolerance, and h times an estimate of the fastest rate.
+    Returns:
+        FMI status, error in units of the tolerance, and h times an estimate of the dominant eigenvalue.
     """
     time, n = s.clock[TIME], s.x.shape[0]
     k, stage, before = s.stages, s.work[0], s.work[1]
@@ -114,7 +115,7 @@ def explicit_step(m, s, h):  # type: ignore[no-untyped-def]
 
 @compiled
 def implicit_step(m, s, h):  # type: ignore[no-untyped-def]
-    """Try an implicit step of h; like explicit_step, ``s.stages[5]`` is the derivative at the end."""
+    """Try an implicit step of h; like explicit_step, but ``s.stages[5]`` is the derivative at the end."""
     while True:
         is_new = not s.counts[JACOBIAN_KNOWN]
         if is_new:
@@ -136,14 +137,14 @@ def implicit_step(m, s, h):  # type: ignore[no-untyped-def]
         for j in range(6):
             total += _IE[j] * s.stages[j, e]
         error[e] = h * total
-    # The stiff components of this difference say nothing; the matrix of the step damps them (Shampine).
+    # This difference overestimates the error of stiff components; the step's matrix damps them (Shampine).
     _substitute(s, error)
     return 0, _norm(m, s.x, s.new_x, error), 0.0
 
 
 @compiled
 def _solve_stages(m, s, h):  # type: ignore[no-untyped-def]
-    """All implicit stages of a step: status and whether they converged."""
+    """Solve all implicit stages of a step; return the FMI status and whether all converged."""
     k, base, n = s.stages, s.work[0], s.x.shape[0]
     for i in range(1, 6):
         for e in range(n):
@@ -160,11 +161,11 @@ def _solve_stages(m, s, h):  # type: ignore[no-untyped-def]
 
 @compiled
 def _solve_stage(m, s, time, hg, derivatives):  # type: ignore[no-untyped-def]
-    """Newton iteration for one stage value in ``s.new_x``; status and whether it converged."""
+    """Solve one stage for ``s.new_x`` by Newton's method; return the FMI status and whether it converged."""
     n = s.x.shape[0]
     base, residual = s.work[0], s.work[1]
     last = np.inf
-    for _ in range(_MOST_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         status = derive(m, s, time, s.new_x, derivatives)
         if status > 1:
             return status, False
@@ -186,7 +187,7 @@ def _solve_stage(m, s, time, hg, derivatives):  # type: ignore[no-untyped-def]
 
 @compiled
 def _find_jacobian(m, s):  # type: ignore[no-untyped-def]
-    """Forward differences at the start of the step; returns the FMI status."""
+    """Approximate the Jacobian at the start of the step by forward differences; return the FMI status."""
     time, n = s.clock[TIME], s.x.shape[0]
     base, moved, at = s.work[1], s.work[2], s.work[3]
     copy(at, s.x)
@@ -194,7 +195,8 @@ def _find_jacobian(m, s):  # type: ignore[no-untyped-def]
     if status > 1:
         return status
     for j in range(n):
-        # The square root of the machine precision, relative to the state or to what counts as zero for it.
+        # 1.5e-8 is the square root of the machine precision, relative to the state or, near 0, to its nominal
+        # value, which the weight contains. The second line makes delta exactly representable.
         delta = 1.5e-8 * max(abs(s.x[j]), 100.0 * m.weights[j] / m.tolerance)
         at[j] = s.x[j] + delta
         delta = at[j] - s.x[j]
@@ -210,7 +212,7 @@ def _find_jacobian(m, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def _factorise(s, hg):  # type: ignore[no-untyped-def]
-    """Triangular factors of 1 - hg J with row exchanges."""
+    """Factorise 1 - hg J into triangular matrices, with row exchanges."""
     a, n = s.factors, s.x.shape[0]
     for i in range(n):
         for j in range(n):
@@ -225,6 +227,7 @@ def _factorise(s, hg):  # type: ignore[no-untyped-def]
             for j in range(n):
                 a[c, j], a[p, j] = a[p, j], a[c, j]
         if a[c, c] == 0.0:
+            # Newton's method then diverges, and the step is retried with a new Jacobian or a shorter step.
             a[c, c] = 1e-300
         for i in range(c + 1, n):
             a[i, c] /= a[c, c]
@@ -234,7 +237,7 @@ def _factorise(s, hg):  # type: ignore[no-untyped-def]
 
 @compiled
 def _substitute(s, b):  # type: ignore[no-untyped-def]
-    """Solve with the factors, in place."""
+    """Solve the linear system with the factors, in place of the right-hand side ``b``."""
     a, n = s.factors, b.shape[0]
     for c in range(n):
         p = s.pivots[c]
@@ -250,7 +253,7 @@ def _substitute(s, b):  # type: ignore[no-untyped-def]
 
 @compiled
 def interpolate(s, h, theta, end_stage, x):  # type: ignore[no-untyped-def]
-    """State at ``theta`` in [0, 1] of the last tried step; cubic after an implicit one."""
+    """Interpolate the state at ``theta`` in [0, 1] of the last trial step; cubic after an implicit step."""
     k = s.stages
     for e in range(s.x.shape[0]):
         change = s.new_x[e] - s.x[e]

@@ -1,7 +1,8 @@
-"""Simulating in other processes: the side that asks.
+"""Simulation in worker processes: the side of the process that requests it.
 
-One nursery per process that simulates, one worker per FMU and interface. A worker that crashes, hangs or
-leaks is replaced; what it was doing becomes a SimulationError.
+Each requesting process has one nursery, from which its workers are forked, and one worker per FMU and
+interface. A worker that crashes, hangs or leaks memory is replaced; the simulation that it was running raises
+a SimulationError.
 """
 
 import atexit
@@ -46,12 +47,13 @@ from falsifier.fmu.worker_order import Order, Reuse
 
 _LOG = logging.getLogger(__name__)
 
-# The worker watches the clock itself; this much later it is taken to hang and is killed.
+# The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
 _GRACE_SECONDS = 0.1
-# Loading an FMU may mean starting a tool's run-time or asking a licence server.
+# Loading an FMU may start the runtime of a tool or contact a licence server.
 _LOADING_SECONDS = 120.0
+# The nursery imports numba and may compile the model-exchange solver, slowly on a busy machine.
 _STARTING_SECONDS = 300.0
-_MOST_LOG_BYTES = 64 << 10
+_MAX_LOG_BYTES = 64 << 10
 
 _BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
     "from falsifier.fmu.nursery import main; main(int(sys.argv[2]), Path(sys.argv[3]))"
@@ -59,7 +61,7 @@ _BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib i
 
 
 class Nursery:
-    """The process that this process's workers are forked from; started at once, awaited when first needed."""
+    """The process from which this one's workers are forked; started at once, waited for when first needed."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -79,19 +81,19 @@ class Nursery:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the process runs."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     def start_worker(self, order: Order, connection: int, log: int) -> int:
-        """Fork a worker that serves the connection; returns its process id.
+        """Fork a worker that serves the connection; return its process id.
 
         Raises:
-            ModelError: when the FMU cannot be unpacked or the nursery is gone.
+            ModelError: if the FMU cannot be unpacked or the nursery has ended.
         """
         return int(self._ask(nursery.START, pickle.dumps(order), (connection, log)))
 
     def reap(self, pid: int) -> int:
-        """Wait for a worker to end; returns its exit code, negative for a signal."""
+        """Wait for a worker to end; return its exit code, negative for a signal."""
         return int(self._ask(nursery.REAP, str(pid).encode(), ()))
 
     def close(self) -> None:
@@ -104,7 +106,7 @@ class Nursery:
         shutil.rmtree(self._root, ignore_errors=True)
 
     def forget(self) -> None:
-        """Let go of it in a forked copy of this process: it belongs to the original."""
+        """Close the connection in a forked copy of this process; the nursery belongs to the original."""
         self._sock.close()
 
     def _ask(self, kind: int, payload: bytes, descriptors: tuple[int, ...]) -> str:
@@ -120,7 +122,7 @@ class Nursery:
                     reply = receive_reply(self._sock, _STARTING_SECONDS)
             except (Closed, TimeoutError) as error:
                 raise ModelError(
-                    "the process that FMU workers are started from has ended; see the messages above"
+                    "the process that starts the FMU workers has ended or hangs; see the messages above"
                 ) from error
         if reply.status != "ok":
             raise ModelError(reply.text)
@@ -128,12 +130,12 @@ class Nursery:
 
 
 class _Worker:
-    """One worker process, the memory it shares with this process, and its messages."""
+    """One worker process, the memory shared with it, and its messages."""
 
     def __init__(self, owner: Nursery, order: Order) -> None:
         self._owner = owner
         self.log = _anonymous_file()
-        # What is written after it was read and cut goes to its new end.
+        # Append mode, so that output after take_log truncated the file starts at its new end.
         fcntl.fcntl(self.log, fcntl.F_SETFL, fcntl.fcntl(self.log, fcntl.F_GETFL) | os.O_APPEND)
         self.sock, theirs = socket.socketpair()
         with theirs:
@@ -144,7 +146,7 @@ class _Worker:
         self.is_quick = False
 
     def prepare(self, plan: Plan) -> Reply:
-        """Share memory for a plan and have the worker look up its names."""
+        """Share memory for a plan with the worker, which then looks up the plan's variables."""
         size = max(Room.size(plan) * 8, 8)
         with _anonymous_file() as file:
             file.truncate(size)
@@ -155,11 +157,11 @@ class _Worker:
         return reply
 
     def wait(self, limit: float) -> Reply:
-        """Outcome of a simulation that was begun.
+        """Return the outcome of the simulation under way, waiting at most ``limit`` seconds.
 
         Raises:
-            TimeoutError: when there is none within limit seconds.
-            Closed: when the process has died.
+            TimeoutError: if there is none by then.
+            Closed: if the process has died.
         """
         started = time.perf_counter()
         if self.is_quick:
@@ -169,17 +171,17 @@ class _Worker:
         return reply
 
     def take_log(self) -> tuple[str, ...]:
-        """Lines that the FMU wrote since the last call."""
+        """Return the lines that the FMU has written since the last call; only the end of long output."""
         size = os.fstat(self.log.fileno()).st_size
         if not size:
             return ()
-        text = os.pread(self.log.fileno(), _MOST_LOG_BYTES, max(0, size - _MOST_LOG_BYTES))
+        text = os.pread(self.log.fileno(), _MAX_LOG_BYTES, max(0, size - _MAX_LOG_BYTES))
         self.log.truncate(0)
         return tuple(text.decode("utf-8", "replace").splitlines())
 
     def kill(self) -> int:
-        """End the process; returns its exit code, negative for a signal."""
-        # A process that is ending by itself keeps its own exit code.
+        """End the process; return its exit code, negative for a signal."""
+        # A process that has already ended keeps its own exit code.
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
         self.sock.close()
@@ -187,12 +189,12 @@ class _Worker:
         try:
             return self._owner.reap(self.pid)
         except ModelError:
-            # The nursery is gone, and with it the exit code; the next worker comes from a new one.
+            # The nursery has ended, so the exit code is unknown; the next worker comes from a new nursery.
             return 0
 
 
 class IsolatedFmu:
-    """Simulates one FMU in a worker process, which is replaced when needed."""
+    """Simulates one FMU in a worker process, which is replaced when necessary."""
 
     def __init__(self, owner: Callable[[], Nursery], order: Order) -> None:
         self._owner, self._order = owner, order
@@ -206,15 +208,15 @@ class IsolatedFmu:
         """Simulate once.
 
         Args:
-            plan: what is common to the simulations.
-            fill: writes parameters and inputs into the memory that the worker reads.
+            plan: what the simulations have in common.
+            fill: writes parameters and inputs to the memory that the worker reads.
 
         Returns:
             The outputs, shape (outputs, samples), and the FMU's messages.
 
         Raises:
-            SimulationError: when there is no full trajectory.
-            ModelError: when the FMU cannot be used.
+            SimulationError: if there is no complete trajectory.
+            ModelError: if the FMU cannot be used.
         """
         with self._lock:
             worker = self._worker_for(plan)
@@ -224,12 +226,13 @@ class IsolatedFmu:
                 reply = worker.wait(plan.time_limit + _GRACE_SECONDS)
             except TimeoutError:
                 raise self._end(
-                    f"stopped after the time limit of {plan.time_limit:g} s without an answer", "timeout"
+                    f"did not finish within the time limit of {plan.time_limit:g} s and was stopped",
+                    "timeout",
                 ) from None
             except Closed:
                 raise self._end("", "crashed") from None
             except BaseException:
-                # Interrupted: its answer would be taken for the next simulation's.
+                # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
                 self._drop()
                 raise
             if reply.status == "unusable":
@@ -252,13 +255,13 @@ class IsolatedFmu:
             self._drop()
 
     def forget(self) -> None:
-        """Let go of the worker in a forked copy of this process."""
+        """Close the connection in a forked copy of this process; the worker belongs to the original."""
         if self._worker is not None:
             self._worker.sock.close()
             self._worker = None
 
     def _started(self, worker: _Worker, plan: Plan, fill: Callable[[Room], None]) -> _Worker:
-        """Have the simulation begin, in a new worker where this one has died since the last one."""
+        """Start the simulation, in a new worker if this one has died since its last simulation."""
         try:
             send_request(worker.sock, RUN)
         except Closed:
@@ -283,11 +286,11 @@ class IsolatedFmu:
         try:
             reply = worker.prepare(plan)
         except (Closed, TimeoutError) as error:
-            how = "hangs" if isinstance(error, TimeoutError) else "crashes"
+            how = "hung" if isinstance(error, TimeoutError) else "crashed"
             log = worker.take_log()
             code = self._drop()
             raise ModelError(
-                f"{self._order.path}: the FMU {how} when it is loaded ({_how_it_ended(code)})"
+                f"{self._order.path}: the FMU {how} while it was loaded ({_how_it_ended(code)})"
                 + "".join(f"\n  {line}" for line in log[-5:])
             ) from None
         except BaseException:
@@ -298,7 +301,7 @@ class IsolatedFmu:
             raise ModelError(f"{self._order.path}: {reply.text}")
 
     def _await_test(self, worker: _Worker, plan: Plan) -> None:
-        """Take the outcome of the worker's test of repeated runs; dying of it says: do not repeat."""
+        """Receive the result of the worker's reuse test; if it crashed or hung, never reuse a process."""
         worker.awaits_test = False
         try:
             reply = receive_reply(worker.sock, 5 * plan.time_limit + _GRACE_SECONDS)
@@ -316,7 +319,7 @@ class IsolatedFmu:
 
     def _end(self, reason: str, status: FailureStatus) -> SimulationError:
         worker = self._worker
-        assert worker is not None, "a simulation was under way"
+        assert worker is not None, "_end is called during a simulation"
         log = worker.take_log()
         code = self._drop()
         name = self._order.description.info.name
@@ -340,7 +343,7 @@ def _last_line(log: tuple[str, ...]) -> str:
 
 def _how_it_ended(code: int) -> str:
     if code >= 0:
-        return f"it ended itself with exit code {code}"
+        return f"it exited with code {code}"
     try:
         return f"signal {signal.Signals(-code).name}"
     except ValueError:
@@ -348,7 +351,7 @@ def _how_it_ended(code: int) -> str:
 
 
 def _anonymous_file() -> IO[bytes]:
-    """A file without a name, in memory where the system offers that."""
+    """Open a file without a name, in memory if the system supports that."""
     if hasattr(os, "memfd_create"):
         return os.fdopen(os.memfd_create("falsifier-fmu"), "w+b")
     return tempfile.TemporaryFile()
@@ -359,7 +362,7 @@ def _floats(file: IO[bytes], size: int) -> NDArray[np.float64]:
 
 
 class _Registry:
-    """Nursery and workers of this process; a forked copy starts with none."""
+    """Nursery and workers of this process; a forked copy of the process starts without any."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -1,4 +1,4 @@
-"""An FMU's shared library: loaded and instantiated through fmpy, called by address."""
+"""An FMU's shared library: loaded and instantiated with fmpy, called by function address."""
 
 import ctypes
 import os
@@ -22,12 +22,12 @@ LogSink = Callable[[str], None]
 
 
 def status_name(status: int) -> str:
-    """Name of an FMI status."""
+    """Return the name of an FMI status."""
     return _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {status}"
 
 
 def load_binding() -> None:
-    """Import what loading any FMU needs, so that processes forked from this one have it already."""
+    """Import what loading any FMU needs, so that processes forked from this one need not."""
     from fmpy import fmi1, fmi2, fmi3, logging  # noqa: F401
 
 
@@ -35,13 +35,13 @@ class Library:
     """One loaded library with one instance.
 
     Args:
-        description: of the FMU.
-        folder: where the FMU was extracted.
-        interface: how it is simulated.
-        log: receives the FMU's messages, one by one.
+        description: description of the FMU.
+        folder: folder to which the FMU was extracted.
+        interface: interface to instantiate.
+        log: called with each of the FMU's messages.
 
     Raises:
-        ModelError: when the library is missing, cannot be loaded or gives no instance.
+        ModelError: if the library is missing, cannot be loaded or cannot be instantiated.
     """
 
     def __init__(self, description: Description, folder: Path, interface: Interface, log: LogSink) -> None:
@@ -63,7 +63,7 @@ class Library:
         return int(getattr(component, "value", component))
 
     def address(self, name: str) -> int:
-        """Address of an FMI function, named without ``fmi2``; 0 when the library has none."""
+        """Return the address of an FMI function, named without ``fmi2``; 0 if it is not exported."""
         try:
             function = getattr(self._fmu.dll, self._symbol(name))
         except AttributeError:
@@ -71,29 +71,29 @@ class Library:
         return ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def function(self, name: str, *argument_types: Any) -> Callable[..., int]:
-        """An FMI function that takes the instance and arguments of these types and returns a status.
+        """Return an FMI function whose arguments are the instance and arguments of these types.
 
         Raises:
-            ModelError: when the library has none of this name.
+            ModelError: if the library does not export it.
         """
         address = self.address(name)
         if not address:
             raise ModelError(
-                f"{self.description.info.name}: the library has no function {self._symbol(name)}"
+                f"{self.description.info.name}: the library does not export {self._symbol(name)}"
             )
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *argument_types)
         return prototype(address)
 
     def getters(self) -> dict[str, int]:
-        """Addresses of the functions that read values, by type code."""
+        """Return the addresses of the functions that read values, by type code."""
         return {code: self.address(f"Get{code}") for code in _TYPES[self.description.major]}
 
     def setters(self) -> dict[str, int]:
-        """Addresses of the functions that write values, by type code."""
+        """Return the addresses of the functions that write values, by type code."""
         return {code: self.address(f"Set{code}") for code in _TYPES[self.description.major]}
 
     def renew(self) -> None:
-        """Replace the instance by a new one of the same library."""
+        """Replace the instance with a new one from the same library."""
         self._free()
         self._instantiate()
 
@@ -104,6 +104,7 @@ class Library:
 
     def _symbol(self, name: str) -> str:
         if self.description.major == 1:
+            # FMI 1 prefixes exported functions with the model identifier.
             return f"{self.description.identifiers[self.interface]}_fmi{name}"
         return self._prefix + name
 
@@ -115,13 +116,13 @@ class Library:
             return
         has_sources = any((folder / "sources").glob("*.c"))
         cure = (
-            "it carries C sources: compile them with `falsifier build`"
+            "it contains C sources: compile them with `falsifier build`"
             if has_sources
             else "export it again for this platform"
         )
         raise ModelError(
-            f"{info.name}: no library for {archive.this_platform()} ({file} is missing); "
-            f"it has {', '.join(info.platforms) or 'no binaries'}; {cure}"
+            f"{info.name}: no binary for {archive.this_platform()} ({file} is missing), "
+            f"only {', '.join(info.platforms) or 'no binaries at all'}; {cure}"
         )
 
     def _load(self, folder: Path) -> Any:
@@ -144,15 +145,18 @@ class Library:
         )
 
     def _instantiate(self) -> None:
+        # Some FMUs change the working directory when they are instantiated.
         here = Path.cwd()
         try:
             self._fmu.instantiate(**self._arguments())
         except Exception as error:
-            raise ModelError(f"{self.description.info.name}: the FMU gives no instance: {error}") from error
+            raise ModelError(
+                f"{self.description.info.name}: instantiating the FMU failed: {error}"
+            ) from error
         finally:
             os.chdir(here)
         if not self._fmu.component:
-            raise ModelError(f"{self.description.info.name}: the FMU gives no instance")
+            raise ModelError(f"{self.description.info.name}: instantiating the FMU failed")
 
     def _arguments(self) -> dict[str, Any]:
         if self.description.major == 3:
@@ -164,7 +168,7 @@ class Library:
         return {"functions" if self.description.major == 1 else "callbacks": self._callbacks()}
 
     def _callbacks(self) -> Any:
-        """Callbacks of FMI 1 and 2; fmpy's proxy writes out the printf-like messages."""
+        """Return the callbacks of FMI 1 and 2; fmpy's proxy expands the printf-style messages."""
         from fmpy import calloc, fmi1, fmi2, free
 
         version: Any = fmi1 if self.description.major == 1 else fmi2

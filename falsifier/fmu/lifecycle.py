@@ -1,4 +1,8 @@
-"""Start, end and reset of a simulation, in the words of FMI 1, 2 and 3."""
+"""Start, end and reset of a simulation: the calls that FMI 1, 2 and 3 require, in their order.
+
+Parameters and start values are set before initialisation. Inputs are set within initialization mode (FMI 2
+and 3), because there they may depend on nothing else, and the FMU computes its outputs and states from them.
+"""
 
 import ctypes
 from abc import ABC, abstractmethod
@@ -26,10 +30,11 @@ class EventInfo1(ctypes.Structure):
 
 
 class Lifecycle(ABC):
-    """What surrounds the stepping of one simulation.
+    """The calls before and after the stepping of one simulation.
 
     Attributes:
-        first_events: what FMI 1 model exchange says at its initialisation; None where event mode tells it.
+        first_events: events reported by the initialisation of FMI 1 model exchange; None for all others,
+            which report them in event mode.
     """
 
     first_events: EventInfo1 | None = None
@@ -39,23 +44,23 @@ class Lifecycle(ABC):
 
     @abstractmethod
     def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
-        """Bring a fresh or reset instance to the state in which it can be stepped.
+        """Initialise a new or reset instance, after which it can be stepped.
 
         Raises:
-            SimulationError: when the FMU refuses.
+            SimulationError: if the FMU reports an error.
         """
 
     def terminate(self) -> None:
-        """End the simulation."""
+        """End the simulation; a bad status is ignored, because the trajectory is complete."""
         self._call.status("Terminate")
 
     def reset(self) -> bool:
-        """Bring the instance back to its beginning; False where the FMU cannot."""
+        """Reset the instance to its state after instantiation; return False if the FMU cannot do that."""
         return self._call.try_reset("Reset")
 
 
 def make_lifecycle(library: Library) -> Lifecycle:
-    """Life cycle of the library's FMI version and interface."""
+    """Return the life cycle for the library's FMI version and interface."""
     if library.description.major == 3:
         return _Lifecycle3(library)
     if library.description.major == 2:
@@ -64,7 +69,7 @@ def make_lifecycle(library: Library) -> Lifecycle:
 
 
 class _Calls:
-    """Calls FMI functions and turns bad statuses into errors."""
+    """Calls FMI functions and converts bad statuses to errors."""
 
     def __init__(self, library: Library) -> None:
         self._library = library
@@ -156,5 +161,5 @@ class _Model1(Lifecycle):
         self._call.status("Terminate")
 
     def reset(self) -> bool:
-        # FMI 1 model exchange has no reset.
+        # FMI 1 model exchange does not define a reset.
         return False

@@ -1,4 +1,4 @@
-"""Model exchange: the FMU is a differential equation and is solved here."""
+"""Model exchange: the FMU is a differential equation, solved by solver.py."""
 
 import ctypes
 
@@ -16,7 +16,8 @@ from falsifier.fmu.lifecycle import Lifecycle
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.stepper import Stepper
 
-_STEPS_PER_CLOCK_LOOK = 2000
+# Solver steps between two checks of the time limit.
+_STEPS_PER_CLOCK_CHECK = 2000
 _DEFAULT_TOLERANCE = 1e-6
 # Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7).
 _ABSOLUTE_SHARE = 0.01
@@ -39,7 +40,7 @@ _NAMES = {
 
 
 def warm_up() -> None:
-    """Compile the solver, or load it from the cache, without an FMU."""
+    """Compile the solver, or load it from the cache; needs no FMU."""
     from numba import typeof
 
     table = (0, 0, 0, 0)
@@ -47,12 +48,12 @@ def warm_up() -> None:
     memory = make_memory(0, 0, 0)
     for function in (continuous.settle, continuous.refresh):
         function.compile((typeof(model), typeof(memory)))
-    # A run that has no column left to record calls nothing.
+    # With no column left to record, this returns before it calls the FMU.
     solver.advance(model, memory, np.zeros((0, 0)), 1)
 
 
 class ModelExchange(Stepper):
-    """Solves one model-exchange FMU through a plan."""
+    """Simulates a model-exchange FMU according to a plan."""
 
     def __init__(
         self, description: Description, library: Library, plan: Plan, room: Room, lifecycle: Lifecycle
@@ -64,7 +65,11 @@ class ModelExchange(Stepper):
         self._tolerance = plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE
 
     def advance(self, deadline: float) -> None:
-        """Solve to the stop time; see Stepper.advance."""
+        """Solve the differential equation up to the stop time.
+
+        Raises:
+            SimulationError: if a step fails, events never end, or the deadline passes.
+        """
         memory = make_memory(self._states, self._indicators, len(self._plan.inputs))
         pieces, held_pieces = self._pieces(self._other_rows), self._pieces(self._held_rows)
         model = self._model(pieces, held_pieces)
@@ -73,7 +78,7 @@ class ModelExchange(Stepper):
         memory.counts[continuous.COLUMN] = 1
         memory.clock[continuous.NEXT_STEP] = model.max_step
         while True:
-            status, where = solver.advance(model, memory, self._room.outputs, _STEPS_PER_CLOCK_LOOK)
+            status, where = solver.advance(model, memory, self._room.outputs, _STEPS_PER_CLOCK_CHECK)
             reached = float(memory.clock[continuous.TIME])
             if where == solver.PAUSED:
                 self._watch_clock(deadline, reached)
@@ -98,7 +103,7 @@ class ModelExchange(Stepper):
         )
 
     def _begin(self, model: Model, memory: Memory) -> None:
-        """From initialisation to continuous time, through the events at time 0."""
+        """Get from initialisation to continuous time, handling the events at time 0."""
         self._vector("GetContinuousStates", "GetContinuousStates", memory.x)
         info = self._lifecycle.first_events
         if info is None or info.iteration_converged == b"\x00":
@@ -111,13 +116,13 @@ class ModelExchange(Stepper):
             status, where = continuous.refresh(model, memory)
         self._check(status, where, 0.0)
         if info is None:
-            # After event mode the FMU may have new states, whether it says so or not.
+            # Event mode may have changed the states, whether the FMU reports it or not.
             self._vector("GetContinuousStates", "GetContinuousStates", memory.x)
             status, where = continuous.refresh(model, memory)
             self._check(status, where, 0.0)
 
     def _vector(self, name_1: str, name: str, values: NDArray[np.float64]) -> None:
-        """Have the FMU fill a vector with one value per state."""
+        """Get a vector with one value per state from the FMU."""
         if not values.size:
             return
         function = self._library.function(
@@ -130,7 +135,7 @@ class ModelExchange(Stepper):
         return variable.kind != "real" or variable.variability != "continuous"
 
     def _sizes(self, description: Description) -> tuple[int, int]:
-        """Number of states and of event indicators."""
+        """Return the number of states and of event indicators; FMI 3 reports them only at run time."""
         if description.major < 3:
             return description.states, description.indicators
         sizes = []

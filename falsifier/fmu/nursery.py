@@ -1,8 +1,8 @@
-"""The process that FMU workers are forked from.
+"""The process from which FMU workers are forked.
 
-It is started once by a process that simulates, with a clean environment and no threads. It imports and
-compiles what every worker needs, so that a new worker costs a fork. FMUs are extracted to a folder that it
-owns and removes when its parent is gone, for whatever reason.
+Each process that simulates starts one, with a clean environment and no threads. It imports and compiles what
+every worker needs; starting a worker then costs only a fork. It extracts FMUs to a folder of its own, which
+it removes when its parent ends, however that happens.
 """
 
 import contextlib
@@ -27,14 +27,14 @@ from falsifier.fmu.worker_order import Order
 
 START, REAP = 1, 2
 
-# Share of the machine's memory that one worker may take; beyond it, allocations fail inside the FMU.
+# Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
 _COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
 _LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
 
 
 def main(descriptor: int, root: Path) -> None:
-    """Serve the parent on a socket until it is gone; FMUs are extracted below root."""
+    """Serve the parent on a socket until it closes; FMUs are extracted below ``root``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sock = socket.socket(fileno=descriptor)
     nursery = _Nursery(sock, root)
@@ -92,7 +92,7 @@ class _Nursery:
         return Reply(text=str(pid))
 
     def _load_solver(self) -> None:
-        """Compile the solver before the first fork that needs it: not within a simulation's time limit."""
+        """Compile the solver before the first fork that needs it, outside any simulation's time limit."""
         if self._has_solver:
             return
         from falsifier.fmu import model_exchange
@@ -112,7 +112,7 @@ class _Nursery:
         if not folder.is_dir():
             if archive.file_hash(order.path) != order.sha256:
                 raise ModelError(
-                    f"{order.path}: the file has changed since the model was loaded; load it again"
+                    f"{order.path}: the file has changed since the model was loaded; load the model again"
                 )
             partial = folder.with_suffix(".partial")
             archive.extract(order.path, partial)
@@ -121,7 +121,7 @@ class _Nursery:
 
 
 def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoReturn:
-    """Turn this freshly forked process into a worker; it ends here."""
+    """Run this newly forked process as a worker and exit."""
     code = 1
     try:
         for stream in (1, 2):
@@ -135,21 +135,21 @@ def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoR
     except BaseException:
         traceback.print_exc()
     finally:
-        # No clean-up of the nursery's own in its copy.
+        # Skip the nursery's own clean-up: this copy of it must not remove the folder or end other workers.
         os._exit(code)
 
 
 def _limit_resources() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if sys.platform == "linux":
-        # Private writable memory: what a model allocates, not the address space that run-times reserve.
+        # RLIMIT_DATA counts what a model allocates, not the address space that runtimes merely reserve.
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
         limit = int(memory * _MEMORY_SHARE)
         resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def _flush_lines() -> None:
-    """Have C's stdout written line by line, so that a crash loses nothing that the FMU printed."""
+    """Make C's stdout line-buffered, so that what the FMU printed before a crash is not lost."""
     libc = ctypes.CDLL(None)
     with contextlib.suppress(AttributeError, ValueError):
         stdout = ctypes.c_void_p.in_dll(libc, "stdout")

@@ -1,4 +1,4 @@
-"""One kind of simulation of one FMU: names looked up and refused once, before the first run."""
+"""What all simulations of one search have in common, checked once before the first of them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,25 +7,25 @@ from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu.description import Description
 
-# How far a ratio of two steps may lie from a whole number and still mean it.
+# Maximum relative distance of a ratio of two steps from an integer at which it counts as that integer.
 _RATIO_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is common to all simulations of a search.
+    """What all simulations of a search have in common.
 
     Attributes:
-        inputs: names of the driven inputs, in the order of their rows.
+        inputs: names of the inputs that are set, in the order of their rows.
         parameters: names of the parameters and start values that are set.
         outputs: names of the recorded variables, in the order of their rows.
-        stop_time: end in s.
+        stop_time: stop time in s.
         samples: number of points of the output grid.
         every: communication steps per output interval (co-simulation).
-        pieces: room for this many pieces of each input, see Signal.pieces.
-        max_step: largest step of the solver in s (model exchange).
-        tolerance: relative tolerance, None for the model's own.
-        time_limit: wall-clock seconds for one simulation.
+        pieces: maximum number of pieces of an input, see ``Signal.pieces``.
+        max_step: maximum step of the solver in s (model exchange).
+        tolerance: relative tolerance; None for the model's default.
+        time_limit: maximum wall-clock time of one simulation in s.
     """
 
     inputs: tuple[str, ...]
@@ -53,11 +53,11 @@ def make_plan(
     *,
     pieces: int = 1,
 ) -> Plan:
-    """Look up and check everything that the simulations of a search have in common.
+    """Look up and check what the simulations of a search have in common.
 
     Raises:
-        ModelError: for names that the model does not have or that cannot be driven, set or recorded.
-        SpecError: when the steps do not fit each other.
+        ModelError: naming a variable that the model does not have or that cannot be set or recorded.
+        SpecError: if the steps and the stop time are not multiples of each other.
     """
     plan = Plan(
         inputs=tuple(inputs),
@@ -79,7 +79,7 @@ def make_plan(
             known = ", ".join(v.name for v in description.info.inputs) or "none"
             role = kinds[name].causality
             raise ModelError(
-                f"{model}: {name!r} is not an input (its causality is {role}); inputs are: {known}"
+                f"{model}: {name!r} is not an input, its causality is {role}; the inputs are: {known}"
             )
     for name in plan.parameters:
         slot = description.slot(name)
@@ -108,8 +108,8 @@ def _whole(what: str, total: float, key: str, part: float) -> int:
     count = round(ratio)
     if count < 1 or abs(ratio - count) > _RATIO_ROUNDING * count:
         raise SpecError(
-            f"{what} = {total:g} s is not a whole multiple of {key} = {part:g} s; "
-            f"try {total / max(count, 1):g}",
+            f"{what} = {total:g} s is not an integer multiple of {key} = {part:g} s; "
+            f"try {key} = {total / max(count, 1):g}",
             key=key,
         )
     return count

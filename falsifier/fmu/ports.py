@@ -1,8 +1,8 @@
 """Reading and writing many variables of an FMU at once, whatever their types.
 
-An FMU hands out values type by type: one call for all Reals, one for all Booleans. A :class:`Ports` value
-holds, as plain integer tables that compiled code can walk, which calls to make and where each variable lies
-in the buffers that the calls fill.
+An FMU transfers values by type: one call for all Reals, one for all Booleans. A :class:`Ports` value contains
+integer tables, suitable for compiled code, of the calls to make and of each variable's location in the
+buffers of these calls.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,10 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description import Description, Slot
 
 Table = NDArray[np.int64]
-# What the loops get of Ports: integers, because compiled code counts references to every array it touches.
+# What the compiled loops receive of Ports: integers, because compiled code counts references to arrays.
 Addresses = tuple[int, int, int, int]
 
-# How a value lies in memory: the position is the code that the compiled loops switch on.
+# Storage types of values; the position in this tuple is the code that the compiled loops branch on.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
 
 _STORED_3: Mapping[str, str] = {
@@ -37,17 +37,17 @@ _STORED: Mapping[int, Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ports:
-    """Calls and places for some variables.
+    """FMI calls and memory locations for some variables.
 
     Attributes:
-        calls: one row per FMI call: address of the function, of the value references, number of these,
-            address of the values, number of these.
+        calls: one row per FMI call: address of the function, address and number of the value references,
+            address and number of the values.
         places: one row per variable: storage code, address of the value, sign (-1 for a negated alias), and
             1 for a Boolean.
-        limits: smallest and largest number that fits, shape (n, 2); infinite for floating point.
-        memory: the arrays that the addresses point into.
-        table: what the loops get: address and number of the calls, address and number of the places.
-        is_limited: whether any of the variables has limits.
+        limits: smallest and largest number of each variable's type, shape (n, 2); infinite for floating
+        point. memory: the arrays to which the addresses point; a reference keeps them alive. table: argument
+        of the compiled loops: address and number of calls, address and number of places. is_limited: whether
+        any of the variables has limits.
     """
 
     calls: Table
@@ -59,15 +59,15 @@ class Ports:
 
 
 def make_ports(description: Description, names: Sequence[str], addresses: Mapping[str, int]) -> Ports:
-    """Calls and places for the named variables.
+    """Return the calls and memory locations for the named variables.
 
     Args:
-        description: of the FMU.
-        names: variables, which become the rows of ``places`` in this order.
-        addresses: of the get or of the set functions, by type code.
+        description: description of the FMU.
+        names: names of the variables, in the order of the rows of ``places``.
+        addresses: addresses of either the get or the set functions, by type code.
 
     Raises:
-        ModelError: when the library has no function for a type.
+        ModelError: if the library does not export the function for a type.
     """
     slots = [description.slot(name) for name in names]
     places = np.zeros((len(names), 4), dtype=np.int64)
@@ -79,6 +79,7 @@ def make_ports(description: Description, names: Sequence[str], addresses: Mappin
         stored = _STORED[description.major][code]
         references = np.array(list(starts), dtype=np.uint32)
         values = np.zeros(sum(_sizes(members).values()), dtype=stored)
+        # A set call transfers whole arrays: elements that are not searched keep their start values.
         for reference, start in starts.items():
             if reference in description.arrays:
                 numbers = description.arrays[reference]
@@ -86,7 +87,7 @@ def make_ports(description: Description, names: Sequence[str], addresses: Mappin
         address = addresses.get(code, 0)
         if not address:
             raise ModelError(
-                f"{description.info.name}: the library has no function for values of type {code}"
+                f"{description.info.name}: the library does not export the function for values of type {code}"
             )
         calls.append((address, references.ctypes.data, references.size, values.ctypes.data, values.size))
         memory += [references, values]
@@ -113,7 +114,7 @@ def _sizes(slots: Sequence[Slot]) -> dict[int, int]:
 
 
 def _starts(slots: Sequence[Slot]) -> dict[int, int]:
-    """Position of each value reference's first value in the buffer of its call."""
+    """Return the position of each value reference's first value in the buffer of its call."""
     starts, position = {}, 0
     for reference, size in _sizes(slots).items():
         starts[reference] = position

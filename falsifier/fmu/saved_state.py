@@ -1,4 +1,4 @@
-"""The state of a fresh FMU instance, kept so that later simulations can start from it (FMI 2 and 3)."""
+"""The saved state of a new FMU instance, from which later simulations can start (FMI 2 and 3)."""
 
 from ctypes import byref, c_void_p
 
@@ -8,10 +8,10 @@ _NAMES = {2: "FMUstate", 3: "FMUState"}
 
 
 class SavedState:
-    """One saved state of a library's instance; it belongs to that instance and ends before it.
+    """A saved state of a library's instance; it must be freed before that instance.
 
     Args:
-        library: with the instance.
+        library: the loaded library with its instance.
     """
 
     def __init__(self, library: Library) -> None:
@@ -25,20 +25,20 @@ class SavedState:
         return self._state.value is not None
 
     def take(self) -> bool:
-        """Save the state as it is now; False where the FMU cannot."""
+        """Save the current state; return False if the FMU cannot do that."""
         if not all(self._library.address(f"{verb}{self._name}") for verb in ("Get", "Set", "Free")):
             return False
         get = self._library.function(f"Get{self._name}", c_void_p)
         return get(self._library.component, byref(self._state)) <= 1 and self.is_taken
 
     def restore(self) -> bool:
-        """Bring the instance back to the saved state; False where there is none or the FMU refuses."""
+        """Restore the saved state; return False if there is none or the FMU reports an error."""
         if not self.is_taken:
             return False
         return self._library.function(f"Set{self._name}", c_void_p)(self._library.component, self._state) <= 1
 
     def forget(self) -> None:
-        """Free the state, as it must be before its instance is freed."""
+        """Free the saved state; required before its instance is freed."""
         if self.is_taken:
             self._library.function(f"Free{self._name}", c_void_p)(self._library.component, byref(self._state))
             self._state = c_void_p()

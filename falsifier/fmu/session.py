@@ -1,4 +1,4 @@
-"""One FMU instance that is simulated again and again: the life cycle around the compiled loops."""
+"""An FMU that is simulated repeatedly: when to reset, restore or replace its instance."""
 
 import time
 from pathlib import Path
@@ -22,16 +22,16 @@ _CHEAPEST_FIRST: tuple[Reuse, ...] = ("reset", "state", "instance")
 
 
 class Session:
-    """A loaded FMU and how to simulate it according to a plan.
+    """A loaded FMU that simulates according to a plan.
 
     Args:
-        description: of the FMU.
-        folder: where it was extracted.
-        interface: how it is simulated.
-        log: receives the FMU's messages.
+        description: description of the FMU.
+        folder: folder to which it was extracted.
+        interface: interface to simulate with.
+        log: called with each of the FMU's messages.
 
     Raises:
-        ModelError: when the FMU cannot be loaded.
+        ModelError: if the FMU cannot be loaded.
     """
 
     def __init__(self, description: Description, folder: Path, interface: Interface, log: LogSink) -> None:
@@ -43,19 +43,19 @@ class Session:
         self.reuse: Reuse = "instance"
 
     def prepare(self, plan: Plan, room: Room) -> None:
-        """Look up what the simulations of a plan need.
+        """Prepare for the simulations of a plan.
 
         Raises:
-            ModelError: when the library lacks functions for the plan's variables.
+            ModelError: if the library lacks functions for the plan's variables.
         """
         self._plan, self._room = plan, room
         self._stepper = self._make_stepper(plan, room)
 
     def run(self) -> None:
-        """Simulate once: from the room's parameters and inputs to its outputs.
+        """Simulate once, from the room's parameters and inputs to its outputs.
 
         Raises:
-            SimulationError: when there is no full trajectory.
+            SimulationError: if there is no complete trajectory.
         """
         deadline = time.perf_counter() + self._plan.time_limit
         if self._state != "new" and not self._is_brought_back():
@@ -64,6 +64,7 @@ class Session:
             self._state = "new"
         if self._state == "new" and self.reuse == "state" and not self._saved.take():
             self.reuse = "instance"
+        # Stays so if anything below raises an exception: such an instance cannot be reset reliably.
         self._state = "broken"
         self._lifecycle.initialise(self._plan, self._stepper.set_parameters, self._stepper.set_first_inputs)
         self._stepper.advance(deadline)
@@ -71,10 +72,10 @@ class Session:
         self._state = "finished"
 
     def find_reuse(self) -> Reuse:
-        """Find out what makes a second simulation equal to the first one, whose outcome is in the room.
+        """Find the cheapest way to start again that reproduces the outputs of the first simulation.
 
-        The room stays as it is. A model whose runs differ even in new instances gets a new process each time:
-        its library keeps something from run to run.
+        These are in the room, which is not changed. If even a new instance gives other outputs, the library
+        keeps state between simulations, and each simulation needs a new process.
         """
         plan, room = self._plan, self._room
         expected = room.outputs.copy()
@@ -85,13 +86,13 @@ class Session:
             self.reuse = reuse
             try:
                 if reuse == "state":
-                    self.run()  # takes the state that the next runs start from
-                    self.run()  # from then on the state must serve again and again
+                    self.run()  # saves the state from which the next simulations start
+                    self.run()  # starts from it once; the run below shows that it can be restored repeatedly
                 trial.outputs[:] = 0.0
                 self.run()
             except FalsifierError:
                 continue
-            # An instance that refused its reset or its state was replaced: that is another way to begin.
+            # If the instance rejected its reset or its state, it was replaced; then this way was not tested.
             if self.reuse == reuse and np.array_equal(trial.outputs, expected, equal_nan=True):
                 found = reuse
                 break
@@ -105,7 +106,7 @@ class Session:
         self._library.close()
 
     def _is_brought_back(self) -> bool:
-        """Whether the instance of a finished simulation was brought back to its beginning."""
+        """Reset the instance after a finished simulation or restore its state; return whether that worked."""
         if self._state != "finished":
             return False
         if self.reuse == "reset" and self._lifecycle.reset():
@@ -117,7 +118,7 @@ class Session:
         return False
 
     def _possible(self) -> tuple[Reuse, ...]:
-        """Ways to begin again that the FMU says it has, the cheapest first."""
+        """Return the ways to start again that the FMU declares, the cheapest first."""
         saves = self._library.interface in self._description.saves_state
         return tuple(reuse for reuse in _CHEAPEST_FIRST if saves or reuse != "state")
 

@@ -1,4 +1,4 @@
-"""FMUs as models."""
+"""FMUs as models: the implementation of the Model protocol."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,16 +23,16 @@ from falsifier.fmu.worker_order import Order
 
 @dataclass(frozen=True, slots=True)
 class FmuModel:
-    """An FMU and how it is simulated; nothing is loaded before the first simulation.
+    """An FMU and how to simulate it; the library is loaded at the first simulation.
 
     Attributes:
-        path: of the .fmu file.
-        interface: ``co-simulation`` (the FMU brings its own solver) or ``model-exchange``.
-        isolate: simulate in a worker process; without it a crash of the FMU is a crash of this process.
-        sha256: of the file, so that equal models are equal files.
+        path: path of the .fmu file.
+        interface: ``co-simulation`` (the FMU contains its own solver) or ``model-exchange``.
+        isolate: whether to simulate in a worker process; if not, a crash of the FMU crashes this process.
+        sha256: hash of the file; models with different files are not equal.
 
     Raises:
-        ModelError: when the file is not an FMU or does not offer the interface.
+        ModelError: if the file is not an FMU or does not offer the interface.
     """
 
     path: Path
@@ -47,21 +47,23 @@ class FmuModel:
 
     @property
     def info(self) -> ModelInfo:
-        """What the FMU says of itself."""
+        """The FMU's description of itself."""
         return self._description.info
 
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
     ) -> Trajectory:
-        """Simulate once; see falsifier.core.model.Model.simulate.
+        """Simulate once, as described in ``falsifier.core.model.Model.simulate``.
 
-        Inputs are set at each communication point to the signal's value there. Integer, Boolean and
-        enumeration inputs get the nearest number.
+        In co-simulation an input is set at each communication point to the signal's value at that time; in
+        model exchange the solver evaluates it at any time. Integer, Boolean and enumeration inputs are
+        rounded.
         """
         tables = self._pieces(signals, experiment)
-        most = max(map(len, tables), default=1)
-        # Room for a power of two, so that few plans serve candidates with any number of control points.
-        task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (most - 1).bit_length())
+        pieces = max(map(len, tables), default=1)
+        # Rounded up to a power of two, so that a few plans suffice for candidates with any number of control
+        # points.
+        task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (pieces - 1).bit_length())
 
         def fill(room: Room) -> None:
             if parameters:
@@ -77,14 +79,14 @@ class FmuModel:
         return Trajectory(task.times, columns, task.units, log)
 
     def close(self) -> None:
-        """End the worker process; a later simulation starts a new one."""
+        """End the worker process or unload the library; the next simulation starts again."""
         if self.isolate:
             REGISTRY.drop(self.sha256, self.interface)
         else:
             in_process.drop(self.sha256, self.interface)
 
     def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
-        """Inputs as piecewise cubics; a solver holds what cannot vary continuously on the output grid."""
+        """Return the inputs as piecewise cubics; for a solver, discrete ones change on the output grid."""
         if self.interface == "co-simulation":
             return [signal.pieces(experiment.stop_time) for signal in signals.values()]
         kinds = {v.name: v for v in self.info.inputs}
@@ -104,7 +106,7 @@ class FmuModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """What all simulations of one search share in the process that asks for them."""
+    """What the simulations of one search share in the process that requests them."""
 
     plan: Plan
     times: NDArray[np.float64]
@@ -128,7 +130,7 @@ def _task(
 
 
 def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:
-    """Constant pieces that begin where the sampled signal changes."""
+    """Return constant pieces that start at the sample times at which the signal changes."""
     values = signal.sample(times)
     values = np.rint(values) if whole else values
     changes = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
@@ -147,8 +149,8 @@ def _check_interface(model: FmuModel) -> None:
     info = description.info
     if info.clocks:
         raise ModelError(
-            f"{model.path}: its clocks {', '.join(map(repr, info.clocks))} would have to be ticked "
-            "from outside, which is not supported; export the model without input clocks"
+            f"{model.path}: the importing tool would have to tick its clocks "
+            f"{', '.join(map(repr, info.clocks))}, which is not supported; export it without input clocks"
         )
     if model.interface in info.interfaces:
         return
@@ -156,9 +158,9 @@ def _check_interface(model: FmuModel) -> None:
         raise ModelError(f"unknown interface {model.interface!r}; expected one of {get_args(Interface)}")
     if not info.interfaces:
         raise ModelError(
-            f"{model.path}: it offers neither co-simulation nor model exchange, and scheduled "
+            f"{model.path}: the FMU offers neither co-simulation nor model exchange, and scheduled "
             "execution is not supported; export it for co-simulation"
         )
     raise ModelError(
-        f'{model.path}: it does not offer {model.interface}; write interface = "{info.interfaces[0]}"'
+        f'{model.path}: the FMU does not offer {model.interface}; set interface = "{info.interfaces[0]}"'
     )

@@ -1,9 +1,9 @@
-"""Model exchange: the solver that the FMU does not bring.
+"""Model exchange: the solver.
 
-Inputs are applied at every stage of every step. Steps end on output points, control points of the inputs and
-time events. State events are located on the dense output, and the step is done again up to the event, so that
-the state there is a full step's and not an interpolant's. Explicit steps change to implicit ones for the rest
-of the run where stability rather than accuracy limits them.
+Inputs are applied at every stage of every step. Steps end at output points, control points of the inputs and
+time events. State events are located on the dense output, and the step is repeated up to the event; the state
+at the event is then the result of a step and not interpolated. If stability rather than accuracy limits
+explicit steps, the rest of the simulation uses implicit ones.
 """
 
 import numpy as np
@@ -41,24 +41,24 @@ from falsifier.fmu.stepping import (
     rounding,
 )
 
-# Constants of Hairer and Wanner: so many steps with h times rate above the bound (the method is stable up to
-# 3.3) make a problem stiff, and so many others in between do not.
+# Constants of Hairer and Wanner: a problem is stiff after 15 steps with h times the dominant eigenvalue above
+# 3.25 (the method is stable up to 3.3); 6 other steps in a row reset the count.
 _STIFF_BOUND, _STIFF_STEPS, _OTHER_STEPS = 3.25, 15, 6
-_SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 5.0
-# Events within one output interval before they count as piled up (Zeno).
-_MOST_EVENTS = 10_000
+_SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 5.0
+# Events within one output interval after which the FMU is considered stuck (Zeno behaviour).
+_MAX_EVENTS = 10_000
 PAUSED = 100
 
 
 @compiled
 def advance(m, s, outputs, steps):  # type: ignore[no-untyped-def]
-    """Go on with a run for at most so many solver steps.
+    """Continue a simulation for at most ``steps`` solver steps.
 
     Args:
-        m: model, see continuous.Model.
-        s: memory of the run.
-        outputs: receives the recorded variables, shape (k, samples); column 0 is the caller's.
-        steps: number of solver steps after which the caller wants to look at the clock.
+        m: model, see ``continuous.Model``.
+        s: memory of the simulation, see ``continuous.Memory``.
+        outputs: receives the recorded variables, shape (k, samples); the caller writes column 0.
+        steps: number of solver steps after which to return, so that the caller can check the time limit.
 
     Returns:
         FMI status and why it stopped: DONE at the stop time, PAUSED after ``steps``.
@@ -81,10 +81,12 @@ def advance(m, s, outputs, steps):  # type: ignore[no-untyped-def]
         jumps = enter_pieces(m, s)
         if wants_event or jumps or s.clock[NEXT_EVENT] <= time + rounding(time):
             s.counts[EVENTS] += 1
-            if s.counts[EVENTS] > _MOST_EVENTS:
+            if s.counts[EVENTS] > _MAX_EVENTS:
                 return 0, STUCK
             status, where = handle_event(m, s)
             if where != DONE:
+                # A model that terminates at the stop time has finished: only the last sample is left to
+                # record.
                 last = s.counts[COLUMN] == samples - 1 and m.stop_time - time <= rounding(time)
                 if where != TERMINATED or not last:
                     return status, where
@@ -103,9 +105,9 @@ def advance(m, s, outputs, steps):  # type: ignore[no-untyped-def]
 
 @compiled
 def _step_towards(m, s, target):  # type: ignore[no-untyped-def]
-    """One accepted step that ends at the target, at an event or in between.
+    """Do one accepted step that ends at the target, at an event or in between.
 
-    Returns status, where it stopped, and whether an event waits at the new time.
+    Returns status, where it stopped, and whether an event is pending at the new time.
     """
     h = _step_size(s, target)
     status, where, h = _accepted_step(m, s, h, target)
@@ -134,7 +136,7 @@ def _step_towards(m, s, target):  # type: ignore[no-untyped-def]
 
 @compiled
 def _step_size(s, target):  # type: ignore[no-untyped-def]
-    """The proposed step, fitted to the target so that no sliver is left before it."""
+    """Return the proposed step, adjusted so that no tiny step remains before the target."""
     left = target - s.clock[TIME]
     h = s.clock[NEXT_STEP]
     if h >= left * (1.0 - 1e-6):
@@ -147,7 +149,7 @@ def _try_step(m, s, h):  # type: ignore[no-untyped-def]
     if s.counts[IMPLICIT]:
         status, error, stiffness = implicit_step(m, s, h)
         if status <= 1 and np.isfinite(error):
-            # The FMU was last asked at an iterate: bring it to the end of the step.
+            # The FMU was last evaluated at an iterate of Newton's method; set it to the end of the step.
             status = derive(m, s, s.clock[TIME] + h, s.new_x, s.work[1])
         return status, error, stiffness
     return explicit_step(m, s, h)
@@ -155,7 +157,7 @@ def _try_step(m, s, h):  # type: ignore[no-untyped-def]
 
 @compiled
 def _accepted_step(m, s, h, target):  # type: ignore[no-untyped-def]
-    """Shorten the step until its error is below the tolerance: status, where it stopped, step."""
+    """Shorten the step until its error is within the tolerance; return status, where it stopped, the step."""
     tried = h
     while True:
         status, error, stiffness = _try_step(m, s, h)
@@ -163,13 +165,13 @@ def _accepted_step(m, s, h, target):  # type: ignore[no-untyped-def]
             return status, STEPPING, h
         order = 4.0 if s.counts[IMPLICIT] else 5.0
         if status == 2 or not np.isfinite(error):
-            factor = _LEAST_FACTOR
+            factor = _MIN_FACTOR
         else:
             factor = _SAFETY * max(error, 1e-10) ** (-1.0 / order)
-            factor = min(_MOST_FACTOR, max(_LEAST_FACTOR, factor))
+            factor = min(_MAX_FACTOR, max(_MIN_FACTOR, factor))
         accepted = status <= 1 and error <= 1.0
         if accepted:
-            # A step that a target cut short says nothing against the longer one proposed before.
+            # A step that was cut short by a target is no reason to propose less than before.
             proposal = h * factor if h < tried else max(h * factor, s.clock[NEXT_STEP])
             s.clock[NEXT_STEP] = min(proposal, m.max_step)
         else:
@@ -178,13 +180,14 @@ def _accepted_step(m, s, h, target):  # type: ignore[no-untyped-def]
             _watch_stiffness(s, stiffness)
         if accepted:
             return status, DONE, h
+        # Give up once the step is too small to change the time in floating point.
         if h < 4.0 * np.spacing(max(abs(s.clock[TIME]), 1e-3 * m.stop_time)):
             return status, STEPPING, h
 
 
 @compiled
 def _watch_stiffness(s, stiffness):  # type: ignore[no-untyped-def]
-    """Change to implicit steps after many steps in a row at the limit of stability."""
+    """Count steps at the limit of stability; after enough of them _step_towards changes to implicit steps."""
     if stiffness > _STIFF_BOUND:
         s.counts[OTHER_HITS] = 0
         s.counts[STIFF_HITS] += 1
@@ -204,7 +207,7 @@ def _sign_changes(s):  # type: ignore[no-untyped-def]
 
 @compiled
 def _stop_at_event(m, s, h):  # type: ignore[no-untyped-def]
-    """Do the last step again, up to the first sign change of an event indicator within it.
+    """Repeat the last step up to the first sign change of an event indicator within it.
 
     Returns status, where it stopped, and the step.
     """
@@ -219,7 +222,7 @@ def _stop_at_event(m, s, h):  # type: ignore[no-untyped-def]
             status = get_indicators(m, s.new_z)
         if status > 1 or not np.isfinite(error):
             return max(status, 2), STEPPING, h
-        # The interpolant may see the change a little before the step does.
+        # On the interpolant the sign may change slightly earlier than in the repeated step.
         if _sign_changes(s) or theta >= 1.0:
             return 0, DONE, shorter
         theta += nudge
@@ -228,9 +231,9 @@ def _stop_at_event(m, s, h):  # type: ignore[no-untyped-def]
 
 @compiled
 def _locate(m, s, h):  # type: ignore[no-untyped-def]
-    """First sign change within the last tried step: status, and where just behind it in [0, 1].
+    """Locate the first sign change within the last trial step; return status and theta just after it.
 
-    Two trials on either side of a secant's root, then a bisection, and again.
+    Alternates two trials on either side of the secant's root with a bisection, which guarantees convergence.
     """
     low, high = 0.0, 1.0
     end_stage = 5 if s.counts[IMPLICIT] else 6

@@ -1,4 +1,4 @@
-"""Whether the communication step is small enough: the same simulation with half of it."""
+"""Check whether the communication step is small enough, by simulating again with half of it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,12 +11,12 @@ from falsifier.core.signals import Signal
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """How far one output moves when the communication step is halved.
+    """How much one output changes if the communication step is halved.
 
     Attributes:
-        largest: largest distance between the two trajectories, in the output's unit.
-        time: when it occurs, in s.
-        span: largest minus smallest value of the finer trajectory, in the output's unit.
+        largest: maximum distance between the two trajectories, in the output's unit.
+        time: time in s at which it occurs.
+        span: maximum minus minimum of the finer trajectory, in the output's unit.
     """
 
     largest: float
@@ -25,7 +25,7 @@ class Movement:
 
     @property
     def relative(self) -> float:
-        """Largest distance as a share of the span; 0 for an output that neither moves nor varies."""
+        """Maximum distance as a share of the span; 0 for an output that is constant in both trajectories."""
         if self.span > 0.0:
             return self.largest / self.span
         return 0.0 if self.largest == 0.0 else float("inf")
@@ -37,19 +37,19 @@ def step_convergence(
     signals: Mapping[str, Signal],
     parameters: Mapping[str, float] | None = None,
 ) -> dict[str, Movement]:
-    """Simulate twice, the second time with half of the step, and compare on the same output grid.
+    """Simulate with the step and with half of it, and compare the outputs on the same grid.
 
     Args:
-        model: what simulates.
-        experiment: times, outputs and the step that is in question.
+        model: the model to simulate.
+        experiment: times, outputs and the step to check.
         signals: inputs by name.
         parameters: parameter values by name.
 
     Returns:
-        The movement of each output, by name.
+        How much each output changes, by name.
 
     Raises:
-        SimulationError: when one of the simulations fails.
+        SimulationError: if one of the simulations fails.
     """
     step = experiment.step_size or experiment.output_interval
     coarse = model.simulate(signals, parameters or {}, experiment)

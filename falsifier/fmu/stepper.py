@@ -1,4 +1,4 @@
-"""What stepping a co-simulation and a model-exchange FMU through a plan have in common."""
+"""What co-simulation and model exchange have in common: ports, inputs at time 0, time limit, errors."""
 
 import time
 from abc import ABC, abstractmethod
@@ -18,13 +18,13 @@ from falsifier.fmu.ports import Ports, make_ports
 
 
 class Stepper(ABC):
-    """Takes an initialised FMU through a plan, from the inputs in a room to the outputs in it.
+    """Simulates an initialised FMU according to a plan, from the inputs in a room to the outputs in it.
 
     Args:
-        description: of the FMU.
-        library: with the instance.
-        plan: what is simulated.
-        room: where inputs and outputs lie.
+        description: description of the FMU.
+        library: the loaded library with its instance.
+        plan: what the simulations have in common.
+        room: arrays of parameters, inputs and outputs.
     """
 
     def __init__(self, description: Description, library: Library, plan: Plan, room: Room) -> None:
@@ -34,7 +34,7 @@ class Stepper(ABC):
         setters = library.setters()
         self._parameters = make_ports(description, plan.parameters, setters)
         self._outputs = make_ports(description, plan.outputs, library.getters())
-        # What is recorded, where to, and how far apart the rows lie.
+        # What is recorded, the address to record to, and the length of its rows.
         self._record = (self._outputs.table, room.outputs.ctypes.data, plan.samples)
         kinds = {v.name: v for v in description.info.variables}
         held = np.array([self._is_held(kinds[name]) for name in plan.inputs], dtype=bool)
@@ -56,30 +56,30 @@ class Stepper(ABC):
                 continue
             pieces = self._pieces(rows)
             if ports.is_limited:
-                # Interpolation never leaves the range of the values at the ends of the pieces.
+                # Interpolated values are always between those at the ends of a piece.
                 values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
                 check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
             self._write(ports, pieces[:, 0, 1].copy(), "inputs")
 
     def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Pieces of some inputs, shape (rows, pieces, 5), one behind the other in memory."""
+        """Return the pieces of some inputs, shape (rows, pieces, 5), contiguous in memory."""
         inputs = self._room.inputs
         chosen = inputs if len(rows) == len(inputs) else inputs[rows]
         return chosen.reshape(len(rows), self._plan.pieces, 5)
 
     @abstractmethod
     def _is_held(self, variable: Variable) -> bool:
-        """Whether an input may change at events only."""
+        """Whether an input may change only at events."""
 
     @abstractmethod
     def advance(self, deadline: float) -> None:
         """Simulate to the stop time and record the outputs.
 
         Args:
-            deadline: value of time.perf_counter() at which to give up.
+            deadline: value of ``time.perf_counter()`` at which to give up.
 
         Raises:
-            SimulationError: when a step fails, or the clock passes the deadline.
+            SimulationError: if a step fails or the deadline passes.
         """
 
     def _read_first(self) -> None:
@@ -89,7 +89,7 @@ class Stepper(ABC):
         self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
 
     def _write(self, ports: Ports, numbers: NDArray[np.float64], what: str) -> None:
-        """Set variables to numbers, which lie one behind the other."""
+        """Set variables to numbers, which must be contiguous in memory."""
         if not numbers.size:
             return
         version = self._library.description.major
@@ -104,9 +104,9 @@ class Stepper(ABC):
         if where == loops.DONE:
             return
         if where == loops.TERMINATED:
-            what = "the FMU ended the simulation"
+            what = "the FMU terminated the simulation"
         elif where == loops.STUCK:
-            what = "the FMU makes no progress: events follow each other without end"
+            what = "the FMU makes no progress: its events never end"
         else:
             doing = {
                 loops.SETTING: "setting the inputs",
@@ -123,36 +123,36 @@ class Stepper(ABC):
         if time.perf_counter() > deadline:
             limit = self._plan.time_limit
             raise SimulationError(
-                f"{self._name}: stopped at t = {reached:g} s after {limit:g} s, the time limit",
+                f"{self._name}: stopped at t = {reached:g} s after the time limit of {limit:g} s",
                 status="timeout",
                 time=reached,
             )
 
 
 def check_range(model: str, names: Sequence[str], ports: Ports, rows: NDArray[np.float64]) -> None:
-    """Refuse values that do not fit a variable's type.
+    """Reject values outside the range of a variable's type.
 
     Raises:
-        SimulationError: naming the variable and what its type takes.
+        SimulationError: naming the variable and the range of its type.
     """
     for name, (low, high), row in zip(names, ports.limits, rows, strict=True):
         if not np.isinf(low) and not (low - 0.5 <= row.min() and row.max() <= high + 0.5):
             raise SimulationError(
                 f"{model}: values from {row.min():g} to {row.max():g} do not fit {name!r}, "
-                f"whose type takes {low:g} to {high:g}",
+                f"whose type ranges from {low:g} to {high:g}",
                 time=0.0,
             )
 
 
 def loops() -> Any:
-    """The compiled loops; importing them takes a moment."""
+    """Return the module of the compiled loops, imported here because that takes long."""
     from falsifier.fmu import stepping
 
     return stepping
 
 
 def warm_up() -> None:
-    """Load what every simulation needs, so that processes forked from this one find it ready."""
+    """Load what every simulation needs, so that processes forked from this one need not."""
     load_binding()
     compiled = loops()
     table, report = (0, 0, 0, 0), np.zeros(3, dtype=np.int64)

@@ -1,12 +1,12 @@
 """Compiled loops over an FMU's C functions.
 
-numba compiles the loops; small intrinsics emit calls of C functions whose addresses are plain integers, so
-that the machine code is cached on disk and serves every FMU. Intrinsics and loops share this file because
-numba's cache notices changes of the file of the cached function only.
+numba compiles the loops; small intrinsics emit calls of C functions whose addresses are integers. The machine
+code is therefore the same for every FMU and can be cached on disk. Intrinsics and loops are in one file
+because numba's cache only notices changes in the file of the cached function.
 
 Functions, tables and memory are passed as integer addresses, not as arrays: compiled code counts references
-to every array that it touches, which here costs more than the rest of the loop. Every loop returns after a
-bounded number of steps, so that its caller can look at the clock.
+to every array that it touches, which would cost more than the rest of the loop. Every loop returns after a
+bounded number of steps, so that its caller can check the time limit.
 """
 
 from functools import partial
@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from falsifier.stl.compiled import compiled as keep_compiled
 
-# Why a loop stopped: `report[WHERE]`.
+# Where a loop stopped, in `report[WHERE]`; DONE: nowhere before its end.
 DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
 STATUS, WHERE, STEP = range(3)
 
@@ -28,11 +28,11 @@ INSTANCE, DO_STEP, ENTER_EVENT_MODE, UPDATE_DISCRETE_STATES, ENTER_STEP_MODE, FM
     7
 )
 
-# Bytes from one row to the next in the tables of calls and places (Ports) and of pieces (Signal.pieces).
+# Bytes per row in the tables of calls and places (Ports) and of pieces (Signal.pieces).
 CALL_BYTES, PLACE_BYTES, PIECE_BYTES = 40, 32, 40
 
-# Early returns at one time before the FMU counts as stuck, and rounds of one event iteration.
-_MOST_ROUNDS = 1000
+# Early returns at one time, or rounds of one event iteration, after which the FMU is considered stuck.
+_MAX_ROUNDS = 1000
 
 _BYTE = ir.IntType(8)
 _POINTER = _BYTE.as_pointer()
@@ -97,7 +97,7 @@ def _do_step_3(_typing, f, instance, time, step, no_return, event, end, early, r
 
 @intrinsic
 def call_mode(_typing, f, instance):  # type: ignore[no-untyped-def]
-    """Call a function that takes the instance alone."""
+    """Call a function whose only argument is the instance."""
     return call_signature("p")
 
 
@@ -130,13 +130,13 @@ _load_i8, _store_i8 = _typed(types.int64, ir.IntType(64))
 _load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
 
 compiled: Any = keep_compiled
-# For what is called in every step: a call passes every address by itself.
+# For functions called in every step: without inlining, each address would be passed as a separate argument.
 _inlined: Any = partial(keep_compiled, forceinline=True)
 
 
 @_inlined
 def fetch(place):  # type: ignore[no-untyped-def]
-    """A variable as a number, from where its call left it; see PLACE_BYTES."""
+    """Return a variable's value as a number, read from its location in a row of Ports.places."""
     kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
     if kind == 0:
         return _load_f8(address) * sign
@@ -159,14 +159,14 @@ def fetch(place):  # type: ignore[no-untyped-def]
     else:
         value = np.float64(_load_u8(address))
     if _load_i8(place + 24):
-        # Any non-zero byte is true; a negated Boolean is its complement.
+        # Any non-zero value is true; the negated alias of a Boolean is its complement.
         return 1.0 if (value != 0.0) == (sign > 0) else 0.0
     return value * sign
 
 
 @_inlined
 def put(place, number):  # type: ignore[no-untyped-def]
-    """A number to where the call that sets a variable takes it; anything but floating point is rounded."""
+    """Write a number to a variable's location in a row of Ports.places; integers and Booleans are rounded."""
     kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
     value = number * sign
     if kind == 0:
@@ -196,7 +196,7 @@ def put(place, number):  # type: ignore[no-untyped-def]
 
 @_inlined
 def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
-    """Make the get or set calls of a table (Ports.table); the first status above warning ends it."""
+    """Make the get or set calls of a table (Ports.table); stop at the first status worse than a warning."""
     worst = 0
     for g in range(ports[1]):
         call = ports[0] + g * CALL_BYTES
@@ -214,7 +214,7 @@ def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
 
 @_inlined
 def read_row(instance, version, ports, rows, width, column):  # type: ignore[no-untyped-def]
-    """Read all variables of a table into one column of float64 rows of this width at this address."""
+    """Read all variables of a table into one column of the float64 rows of this width at this address."""
     status = exchange_values(instance, version, ports)
     if status <= 1:
         for j in range(ports[3]):
@@ -232,19 +232,19 @@ def write_row(instance, version, ports, numbers):  # type: ignore[no-untyped-def
 
 @_inlined
 def rounding(time):  # type: ignore[no-untyped-def]
-    """Times closer than this are one time; s."""
+    """Return the difference in s below which two times are considered equal."""
     return 1e-11 * max(1.0, abs(time))
 
 
 @_inlined
 def start_of(pieces, j, p):  # type: ignore[no-untyped-def]
-    """Start in s of piece p of input j; inf behind the last one."""
+    """Return the start in s of piece p of input j; inf after the last one."""
     return _load_f8(pieces[0] + PIECE_BYTES * (j * pieces[1] + p)) if p < pieces[1] else np.inf
 
 
 @_inlined
 def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
-    """Input j at a time within (or at the end of) its piece p; ``pieces`` is address and number per input."""
+    """Return input j at a time within its piece p or at its end; ``pieces``: address and number per input."""
     at = pieces[0] + PIECE_BYTES * (j * pieces[1] + p)
     dt = time - _load_f8(at)
     return ((_load_f8(at + 32) * dt + _load_f8(at + 24)) * dt + _load_f8(at + 16)) * dt + _load_f8(at + 8)
@@ -252,9 +252,9 @@ def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _put_inputs(ports, pieces, current, values, time):  # type: ignore[no-untyped-def]
-    """Put all inputs of a table at a time into its buffers; whether any differs from before.
+    """Write the values of all inputs of a table at a time to its buffers; return whether any has changed.
 
-    At ``current`` lie the pieces that the inputs are in, at ``values`` what was put last.
+    ``current`` is the address of the inputs' current pieces, ``values`` that of the values written last.
     """
     changed = False
     for j in range(ports[3]):
@@ -271,12 +271,12 @@ def _put_inputs(ports, pieces, current, values, time):  # type: ignore[no-untype
 
 @compiled
 def settle_3(functions, scratch):  # type: ignore[no-untyped-def]
-    """Event iteration of FMI 3 in event mode: update discrete states until nothing changes any more.
+    """Iterate events in FMI 3's event mode: update discrete states until nothing changes any more.
 
     Returns the status and where it stopped.
     """
-    for _ in range(_MOST_ROUNDS):
-        # again, terminate, nominals changed, states changed, next event defined; next event time
+    for _ in range(_MAX_ROUNDS):
+        # Outputs: again, terminate, nominals changed, states changed, next event defined; next event time.
         status = _update_3(
             functions[UPDATE_DISCRETE_STATES], functions[INSTANCE],
             scratch, scratch + 1, scratch + 2, scratch + 3, scratch + 4, scratch + 8,
@@ -292,7 +292,7 @@ def settle_3(functions, scratch):  # type: ignore[no-untyped-def]
 
 @compiled
 def _event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
-    """One visit to event mode: set the inputs of a table, update, return to step mode."""
+    """Enter event mode, set the inputs of a table, update the discrete states, return to step mode."""
     instance = functions[INSTANCE]
     status = call_mode(functions[ENTER_EVENT_MODE], instance)
     if status > 1:
@@ -309,9 +309,9 @@ def _event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
-    """One communication step of FMI 3, in several calls where the FMU returns early.
+    """Do one communication step of FMI 3, in several calls if the FMU returns early.
 
-    Returns status, where it stopped and whether the FMU asked to end the simulation.
+    Returns status, where it stopped, and whether the FMU requested to terminate the simulation.
     """
     time, rounds = start, 0
     while True:
@@ -330,11 +330,11 @@ def _advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
                 return status, DONE if time >= end else TERMINATED, True
             if where != DONE:
                 return status, where, ends
-        # What is left of a step below this is rounding, and no FMU steps that far.
+        # A remainder smaller than this is a rounding error; FMUs reject steps that short.
         if ends or end - time <= 1e-12 * max(1.0, abs(end)):
             return status, DONE if end - time <= 1e-9 * max(1.0, abs(end)) else TERMINATED, ends
         rounds = 0 if time > before else rounds + 1
-        if rounds > _MOST_ROUNDS:
+        if rounds > _MAX_ROUNDS:
             return 0, STUCK, ends
 
 
@@ -346,22 +346,22 @@ def co_simulate(  # type: ignore[no-untyped-def]
     """Do the communication steps first..last-1.
 
     Args:
-        functions: addresses and facts, 7 integers.
+        functions: instance, function addresses, FMI version and whether event mode is used; see INSTANCE.
         ports: inputs that are set before each step (Ports.table).
-        pieces: address and number per input of these as piecewise cubics (Signal.pieces); pieces that are not
-            there start at inf.
-        held_ports: inputs that are set in event mode only (FMI 3 with event mode).
-        held_pieces: the same for these.
-        current: address of the pieces that inputs, then held inputs are in; int64, zeros at the start.
-        values: address of what they were set to last.
+        pieces: address of these inputs as piecewise cubics (Signal.pieces) and number of pieces per input;
+            unused pieces start at inf.
+        held_ports: inputs that may only be set in event mode (FMI 3 with event mode).
+        held_pieces: the same for these inputs.
+        current: address of the current piece of each input, then of each held input; int64, initially 0.
+        values: address of the value last written to each of them.
         getters: recorded variables (Ports.table).
-        outputs: address of a row of float64 for each of these; column 0 is the caller's.
+        outputs: address of one row of float64 per recorded variable; the caller writes column 0.
         width: length of such a row.
         step: communication step in s.
         first: first step to do.
-        last: step to stop before.
+        last: step before which to stop.
         every: steps per column of the outputs.
-        report: receives FMI status, reason and number of completed steps, int64[3].
+        report: receives FMI status, where it stopped, and number of completed steps, int64[3].
     """
     instance, version = functions[INSTANCE], functions[FMI_VERSION]
     memory = np.zeros(16, dtype=np.uint8)
@@ -392,7 +392,7 @@ def co_simulate(  # type: ignore[no-untyped-def]
         if ends and where == DONE:
             where = TERMINATED
     report[STATUS], report[WHERE], report[STEP] = status, where, k
-    # The scratch memory must outlive the calls that got its address.
+    # A use after the last call: otherwise numba may free the memory while the FMU writes to its address.
     memory[0] = 0
 
 
@@ -400,7 +400,7 @@ def co_simulate(  # type: ignore[no-untyped-def]
 def _set_inputs(  # type: ignore[no-untyped-def]
     functions, ports, pieces, held_ports, held_pieces, current, values, time, is_initialised, scratch
 ):  # fmt: skip
-    """Set the inputs at a communication point. Status and where it stopped."""
+    """Set the inputs at a communication point; return status and where it stopped."""
     if ports[3]:
         _put_inputs(ports, pieces, current, values, time)
         status = exchange_values(functions[INSTANCE], functions[FMI_VERSION], ports)
@@ -409,7 +409,7 @@ def _set_inputs(  # type: ignore[no-untyped-def]
     if held_ports[3]:
         offset = 8 * ports[3]
         changed = _put_inputs(held_ports, held_pieces, current + offset, values + offset, time)
-        # Initialisation has set their first values.
+        # Initialisation has already set their values at time 0.
         if changed and is_initialised:
             return _event_3(functions, held_ports, scratch)
     return 0, DONE
@@ -417,7 +417,7 @@ def _set_inputs(  # type: ignore[no-untyped-def]
 
 @compiled
 def enter_step_mode(functions):  # type: ignore[no-untyped-def]
-    """Leave the event mode that an FMI 3 FMU is in after its initialisation: status and where it stopped."""
+    """Leave the event mode in which FMI 3 initialisation ends; return status and where it stopped."""
     memory = np.zeros(16, dtype=np.uint8)
     status, where = settle_3(functions, memory.ctypes.data)
     if where == DONE:

@@ -1,6 +1,6 @@
-"""The process that one FMU runs in: takes requests, simulates, replies.
+"""The process in which one FMU runs: receives requests, simulates, replies.
 
-It is forked by the nursery, has no secrets in its environment, and may die at any moment.
+It is forked from the nursery, has no secrets in its environment, and may crash at any time.
 """
 
 import contextlib
@@ -34,24 +34,25 @@ from falsifier.fmu.worker_order import Reuse
 
 PREPARE, RUN = 1, 2
 
-# A simulation that takes longer than this is not repeated to find out whether a reset can be trusted.
-_LONGEST_TEST_SECONDS = 1.0
-# Exporters' run-times run out of thread keys after about 1000 instances in a process.
-_MOST_INSTANCES = 400
-_MOST_GROWTH_KIB = 256 << 10
+# Simulations longer than this are not repeated to test whether a reset reproduces the results.
+_MAX_TEST_SECONDS = 1.0
+# Some tools' runtimes run out of thread keys after about 1000 instances in one process.
+_MAX_INSTANCES = 400
+# Growth in memory after which a worker that leaks is replaced.
+_MAX_GROWTH_KIB = 256 << 10
 
 
 def serve(
     sock: socket.socket, description: Description, folder: Path, interface: Interface, reuse: Reuse | None
 ) -> None:
-    """Answer requests until the other end is gone or the process should be replaced.
+    """Reply to requests until the connection is closed or the process should be replaced.
 
     Args:
-        sock: connection to the process that asks.
-        description: of the FMU.
-        folder: where it was extracted.
-        interface: how it is simulated.
-        reuse: how an instance may be used again; None: find out after the first simulation.
+        sock: connection to the process that requests simulations.
+        description: description of the FMU.
+        folder: folder to which it was extracted.
+        interface: interface to simulate with.
+        reuse: how the next simulation starts; None: test this after the first simulation.
     """
     worker = _Worker(description, folder, interface, reuse)
     while True:
@@ -98,7 +99,7 @@ class _Worker:
         return Reply()
 
     def run(self) -> Reply:
-        assert self._session is not None, "prepare comes before run"
+        assert self._session is not None, "prepare must be called before run"
         self._session.reuse = self._reuse or "instance"
         self._instances += self._session.reuse == "instance" or not self._instances
         started = time.perf_counter()
@@ -109,23 +110,23 @@ class _Worker:
             return Reply("timeout" if error.status == "timeout" else "failed", str(error), at)
         except FalsifierError as error:
             return Reply("unusable", str(error))
-        if self._reuse is None and time.perf_counter() - started > _LONGEST_TEST_SECONDS:
+        if self._reuse is None and time.perf_counter() - started > _MAX_TEST_SECONDS:
             self._reuse = "instance"
         return Reply(more=self._reuse is None, leaving=self._reuse is not None and self._is_spent())
 
     def find_reuse(self) -> Reply:
-        """Repeat the simulation in each way to begin again; the first equal outcome decides."""
-        assert self._session is not None, "run comes before find_reuse"
+        """Repeat the simulation with each kind of reuse; the first with the same outputs is chosen."""
+        assert self._session is not None, "run must be called before find_reuse"
         self._reuse = self._session.find_reuse()
         return Reply(text=self._reuse, leaving=self._is_spent())
 
     def _is_spent(self) -> bool:
-        """Whether this process has done enough, or has grown too much, to go on."""
-        if self._instances >= _MOST_INSTANCES or self._reuse == "process":
+        """Whether this process should be replaced: too many instances, or too much memory."""
+        if self._instances >= _MAX_INSTANCES or self._reuse == "process":
             return True
         size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         self._first_size = self._first_size or (size if self._instances else 0)
-        return bool(self._first_size) and size > self._first_size + _MOST_GROWTH_KIB
+        return bool(self._first_size) and size > self._first_size + _MAX_GROWTH_KIB
 
 
 def _log(line: str) -> None:

@@ -1,4 +1,4 @@
-"""Which FMU is to be run, and how: what a simulating process tells the one that simulates for it."""
+"""What a new worker needs to know about the FMU that it will simulate."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,21 +7,21 @@ from typing import Literal
 from falsifier.core.model import Interface
 from falsifier.fmu.description import Description
 
-# How the next simulation starts: the same instance after a reset or from its saved state, a new instance,
-# a new process.
+# How the next simulation starts: with the same instance after a reset or from its saved state, with a new
+# instance, or in a new process.
 Reuse = Literal["reset", "state", "instance", "process"]
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a new worker is to run.
+    """The FMU that a new worker simulates.
 
     Attributes:
-        path: of the FMU.
-        sha256: of the file as it was when the model was loaded.
-        description: of the FMU.
-        interface: how it is simulated.
-        reuse: how instances may be used again, None if not known yet.
+        path: path of the FMU.
+        sha256: hash of the file when the model was loaded.
+        description: description of the FMU.
+        interface: interface to simulate with.
+        reuse: how the next simulation starts; None if not yet known.
     """
 
     path: Path

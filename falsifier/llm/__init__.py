@@ -1,14 +1,15 @@
-"""Language models: typed prompts, typed replies, and one narrow door to every provider.
+"""Language models: typed prompts, typed replies and one interface to every provider.
 
-A chat is anything with ``complete(request) -> reply``. ``connect`` makes one from an LLM's name out of small
-wrappers, each with one concern::
+A chat is any object with ``complete(request) -> reply``. ``connect`` builds one from an LLM's name by nesting
+small wrappers, each with a single concern::
 
-    CachedChat      valid replies on disk                         cache
-    RecordedChat    a journal's replies first                     replay
-    RetryingChat    patience, shared between runs                 retry
-    LadderChat      the way of asking for JSON that works here    ladder
-    LiteLLMChat     one request, one answer or one clear error    client
+    CachedChat      answers repeated requests from disk               cache
+    RecordedChat    plays back a journal's replies, then asks         replay
+    RetryingChat    retries temporary failures                        retry
+    LadderChat      asks for JSON in the strictest accepted way       ladder
+    LiteLLMChat     sends one request: one reply or one clear error   client
 
-``ScriptedChat`` plays a script instead. ``converse`` asks until a reply is valid; ``prompts`` says what is
-told and ``replies`` what is read. Nothing here knows what searches.
+``ScriptedChat`` follows a script instead. ``converse`` repeats a question until the reply is valid.
+``prompts`` builds what an LLM is sent, ``replies`` reads what it returns. Nothing in this package depends on
+the engines or the search.
 """

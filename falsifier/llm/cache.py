@@ -1,4 +1,4 @@
-"""Valid replies on disk, by the content of what was asked: no question is paid for twice."""
+"""Valid replies on disk, keyed by the content of the request: no question is paid for twice."""
 
 import json
 import os
@@ -16,11 +16,11 @@ from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 
 @dataclass(frozen=True)
 class CachedChat:
-    """Answers from a directory where it can, and keeps there what proved valid.
+    """Answers from a directory if possible, and stores there every reply that proved valid.
 
     Attributes:
-        inner: who is asked otherwise.
-        directory: one file per reply, made when the first one is kept.
+        inner: chat to ask if there is no stored reply.
+        directory: one file per reply; created with the first one.
     """
 
     inner: Chat
@@ -28,28 +28,27 @@ class CachedChat:
 
     @property
     def llm(self) -> str:
-        """See Chat."""
         return self.inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """See Chat."""
         return self.inner.parameters
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the kept reply, at no cost, or ask."""
+        """Return the stored reply, at no cost, or ask."""
         try:
-            kept = ChatReply.model_validate_json(self._path(request).read_bytes())
-        except (OSError, ValidationError):  # not there, or damaged: then it is asked for and written anew
+            stored = ChatReply.model_validate_json(self._path(request).read_bytes())
+        except (OSError, ValidationError):  # missing or damaged: ask again and overwrite it
             return self.inner.complete(request)
-        return kept.model_copy(update={"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"})
+        return stored.model_copy(update={"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"})
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Keep a valid reply."""
+        """Store a valid reply."""
         if reply.source == "cache":
             return
         path = self._path(request)
         path.parent.mkdir(parents=True, exist_ok=True)
+        # Under a unique name first: several runs may store the same reply at the same time.
         partial = path.with_name(f"{path.name}.{uuid4().hex}")
         partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
         partial.replace(path)
@@ -66,6 +65,6 @@ class CachedChat:
 
 
 def default_cache_directory() -> Path:
-    """Where replies are kept unless said otherwise."""
+    """Directory of stored replies: ``falsifier/replies`` in the user's cache directory."""
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "falsifier" / "replies"

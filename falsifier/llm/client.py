@@ -1,4 +1,4 @@
-"""One request to an LLM behind litellm: sent once, answered, or failed with one of our own errors."""
+"""One request to an LLM through litellm: sent once, then either a reply or one of our own errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,22 +13,22 @@ from falsifier.llm.providers import find_key, known
 from falsifier.llm.usage import Price, usage_of
 from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, storable
 
-# Reasoning models may think for minutes; seconds.
+# In s; reasoning models may think for minutes.
 DEFAULT_TIMEOUT = 600.0
 
 
 @dataclass(frozen=True)
 class LiteLLMChat:
-    """An LLM behind any provider that litellm speaks to.
+    """An LLM of any provider that litellm supports.
 
     Attributes:
         llm: litellm's name, e.g. ``openai/gpt-5-mini``.
-        effort: reasoning effort, ``low``, ``medium`` or ``high``; None: the LLM's own.
+        effort: reasoning effort, ``low``, ``medium`` or ``high``; None: the LLM's default.
         api_base: address of the server; None: the provider's own.
-        options: further parameters of litellm's ``completion``, passed as they are.
-        timeout: seconds to wait for an answer.
-        price: the user's own price; None: litellm's table.
-        mode: how replies of a schema are asked for.
+        options: further parameters of litellm's ``completion``, passed unchanged.
+        timeout: seconds to wait for a reply.
+        price: price stated by the user; None: litellm's table.
+        mode: how to ask for a reply that follows a schema.
     """
 
     llm: str
@@ -41,7 +41,7 @@ class LiteLLMChat:
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """What is sent beside the messages, without secrets."""
+        """What is sent in addition to the messages, without secrets."""
         stated = {"effort": self.effort, "api_base": self.api_base and redact(self.api_base)}
         return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
@@ -49,10 +49,10 @@ class LiteLLMChat:
         """Send one request.
 
         Raises:
-            TransientChatError: for what may be gone the next time.
-            FormatUnsupportedError: when the server refuses this way of asking for JSON.
-            ToolsUnsupportedError: when the server refuses the tools that are offered.
-            ChatError: for everything else, naming the LLM and the key's variable.
+            TransientChatError: if a retry may succeed.
+            FormatUnsupportedError: if the server rejects this way of asking for JSON.
+            ToolsUnsupportedError: if the server rejects the tools that are offered.
+            ChatError: for any other failure; it names the LLM and the key's variable.
         """
         key = find_key(self.llm, api_base=self.api_base)
         litellm = load_litellm()
@@ -64,11 +64,11 @@ class LiteLLMChat:
                 messages=[sent_message(m) for m in request.messages],
                 api_base=self.api_base,
                 timeout=self.timeout,
-                drop_params=True,
+                drop_params=True,  # what the LLM does not accept is omitted; _effective() reports it
                 **{"api_key": key, **arguments},
             )
             return self._reply(request, response, arguments, perf_counter() - started)
-        except Exception as error:  # litellm raises its own, its clients' and bare built-in errors alike
+        except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             raise classify(
                 error,
                 llm=self.llm,
@@ -79,7 +79,7 @@ class LiteLLMChat:
             ) from None
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Keep nothing."""
+        """Do nothing; storing replies is CachedChat's concern."""
 
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}
@@ -88,7 +88,7 @@ class LiteLLMChat:
         provider = known(self.llm)
         arguments = self._options()
         if provider.openai_client:
-            arguments["max_retries"] = 0  # the client would retry twice without saying so
+            arguments["max_retries"] = 0  # the client would silently retry twice
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
             if provider.effort == "allowed":
@@ -102,8 +102,8 @@ class LiteLLMChat:
             arguments["response_format"] = {"type": "json_object"}
         if request.tools:
             arguments["tools"] = [sent_tool(tool) for tool in request.tools]
-            # With tools litellm imports its gateway for MCP servers, whose packages are not among its own
-            # requirements; it pops this again before anything is sent.
+            # Given tools, litellm imports its MCP gateway, whose packages are not among litellm's own
+            # requirements. It removes this argument before sending.
             arguments["_skip_mcp_handler"] = True
         if request.room > 1 and "max_tokens" in arguments:
             arguments["max_tokens"] *= request.room
@@ -137,13 +137,13 @@ class LiteLLMChat:
         )
 
     def _believed(self, cost: float | None) -> float | None:
-        """Reported cost where it can be true: another server under a known name has prices of its own."""
+        """Reported cost if it can be true: another server under a listed name has its own prices."""
         if known(self.llm).local:
             return cost
         return cost if cost and self.api_base is None else None
 
     def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """What was sent beside the messages; ``dropped`` names what this LLM does not take."""
+        """What was sent in addition to the messages; ``dropped`` lists what this LLM does not accept."""
         dropped = dropped_parameters(self.llm, arguments)
         own_names = {"reasoning_effort": "effort"}
         omitted = {own_names.get(name, name) for name in dropped}
@@ -157,6 +157,6 @@ class LiteLLMChat:
 
 
 def _refusal(message: Any) -> str:
-    """Why the LLM declines, where it says so in a field of its own."""
+    """Why the LLM declined, if the provider reports that in a separate field."""
     fields = getattr(message, "provider_specific_fields", None) or {}
     return str(getattr(message, "refusal", None) or fields.get("refusal") or "")

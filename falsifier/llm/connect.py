@@ -1,4 +1,4 @@
-"""From an LLM's name to a chat that is patient, adapts to the server and never pays twice."""
+"""From an LLM's name to a chat that retries, adapts to the server and never pays twice for one question."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ def preflight(llm: str, *, api_base: str | None = None) -> None:
     """Check an LLM's name and key without sending anything.
 
     Raises:
-        ChatError: naming what to set or to change.
+        ChatError: saying what to set or change.
     """
     check_name(llm)
     find_key(llm, api_base=api_base)
@@ -40,19 +40,19 @@ def connect(
     attempts: int = DEFAULT_ATTEMPTS,
     cache: Path | None = None,
 ) -> Chat:
-    """Chat with an LLM; nothing is sent yet.
+    """Make a chat with an LLM; nothing is sent yet.
 
     Args:
         llm: PROVIDER/MODEL as litellm names it.
         effort: reasoning effort, ``low``, ``medium`` or ``high``.
-        api_base: address of the server, where it is not the provider's own.
+        api_base: address of the server, if it is not the provider's own.
         options: further parameters of litellm's ``completion``.
         price: what the LLM costs; None: litellm's table.
-        timeout: seconds to wait for one answer.
-        mode: how to ask for JSON at first; None: what the provider is known to take.
-        gate: shared by all runs on the same account; None: one of its own.
-        attempts: most requests for one answer, where failures may pass.
-        cache: directory of kept replies; None: nothing is kept.
+        timeout: seconds to wait for one reply.
+        mode: first way of asking for JSON; None: the strictest one that the provider is known to accept.
+        gate: shared by all runs on the same account; None: a new one.
+        attempts: maximum number of requests per reply if failures are temporary.
+        cache: directory of stored replies; None: no cache.
 
     Raises:
         ChatError: for an unknown provider or a missing key.
@@ -73,14 +73,14 @@ def connect(
 
 @dataclass(frozen=True, slots=True)
 class LLMCheck:
-    """What one small round trip showed.
+    """Result of one short request.
 
     Attributes:
-        llm: its name.
-        key: environment variable that held the key; empty where none is needed.
-        price: what it costs; None where that is unknown.
+        llm: name of the LLM.
+        key: environment variable that contains the key; empty if none is needed.
+        price: what the LLM costs; None if unknown.
         reply: what it answered.
-        usage: tokens and money of the round trip.
+        usage: tokens and cost of the request.
         seconds: how long it took.
     """
 
@@ -103,7 +103,7 @@ def check_llm(
     """Check name and key, and ask the LLM for one word.
 
     Raises:
-        ChatError: naming what is wrong.
+        ChatError: saying what is wrong.
     """
     chat = connect(llm, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
     reply = chat.complete(_HELLO)

@@ -1,8 +1,9 @@
-"""One question until it is answered validly: a rejected reply is returned with what was wrong."""
+"""Repeats a question until the reply is valid; a rejected reply is returned to the LLM with its defect."""
 
 from collections.abc import Callable
 from typing import TypeVar
 
+from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Message, ToolCall
 
@@ -11,16 +12,16 @@ OnExchange = Callable[[Exchange], None]
 Respond = Callable[[ToolCall], str]
 
 MAX_REASKS = 2
-# A rejected reply is shown to its author again, but a runaway one not in full.
+# Characters of a rejected reply that are quoted back to the LLM; runaway replies are cut.
 _LONGEST_QUOTE = 4000
 
 
 class RejectedReplyError(FalsifierError):
-    """A reply cannot be used; the message tells its author why."""
+    """A reply cannot be used; the message is sent to the LLM."""
 
 
 class NoValidReplyError(ChatError):
-    """The LLM answered, but never validly."""
+    """The LLM answered, but no reply was valid."""
 
 
 def converse(
@@ -32,21 +33,21 @@ def converse(
     reasks: int = MAX_REASKS,
     respond: Respond | None = None,
 ) -> T:
-    """Ask, answer what the LLM asks in its turn, and ask again with what was wrong.
+    """Ask, answer the LLM's tool calls, and after an invalid reply ask again, stating what was wrong.
 
     Args:
-        chat: who is asked.
+        chat: chat to ask.
         request: the question.
-        read: makes a value of a reply's text, or raises RejectedReplyError.
-        on_exchange: called with every question and answer, rejected ones included.
-        reasks: how often a rejected reply is asked for again; one in which no call of a tool could be
+        read: turns a reply's text into a value, or raises RejectedReplyError.
+        on_exchange: called with every question and reply, including rejected ones.
+        reasks: how often to ask again after a rejected reply; a reply none of whose tool calls could be
             answered counts as rejected.
-        respond: answers a call of a tool that the question offers, or raises RejectedReplyError, as it must
-            after some calls, for each is a request more; None: no tool is offered.
+        respond: answers a call of a tool that the question offers, or raises RejectedReplyError. It must do
+            so after a number of calls, because each call costs another request. None: no tool is offered.
 
     Raises:
-        NoValidReplyError: when no answer was valid.
-        ChatError: when no answer came.
+        NoValidReplyError: if no reply was valid.
+        ChatError: if there was no reply.
     """
     problems: list[str] = []
     while len(problems) <= reasks:
@@ -78,12 +79,13 @@ def converse(
             problems.append(problem)
         request = following
     raise NoValidReplyError(
-        f"{chat.llm} gave no valid reply in {reasks + 1} tries; what was wrong: {' | '.join(problems)}"
+        f"{chat.llm} gave no valid reply in {counted(reasks + 1, 'attempt')}; rejected because: "
+        f"{' | '.join(problems)}"
     )
 
 
 def _called(request: ChatRequest, reply: ChatReply, respond: Respond) -> tuple[ChatRequest, str | None]:
-    """Answer the calls of a reply: what is sent next, and what was wrong if no call could be answered."""
+    """Answer the calls of a reply; return the next request, and the defect if no call could be answered."""
     answers, problems = [], []
     for call in reply.tool_calls:
         try:
@@ -118,7 +120,7 @@ def _usable_text(reply: ChatReply) -> str:
 
 def _explained(reply: ChatReply, problem: str) -> str:
     if reply.finish_reason == "length":
-        return f"the reply was cut off at the token limit ({problem}); think less and answer shorter"
+        return f"the reply was cut off at the token limit ({problem}); reason less and give a shorter reply"
     return problem
 
 
@@ -133,7 +135,7 @@ def _asked_again(request: ChatRequest, reply: ChatReply, problem: str) -> ChatRe
                 Message(role="assistant", content=quoted),
                 Message(
                     role="user",
-                    content=f"That reply cannot be used: {problem}.\nReply again, in the form asked for.",
+                    content=f"That reply cannot be used: {problem}.\nReply again in the required form.",
                 ),
             ),
             "room": 2 if reply.finish_reason == "length" else request.room,

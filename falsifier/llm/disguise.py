@@ -1,4 +1,4 @@
-"""Neutral names: what an LLM is told says nothing of whose system it is."""
+"""Neutral names, so that the prompt does not reveal which system is searched."""
 
 import re
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Disguise:
-    """A view under neutral names, without units and descriptions, and the way back.
+    """A view with neutral names and without units and descriptions, and the mapping back.
 
     Attributes:
-        real: the view as it is.
-        names: neutral name by real name: inputs u1, u2, ..., parameters p1, ..., other signals y1, ...
+        real: the original view.
+        names: neutral names by real name: inputs u1, u2, ..., parameters p1, ..., other signals y1, ...
     """
 
     real: View
@@ -31,7 +31,7 @@ class Disguise:
 
     @classmethod
     def of(cls, view: View) -> "Disguise":
-        """Disguise for a view."""
+        """Number the names of a view: inputs, parameters, then the signals of the formula and the model."""
         inputs = [r.name for r in view.space.inputs]
         parameters = [p.name for p in view.space.parameters]
         searched = {*inputs, *parameters}
@@ -50,7 +50,7 @@ class Disguise:
 
     @property
     def view(self) -> View:
-        """What may be told."""
+        """The view that prompts are built from."""
         real, names = self.real, self.names
         return View(
             info=ModelInfo(
@@ -77,13 +77,13 @@ class Disguise:
         )
 
     def hidden(self, evaluation: Evaluation) -> Evaluation:
-        """Return an evaluation under neutral names; messages of the model are left out."""
+        """Return an evaluation under neutral names, without the model's messages: they may contain names."""
         verdict, trajectory = evaluation.verdict, evaluation.trajectory
         return replace(
             evaluation,
             candidate=self.hidden_candidate(evaluation.candidate),
             verdict=verdict and self.hidden_verdict(verdict),
-            trajectory=trajectory and Trajectory(trajectory.times, self._told(trajectory.columns)),
+            trajectory=trajectory and Trajectory(trajectory.times, self._by_neutral_name(trajectory.columns)),
             reason="",
             log=(),
         )
@@ -91,15 +91,19 @@ class Disguise:
     def hidden_verdict(self, verdict: Verdict) -> Verdict:
         """Return a verdict under neutral names."""
         return replace(
-            verdict, predicate=self._predicate(verdict.predicate), values=self._told(verdict.values)
+            verdict,
+            predicate=self._predicate(verdict.predicate),
+            values=self._by_neutral_name(verdict.values),
         )
 
     def hidden_candidate(self, candidate: Candidate) -> Candidate:
         """Return a candidate under neutral names."""
-        return Candidate(self._told(candidate.signals), self._told(candidate.parameters))
+        return Candidate(
+            self._by_neutral_name(candidate.signals), self._by_neutral_name(candidate.parameters)
+        )
 
     def revealed(self, candidate: Candidate) -> Candidate:
-        """Return a candidate under its real names, also where its rationale mentions them."""
+        """Return a candidate under its real names, in its rationale too."""
         real = {neutral: name for name, neutral in self.names.items()}
         return replace(
             candidate,
@@ -108,7 +112,7 @@ class Disguise:
             rationale=re.sub(r"\b[upy]\d+\b", lambda m: real.get(m[0], m[0]), candidate.rationale),
         )
 
-    def _told(self, values: Mapping[str, T]) -> dict[str, T]:
+    def _by_neutral_name(self, values: Mapping[str, T]) -> dict[str, T]:
         return {self.names[n]: v for n, v in values.items() if n in self.names}
 
     def _predicate(self, text: str) -> str:
@@ -117,7 +121,7 @@ class Disguise:
 
 
 def renamed(node: T, names: Mapping[str, str]) -> T:
-    """Return the same formula or expression over other names."""
+    """Return the same formula or expression with other names."""
     return _renamed(node, names)  # type: ignore[no-any-return]
 
 

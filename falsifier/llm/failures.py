@@ -1,4 +1,4 @@
-"""What can go wrong between here and a language model, sorted by what helps against it."""
+"""Failures of requests to a language model, classified by what can be done about them."""
 
 from collections.abc import Iterable
 from urllib.parse import urlsplit
@@ -7,7 +7,7 @@ from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.providers import known, server_address
 
-# 200 is an answer that is no JSON: a page of some machine in between.
+# 200: the body is not JSON, typically an HTML page from a proxy.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
 _FORMAT_WORDS = (
     "response_format",
@@ -22,17 +22,17 @@ _FORMAT_WORDS = (
 _TOOL_WORDS = ("tool", "function call", "function_call")
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
 _LONGEST_DETAIL = 600
-# Requests to a server on this machine that refuses connections: one that starts this moment is still met.
+# Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
 
 
 class TransientChatError(ChatError):
-    """A failure that may be gone the next time: rate limit, timeout, lost connection, overloaded server.
+    """A temporary failure: rate limit, timeout, lost connection, overloaded server.
 
     Attributes:
         retry_after: seconds that the server asked to wait, or None.
-        for_all: whether other requests of the same account had better wait too, as after a rate limit.
-        patience: most requests that are worth sending, or None where there is no such number.
+        for_all: whether other requests on the same account should wait too, as after a rate limit.
+        patience: maximum number of requests worth sending; None: no limit of its own.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class FormatUnsupportedError(ChatError):
 
 
 class ToolsUnsupportedError(ChatError):
-    """The server, or the LLM behind it, takes no tools."""
+    """The server, or the LLM behind it, does not support tools."""
 
 
 def classify(
@@ -66,7 +66,16 @@ def classify(
     secrets: Iterable[str],
     offers_tools: bool = False,
 ) -> ChatError:
-    """Error of this package for whatever a request raised; its text holds no secret."""
+    """Translate an exception raised by a request into an error of this package, without secrets.
+
+    Args:
+        error: what the client library raised.
+        llm: name of the LLM.
+        api_base: address of the server, if stated.
+        key_variables: environment variables that may contain the key.
+        secrets: texts to remove from the message.
+        offers_tools: whether the request offered tools.
+    """
     status = _status(error)
     detail = _first_lines(redact(f"{type(error).__name__}: {error}", secrets))
     lowered = detail.lower()
@@ -77,13 +86,14 @@ def classify(
         command = known(llm).start
         start = f"the server with '{command}'" if command else "the LLM's server"
         return TransientChatError(
-            f"{llm}: nothing listens at {redact(address, secrets)}: start {start}, or correct --api-base",
+            f"{llm}: nothing is listening at {redact(address, secrets)}: start {start}, "
+            "or correct --api-base",
             patience=_LOCAL_PATIENCE,
         )
     if status in (401, 403):
-        return ChatError(f"{llm}{where}: the provider refused the key; check {keys}. {detail}")
+        return ChatError(f"{llm}{where}: the provider rejected the key; check {keys}. {detail}")
     speaks_of_format = any(word in lowered for word in _FORMAT_WORDS)
-    # Some servers say so by 404 (no route with tools) or 500 (not started with them).
+    # Some servers report this as 404 (no route with tools) or 500 (started without tool support).
     if (
         offers_tools
         and status in (400, 404, 422, 500, 501)
@@ -93,16 +103,19 @@ def classify(
         return ToolsUnsupportedError(f"{llm}{where}: {detail}")
     if status == 404:
         return ChatError(
-            f"{llm}{where}: there is no such LLM or address; check the LLM's name, --api-base and "
-            f"whether the account behind {keys} may use it. {detail}"
+            f"{llm}{where}: no such LLM or address; check the LLM's name, --api-base, and whether the "
+            f"account behind {keys} may use it. {detail}"
         )
     if "contentpolicy" in lowered or "content_policy" in lowered or "content management policy" in lowered:
         return ChatError(
-            f"{llm}{where}: the provider's content filter refused the prompt; try another LLM or "
+            f"{llm}{where}: the provider's content filter rejected the prompt; try another LLM or "
             f"--anonymous. {detail}"
         )
     if "contextwindow" in lowered or "context_length" in lowered or "maximum context" in lowered:
-        return ChatError(f"{llm}{where}: the prompt is too long; lower its token limit. {detail}")
+        return ChatError(
+            f"{llm}{where}: the prompt is too long for this LLM; use a plainer prompt variant (--variant) or "
+            f"another LLM. {detail}"
+        )
     if status == 429 and any(word in lowered for word in _QUOTA_WORDS):
         return ChatError(f"{llm}{where}: the account behind {keys} has no quota left. {detail}")
     if status in (400, 422, 501) and speaks_of_format:
@@ -115,7 +128,7 @@ def classify(
 
 
 def _first_lines(text: str) -> str:
-    """Beginning of a message, without the stack that the client library may append."""
+    """Beginning of a message, without the stack trace that the client library may append."""
     text = text.split("Traceback (most recent call last)")[0].strip()
     return text if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
 
@@ -126,12 +139,12 @@ def _status(error: Exception) -> int | None:
 
 
 def _is_connection(error: Exception) -> bool:
-    # An answer without choices comes back from the client library as a bare IndexError.
+    # The client library raises a plain IndexError for a reply without choices.
     return isinstance(error, ConnectionError | TimeoutError | IndexError)
 
 
 def _is_refused(error: BaseException | None) -> bool:
-    """Whether a connection was refused, which the client libraries wrap several times."""
+    """Whether a connection was refused; the client libraries wrap that error several times."""
     while error is not None:
         if isinstance(error, ConnectionRefusedError) or "connection refused" in str(error).lower():
             return True

@@ -1,4 +1,4 @@
-"""From the strictest way of asking, by schema and with tools, down to the one that the server takes."""
+"""From the strictest way of asking, by schema and with tools, down to one that the server accepts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,13 +13,14 @@ from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode, below
 
 @dataclass
 class LadderChat:
-    """Asks by JSON Schema, else for any JSON object, else in words; remembers what worked.
+    """Asks by JSON Schema, else for any JSON object, else in words only; remembers what worked.
 
-    Questions that offer tools have a ladder of their own, for servers take both and refuse them together;
-    below its last rung, or where tools are refused as such, they are asked without tools.
+    Requests that offer tools have their own ladder: some servers accept a schema and accept tools but reject
+    the two together. Below its last step, or if the server rejects tools altogether, the request is sent
+    without tools.
 
     Attributes:
-        inner: the client, whose ``mode`` is where the ladder begins.
+        inner: the client; its ``mode`` is the first step.
     """
 
     inner: LiteLLMChat
@@ -32,21 +33,19 @@ class LadderChat:
 
     @property
     def llm(self) -> str:
-        """See Chat."""
         return self.inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """See Chat."""
         return self.inner.parameters
 
     @property
     def mode(self) -> Mode:
-        """How the next reply is asked for, without tools."""
+        """How the next reply will be asked for if no tools are offered."""
         return self._mode
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Answer, in the strictest form that the server takes."""
+        """Ask in the strictest way that the server accepts."""
         if request.tools and not self._may_offer_tools():
             request = _without_tools(request)
         while True:
@@ -67,7 +66,6 @@ class LadderChat:
                 request = self._refused_with_tools(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """See Chat."""
         self.inner.accepted(request, reply)
 
     def _may_offer_tools(self) -> bool:
@@ -76,9 +74,13 @@ class LadderChat:
         return self._takes_tools
 
     def _refused_with_tools(self, request: ChatRequest) -> ChatRequest:
-        """Remember that tools are refused; return the question without them."""
+        """Remember that the server rejects tools; return the request without them."""
         if any(message.role == "tool" for message in request.messages):
-            raise ChatError(f"{self.llm}: the server took a tool first and refused it in the same turn")
+            # The conversation contains tool calls already, which cannot be sent without the tools.
+            raise ChatError(
+                f"{self.llm}: the server first accepted a tool, then rejected it in the same turn; "
+                "use --engine llm, which offers no tools"
+            )
         self._takes_tools = False
         return _without_tools(request)
 

@@ -1,4 +1,4 @@
-"""litellm, imported here and nowhere else, and only when an LLM is used."""
+"""The only place that imports litellm, and only when an LLM is used: the import takes seconds."""
 
 import os
 import warnings
@@ -10,13 +10,13 @@ from falsifier.errors import ChatError, ChatSetupError, did_you_mean
 from falsifier.llm.providers import PROVIDERS, known
 from falsifier.llm.usage import Price
 
-# What litellm would do unasked when it is imported or first used, and how it is told not to.
+# What litellm would do on import or first use, and the variables that prevent it.
 _ENVIRONMENT = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # fetch a price list
     "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",  # fetch a list of headers
     "LITELLM_MODE": "PRODUCTION",  # read a .env file
 }
-# Parameters that litellm drops for models which do not take them.
+# Parameters that litellm drops for LLMs that do not accept them.
 _DROPPABLE = frozenset(
     {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
      "frequency_penalty"}
@@ -25,10 +25,10 @@ _DROPPABLE = frozenset(
 
 @cache
 def load_litellm() -> Any:
-    """Import litellm, which takes seconds, without its network access, its .env file and its prints.
+    """Import litellm without its network access, its .env file and its messages.
 
     Raises:
-        ChatError: when it is not installed.
+        ChatError: if it cannot be imported.
     """
     os.environ.update(_ENVIRONMENT)
     try:
@@ -36,28 +36,28 @@ def load_litellm() -> Any:
     except ImportError as error:
         raise ChatError(f"litellm cannot be imported ({error}): pip install litellm") from None
     litellm.suppress_debug_info = True
-    # Its types make pydantic warn of something that is none of the user's business.
+    # litellm's own types cause this pydantic warning; the user can do nothing about it.
     warnings.filterwarnings("ignore", message=".*`ReadOnly` qualifier", category=UserWarning)
     return litellm
 
 
 def check_name(llm: str) -> None:
-    """Refuse a name whose provider nobody knows; listed providers need no import for that.
+    """Reject a name with an unknown provider; for the listed providers this does not import litellm.
 
     Raises:
-        ChatSetupError: with the form that is expected.
+        ChatSetupError: stating the expected form.
     """
     provider, _, name = llm.partition("/")
     if name and (provider in PROVIDERS or _knows(llm)):
         return
     raise ChatSetupError(
-        f"{llm!r} names no known provider and model: expected PROVIDER/MODEL such as openai/gpt-5-mini; "
+        f"{llm!r} does not name a known provider: expected PROVIDER/MODEL such as openai/gpt-5-mini; "
         f"{did_you_mean(provider, PROVIDERS)}"
     )
 
 
 def listed_price(llm: str) -> Price | None:
-    """Price of an LLM in litellm's table; None where it is not listed, or falsely listed as free."""
+    """Price of an LLM in litellm's table; None if it is not listed, or wrongly listed as free."""
     try:
         info = load_litellm().get_model_info(llm)
     except ChatError:
@@ -71,9 +71,9 @@ def listed_price(llm: str) -> Price | None:
 
 
 def may_take_tools(llm: str, *, api_base: str | None = None) -> bool:
-    """Whether tools are worth offering: False only where litellm lists the LLM as one that takes none.
+    """Whether to offer tools: False only if litellm lists the LLM as one without tool support.
 
-    What a server of one's own takes, only the server can say.
+    For the user's own server the answer is always True: only a request can show what it supports.
     """
     if api_base is not None or known(llm).local:
         return True
@@ -86,7 +86,7 @@ def may_take_tools(llm: str, *, api_base: str | None = None) -> bool:
 
 
 def dropped_parameters(llm: str, arguments: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of those arguments that litellm leaves out because the LLM does not take them."""
+    """Names of the arguments that litellm omits because the LLM does not accept them."""
     allowed = set(arguments.get("allowed_openai_params", ()))
     stated = {k: v for k, v in arguments.items() if k in _DROPPABLE and k not in allowed}
     effort = {k: v for k, v in stated.items() if k == "reasoning_effort"}
@@ -97,7 +97,7 @@ def _knows(llm: str) -> bool:
     litellm = load_litellm()
     try:
         litellm.get_llm_provider(llm)
-    except Exception:  # litellm raises several kinds for names that it does not know
+    except Exception:  # litellm raises various exceptions for unknown names
         return False
     return True
 
@@ -111,6 +111,6 @@ def _takes(llm: str, arguments: Mapping[str, Any]) -> bool:
         )
     except litellm.UnsupportedParamsError:
         return False
-    except Exception:  # nothing can be said, and the request itself will tell
+    except Exception:  # unknown here; the request itself will show it
         return True
     return True

@@ -1,4 +1,4 @@
-"""What travels to and from a language model, as frozen values that go into the journal as they are."""
+"""What is sent to and received from a language model: frozen values, written to the journal unchanged."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, Protocol, get_args
@@ -17,13 +17,13 @@ class _Value(BaseModel):
 
 
 def below(mode: Mode) -> Mode | None:
-    """Next plainer way, or None."""
+    """Next plainer way of asking, or None."""
     rest = MODES[MODES.index(mode) + 1 :]
     return rest[0] if rest else None
 
 
 class _MayUseTools(_Value):
-    """Leaves out empty fields of tools: most messages have none, and a journal has many."""
+    """Omits empty fields that concern tools: few messages use tools, and a journal contains many messages."""
 
     @model_serializer(mode="wrap")
     def _without_empty_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -34,11 +34,13 @@ _FIELDS_OF_TOOLS = frozenset({"tools", "tool_calls", "tool_call_id", "echo"})
 
 
 class Tool(_Value):
-    """Something that an LLM may call before it answers."""
+    """A function that an LLM may call before it answers."""
 
     name: str
     description: str
-    parameters: dict[str, Any] = Field(description="JSON Schema of the arguments, strict subset.")
+    parameters: dict[str, Any] = Field(
+        description="JSON Schema of the arguments, within the subset of strict servers."
+    )
 
 
 class ToolCall(_MayUseTools):
@@ -46,9 +48,10 @@ class ToolCall(_MayUseTools):
 
     id: str
     name: str
-    arguments: str = Field(description="JSON text; whether it is valid, the tool must see.")
+    arguments: str = Field(description="JSON text, not validated yet.")
     echo: dict[str, Any] = Field(
-        default_factory=dict, description="What the provider wants back with the call, such as a signature."
+        default_factory=dict,
+        description="What the provider requires to be sent back with the call, such as a signature.",
     )
 
 
@@ -60,21 +63,22 @@ class Message(_MayUseTools):
     tool_calls: tuple[ToolCall, ...] = Field(default=(), description="Of an assistant's message.")
     tool_call_id: str = Field(default="", description="Of a tool's message: the call that it answers.")
     echo: dict[str, Any] = Field(
-        default_factory=dict, description="What the provider wants back with the message, such as thoughts."
+        default_factory=dict,
+        description="What the provider requires to be sent back with the message, such as signed reasoning.",
     )
 
 
 class Usage(_Value):
-    """Tokens and money of one request."""
+    """Tokens and cost of one request."""
 
     prompt_tokens: int = 0
     completion_tokens: int = Field(default=0, description="Reasoning included.")
     reasoning_tokens: int = Field(
-        default=0, description="Of the completion tokens, where the provider says so."
+        default=0, description="Part of the completion tokens, if the provider reports it."
     )
-    cost: float | None = Field(default=None, description="US dollars; None where the price is unknown.")
+    cost: float | None = Field(default=None, description="US dollars; None if the price is unknown.")
     estimated: bool = Field(
-        default=False, description="The provider sent no counts; four characters make a token."
+        default=False, description="The provider sent no counts; estimated at four characters per token."
     )
 
     @property
@@ -84,61 +88,69 @@ class Usage(_Value):
 
 
 class ChatRequest(_MayUseTools):
-    """What is asked.
+    """One request.
 
-    Everything that shapes the answer is either here or among the chat's own parameters.
+    Everything that influences the reply is either here or among the chat's parameters: together they are the
+    key of the cache.
     """
 
     messages: tuple[Message, ...]
     reply_schema: dict[str, Any] | None = Field(
-        default=None, description="JSON Schema of the reply, strict subset."
+        default=None, description="JSON Schema of the reply, within the subset of strict servers."
     )
-    tools: tuple[Tool, ...] = Field(default=(), description="What may be called before the answer.")
-    sample: int = Field(default=0, description="Which of several answers to the same question this is.")
-    room: int = Field(
-        default=1, description="Multiplies the limit on tokens, after an answer that was cut off."
+    tools: tuple[Tool, ...] = Field(default=(), description="What may be called before the reply.")
+    sample: int = Field(
+        default=0, description="Distinguishes runs that ask the same question and want different replies."
     )
+    room: int = Field(default=1, description="Factor on the token limit after a reply that was cut off.")
 
 
 class ChatReply(_MayUseTools):
-    """What came back."""
+    """One reply."""
 
     text: str
-    tool_calls: tuple[ToolCall, ...] = Field(default=(), description="To be answered before there is a text.")
-    echo: dict[str, Any] = Field(
-        default_factory=dict, description="What the provider wants back with the calls, such as thoughts."
+    tool_calls: tuple[ToolCall, ...] = Field(
+        default=(), description="Calls to answer before the LLM gives its reply."
     )
-    reasoning: str = Field(default="", description="What the provider shows of the LLM's reasoning.")
+    echo: dict[str, Any] = Field(
+        default_factory=dict,
+        description="What the provider requires to be sent back with the calls, such as signed reasoning.",
+    )
+    reasoning: str = Field(default="", description="The LLM's reasoning as far as the provider shows it.")
     finish_reason: str = "stop"
     usage: Usage = Usage()
     seconds: float = 0.0
     attempts: int = 1
-    parameters: dict[str, Any] = Field(default_factory=dict, description="What was sent beside the messages.")
+    parameters: dict[str, Any] = Field(
+        default_factory=dict, description="What was sent in addition to the messages."
+    )
     source: Source = "llm"
 
 
 class Exchange(_Value):
-    """One question, its answer, and what was wrong with it if it was rejected."""
+    """One request, its reply, and the defect of a rejected reply."""
 
     llm: str
     messages: tuple[Message, ...]
     parameters: dict[str, Any] = Field(default_factory=dict)
-    reply: ChatReply | None = Field(description="None when no answer came.")
-    problem: str | None = Field(default=None, description="Why the answer was rejected, or why none came.")
+    reply: ChatReply | None = Field(description="None if there was no reply.")
+    problem: str | None = Field(
+        default=None, description="Why the reply was rejected, or why there was none."
+    )
 
     @property
     def usage(self) -> Usage:
-        """Tokens and money of this exchange; an answer that never came costs nothing."""
+        """Tokens and cost of this exchange; without a reply it cost nothing."""
         return Usage(cost=0.0) if self.reply is None else self.reply.usage
 
     @property
     def seconds(self) -> float:
-        """Wall-clock seconds until the answer was there."""
+        """Wall-clock seconds until the reply arrived."""
         return 0.0 if self.reply is None else self.reply.seconds
 
 
 class Chat(Protocol):
-    """A language model, or something that wraps or plays one."""
+    """A language model, a wrapper around one, or a stand-in for one."""
 
     @property
     def llm(self) -> str:
@@ -147,17 +159,17 @@ class Chat(Protocol):
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """What is sent beside the messages, without secrets."""
+        """What is sent in addition to the messages, without secrets."""
         ...
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Answer a request.
+        """Return the reply to a request.
 
         Raises:
-            ChatError: when no answer can be had.
+            ChatError: if no reply can be obtained.
         """
         ...
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Hear that a reply proved valid and may be kept."""
+        """Be notified that a reply proved valid and may be stored."""
         ...

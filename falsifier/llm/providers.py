@@ -1,4 +1,4 @@
-"""What is known of each provider before anything is sent: its key, where it runs, what it takes."""
+"""What is known about each provider before anything is sent: its key, its server, what it accepts."""
 
 import os
 from collections.abc import Mapping
@@ -12,19 +12,19 @@ from falsifier.llm.messages import MODES, Mode
 
 @dataclass(frozen=True, slots=True)
 class Provider:
-    """One provider, by the first part of an LLM's name.
+    """One provider; the first part of an LLM's name identifies it.
 
     Attributes:
-        keys: environment variables that may hold its key, the usual one first; empty: none is needed.
-        local: runs on the user's own machine, so that a price of zero is true.
-        address: where its server is when nobody says so, for messages.
+        keys: environment variables that may contain its key, the usual one first; empty: none is needed.
+        local: runs on the user's own machine, so a price of zero is correct.
+        address: default address of its server, for messages.
         start: command that starts its server, for messages.
-        openai_client: served through the OpenAI client, which retries unasked unless told not to.
+        openai_client: served through the OpenAI client, which silently retries by default.
         defaults: parameters that are sent unless the user states them.
-        effort: how reasoning effort is passed: ``native``, or ``allowed`` where the client library must be
-            told to let it through.
-        echo: fields that come with calls of tools and must be sent back with them: signed thoughts, which
-            the provider refuses to do without.
+        effort: how reasoning effort is passed: ``native``, or ``allowed`` if the client library passes it
+            only on an explicit list.
+        echo: fields of tool calls that must be sent back with them, such as signed reasoning; the provider
+            rejects the conversation without them.
     """
 
     keys: tuple[str, ...] = ()
@@ -37,8 +37,8 @@ class Provider:
     echo: tuple[str, ...] = ()
 
 
-# Ollama cuts off the beginning of a prompt that is longer than its context, without a word. Its own default
-# is shorter than most prompts with a history.
+# Ollama silently cuts off the beginning of a prompt that exceeds its context. Its default context is shorter
+# than most prompts with a history.
 _OLLAMA = Provider(
     local=True,
     address="http://localhost:11434",
@@ -78,7 +78,7 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     }
 )
 
-# Sent where an OpenAI-compatible server needs no key but its client insists on one.
+# Sent if an OpenAI-compatible server needs no key, because its client insists on one.
 NO_KEY = "none"
 
 
@@ -88,7 +88,7 @@ def provider_of(llm: str) -> str:
 
 
 def known(llm: str) -> Provider:
-    """What is known of an LLM's provider; nothing special for an unlisted one."""
+    """What is known about an LLM's provider; the defaults for an unlisted one."""
     return PROVIDERS.get(provider_of(llm), Provider())
 
 
@@ -96,7 +96,7 @@ def find_key(llm: str, *, api_base: str | None = None) -> str | None:
     """Key for an LLM from the environment.
 
     Returns:
-        The key; a placeholder for the user's own server without one; None where none is needed.
+        The key; a placeholder for the user's own server without a key; None if none is needed.
 
     Raises:
         ChatSetupError: naming the variable to set.
@@ -108,28 +108,28 @@ def find_key(llm: str, *, api_base: str | None = None) -> str | None:
         return NO_KEY
     if provider.keys and api_base is None:
         variables = " or ".join(provider.keys)
-        raise ChatSetupError(f"{llm}: no key: set {variables} in the environment")
+        raise ChatSetupError(f"{llm}: no API key: set {variables} in the environment")
     return None
 
 
 def key_variable(llm: str) -> str:
-    """Environment variable that holds a key for this LLM; empty where none does."""
+    """Environment variable that contains a key for this LLM; empty if none does."""
     return next((name for name in known(llm).keys if os.environ.get(name, "").strip()), "")
 
 
 def server_address(llm: str, api_base: str | None) -> str:
-    """Where an LLM's server is: as stated, as the environment says, or its provider's usual place.
+    """Address of an LLM's server: as stated, from the environment, or the provider's default.
 
-    Empty where only the client library knows.
+    Empty if only the client library knows it.
     """
     variable = "OLLAMA" if known(llm) is _OLLAMA else provider_of(llm).upper()
     return api_base or os.environ.get(f"{variable}_API_BASE", "") or known(llm).address
 
 
 def first_mode(llm: str) -> Mode:
-    """How to ask this LLM for JSON at first.
+    """First way of asking this LLM for JSON.
 
-    gpt-oss under Ollama and LM Studio answers with nothing or with garbled text when it is held to a grammar
+    Constrained to a grammar by Ollama or LM Studio, gpt-oss returns empty or garbled replies
     (ollama#11691, ollama#12470, lmstudio-bug-tracker#1555).
     """
     grammar_is_broken = provider_of(llm) in ("ollama", "ollama_chat", "lm_studio") and "gpt-oss" in llm

@@ -1,4 +1,4 @@
-"""Recorded conversations, played again: resumed runs pay for nothing twice, notebooks need no key."""
+"""Playback of recorded conversations: resumed runs pay for nothing twice, notebooks need no key."""
 
 import json
 import threading
@@ -6,15 +6,16 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.words import counted
 from falsifier.errors import ChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange
 
 
 def read_recording(path: Path) -> list[Exchange]:
-    """Exchanges of a file with one per line, such as a run's ``journal.jsonl``; other lines are passed over.
+    """Read exchanges from a file with one per line, such as a run's ``journal.jsonl``; skip other lines.
 
     Raises:
-        ChatError: when the file cannot be read, or an exchange in it cannot be understood.
+        ChatError: if the file cannot be read or contains an invalid exchange.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -22,7 +23,7 @@ def read_recording(path: Path) -> list[Exchange]:
         exchanges = [record.get("exchange", record) for record in found if _is_exchange(record)]
         return [Exchange.model_validate(exchange) for exchange in exchanges]
     except (OSError, ValueError) as error:
-        raise ChatError(f"{path}: no recording that can be played: {error}") from None
+        raise ChatError(f"{path}: not a readable recording: {error}") from None
 
 
 def _is_exchange(record: Any) -> bool:
@@ -30,7 +31,7 @@ def _is_exchange(record: Any) -> bool:
 
 
 class Recording:
-    """Recorded exchanges, each played once, whichever chat asks for it.
+    """Recorded exchanges, each played once; several chats may share a recording.
 
     Args:
         exchanges: what was recorded, in order.
@@ -46,16 +47,16 @@ class Recording:
 
     @property
     def remaining(self) -> int:
-        """Recorded replies that were not played yet."""
+        """Number of recorded replies not played yet."""
         return len(self._exchanges) - self._played
 
     @property
     def llm(self) -> str:
-        """Of what this is a recording, in words."""
+        """The name to show for this recording: which LLM was recorded."""
         return f"recording of {self._exchanges[0].llm}" if self._exchanges else "empty recording"
 
     def next(self) -> Exchange | None:
-        """Next exchange; None at the end."""
+        """Play the next exchange; None at the end."""
         with self._lock:
             found = self._exchanges[self._played] if self.remaining else None
             self._played += found is not None
@@ -67,7 +68,7 @@ class RecordedChat:
 
     Args:
         recording: what was recorded.
-        inner: who answers after that; None: nobody.
+        inner: chat to ask after that; None: the end of the recording is an error.
     """
 
     def __init__(self, recording: Recording | Iterable[Exchange], inner: Chat | None = None) -> None:
@@ -76,35 +77,33 @@ class RecordedChat:
 
     @property
     def llm(self) -> str:
-        """Name of the LLM that is asked; without one, that this is a recording, and of what."""
+        """Name of the inner chat's LLM; without an inner chat, the recording's."""
         return self.recording.llm if self._inner is None else self._inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """See Chat."""
         return {} if self._inner is None else self._inner.parameters
 
     @property
     def remaining(self) -> int:
-        """Recorded replies that were not played yet."""
+        """Number of recorded replies not played yet."""
         return self.recording.remaining
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next recorded reply.
 
         Raises:
-            ChatError: when the recording has ended and nobody is there to ask.
+            ChatError: if a failure was recorded, or the recording has ended and there is no inner chat.
         """
         recorded = self.recording.next()
         if recorded is not None:
             if recorded.reply is None:
-                raise ChatError(recorded.problem or "no answer came")
+                raise ChatError(recorded.problem or "there was no reply")
             return recorded.reply.model_copy(update={"source": "recording"})
         if self._inner is None:
-            raise ChatError(f"the {self.llm} ends after {len(self.recording)} replies")
+            raise ChatError(f"the {self.llm} ends after {counted(len(self.recording), 'exchange')}")
         return self._inner.complete(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """See Chat."""
         if self._inner is not None:
             self._inner.accepted(request, reply)

@@ -1,6 +1,6 @@
-"""Replies of a language model: the form that is asked for, and the candidates that are read from it.
+"""Replies of a language model: the required form, and how candidates are read from a reply.
 
-Two forms are understood: JSON with signals by name and a rationale, which is what prompts ask for, and the
+Two forms are accepted: JSON with signals by name and a rationale, which is what prompts ask for, and the
 numbers of a point in order between ``<point>`` and ``</point>``.
 """
 
@@ -28,14 +28,14 @@ _LONGEST_RATIONALE = 2000
 
 @dataclass(frozen=True, slots=True)
 class ReplyForm:
-    """What a reply must hold.
+    """What a reply must contain.
 
     Attributes:
-        space: what candidates must fit.
+        space: search space that candidates must fit.
         named: signals and parameters by name; else one list of numbers in the order of the dimensions.
-        free: whether a free parameterization may be used where the space allows it.
-        count: how many candidates.
-        reasoned: whether each candidate bears a rationale.
+        free: whether a free parameterization may be used if the space allows it.
+        count: number of candidates.
+        reasoned: whether each candidate comes with a rationale.
     """
 
     space: SearchSpace
@@ -46,11 +46,11 @@ class ReplyForm:
 
     @property
     def is_free(self) -> bool:
-        """Whether any input's control points may be chosen."""
+        """Whether the LLM may choose the control points of any input."""
         return self.free and any(r.free for r in self.space.inputs)
 
     def schema(self) -> dict[str, Any]:
-        """JSON Schema within the subset that strict servers take: all required, nothing more, no maps."""
+        """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps."""
         parts: dict[str, Any] = {"rationale": _TEXT} if self.reasoned else {}
         candidate = _object(**parts, **(self._named_parts() if self.named else {"point": _NUMBERS}))
         return candidate if self.count == 1 else _object(candidates={"type": "array", "items": candidate})
@@ -74,10 +74,10 @@ class ReplyForm:
         return parts
 
     def read(self, text: str, *, origin: str = "") -> list[Candidate]:
-        """Candidates of a reply: the valid ones among several.
+        """Read the valid candidates of a reply.
 
         Raises:
-            RejectedReplyError: telling what is wrong, when none is valid.
+            RejectedReplyError: if none is valid; states what is wrong with the first.
         """
         found = self.read_each(text, origin=origin)
         candidates = [one for one in found if isinstance(one, Candidate)]
@@ -86,16 +86,16 @@ class ReplyForm:
         return candidates
 
     def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
-        """Candidates of a reply in its order; in place of an invalid one, what is wrong with it.
+        """Read the candidates of a reply in order; an invalid one is replaced by an error with its defect.
 
         Raises:
-            RejectedReplyError: when there is none, valid or not.
+            RejectedReplyError: if the reply contains no candidate, valid or not.
         """
         text = _THOUGHT.sub("", text)
         found = _candidate_objects(text) or [{"point": numbers} for numbers in _points(text)]
         if not found:
             raise RejectedReplyError(
-                "it holds neither a JSON object with a candidate nor <point> ... </point>"
+                "it contains neither a JSON object with a candidate nor <point> ... </point>"
             )
         each: list[Candidate | RejectedReplyError] = []
         for one in found:
@@ -117,7 +117,7 @@ class ReplyForm:
         return self._admitted(Candidate(signals, parameters, origin, reply.rationale))
 
     def _allowed(self) -> SearchSpace:
-        """Search space with only those freedoms that the reply was offered."""
+        """Search space with free parameterization only if the LLM was offered it."""
         if self.free:
             return self.space
         return replace(self.space, inputs=tuple(replace(r, free=None) for r in self.space.inputs))
@@ -189,7 +189,7 @@ class ParameterReply(_Reply):
 
 
 def _signals_by_name(found: Any) -> Any:
-    """Take ``{name: values}`` and time/value pairs for the listed form."""
+    """Convert ``{name: values}`` and [time, value] pairs, which LLMs also write, to the listed form."""
     if isinstance(found, dict):
         found = [{"name": k, **(v if isinstance(v, dict) else {"values": v})} for k, v in found.items()]
     return [_pairs_apart(s) for s in found] if isinstance(found, list) else found
@@ -212,12 +212,12 @@ def _parameters_by_name(found: Any) -> Any:
 
 
 def _storable(text: str) -> str:
-    """At most so much text, without the halves of surrogate pairs, which no file can hold."""
+    """The text up to a maximum length, without unpaired surrogates, which UTF-8 cannot encode."""
     return text.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_RATIONALE]
 
 
 class CandidateReply(BaseModel):
-    """One candidate, as an LLM writes it; a superfluous remark is no reason to pay for another reply."""
+    """One candidate, as an LLM writes it; unknown keys are ignored, not worth paying for another reply."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
@@ -239,7 +239,7 @@ def _validated(found: dict[str, Any]) -> CandidateReply:
 
 
 def _candidate_objects(text: str) -> list[dict[str, Any]]:
-    """Candidates of the last JSON object that holds any: reasoning may show drafts before it."""
+    """Candidates of the last JSON object that contains any: reasoning may show drafts before it."""
     for found in reversed(list(_json_objects(text))):
         several = found.get("candidates")
         if isinstance(several, list) and several and all(isinstance(c, dict) for c in several):
@@ -268,14 +268,12 @@ def _points(text: str) -> Iterator[list[float]]:
         words = [w for w in re.split(r"[\s,;()\[\]]+", match[1]) if w]
         wrong = [w for w in words if not _NUMBER.fullmatch(w)]
         if wrong:
-            raise RejectedReplyError(
-                f"between <point> and </point> only numbers are expected, got {wrong[0]!r}"
-            )
+            raise RejectedReplyError(f"expected only numbers between <point> and </point>, got {wrong[0]!r}")
         yield [float(w) for w in words]
 
 
 def _unrolled(values: list[float | str]) -> list[float]:
-    """Numbers, with run lengths such as ``"0 x 187"`` written out."""
+    """Numbers, with runs such as ``"0 x 187"`` expanded."""
     numbers: list[float] = []
     for value in values:
         if not isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Patience: requests that failed for a passing reason are sent again, by all runs together."""
+"""Retries of requests that failed for a temporary reason, coordinated between runs."""
 
 import logging
 import random
@@ -9,20 +9,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from falsifier.core.words import counted
 from falsifier.errors import ChatError
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest
 
 _LOG = logging.getLogger(__name__)
 
-# With doubling delays the last request goes out about a minute after the first, so that a server may restart.
+# With doubling delays the last request is sent about a minute after the first: enough for a server restart.
 DEFAULT_ATTEMPTS = 7
 
 
 class Gate:
-    """How many requests may be under way at a time, and until when all of them wait.
+    """Limits concurrent requests and makes all of them wait during a pause.
 
-    Runs that share a gate share the provider's rate limit: when one is told to wait, all wait.
+    Runs that share a gate share the provider's rate limit: if one is told to wait, all wait.
     """
 
     def __init__(self, concurrency: int = 4, *, sleep: Callable[[float], None] = time.sleep) -> None:
@@ -40,12 +41,12 @@ class Gate:
             yield
 
     def pause(self, seconds: float) -> None:
-        """Let nobody through for this many seconds from now."""
+        """Hold back all requests for this many seconds from now."""
         with self._lock:
             self._open_at = max(self._open_at, time.monotonic() + seconds)
 
     def wait(self, seconds: float) -> None:
-        """Wait without holding up others."""
+        """Wait without delaying other requests."""
         self._sleep(seconds)
 
     def remaining(self) -> float:
@@ -56,14 +57,15 @@ class Gate:
 
 @dataclass(frozen=True)
 class RetryingChat:
-    """Sends again after rate limits, timeouts, lost connections and server errors.
+    """Retries after rate limits, timeouts, lost connections and server errors.
 
     Attributes:
-        inner: what is asked.
+        inner: chat to ask.
         gate: shared between all runs that use the same account.
-        attempts: most requests for one answer.
+        attempts: maximum number of requests per reply.
         first_delay: seconds before the second request; each further delay is twice as long, with jitter.
-        longest_delay: most seconds between two requests; a server that asks for more ends the run.
+        longest_delay: maximum number of seconds between two requests; if the server asks for more, the
+            request fails.
     """
 
     inner: Chat
@@ -74,19 +76,17 @@ class RetryingChat:
 
     @property
     def llm(self) -> str:
-        """See Chat."""
         return self.inner.llm
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """See Chat."""
         return self.inner.parameters
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Answer, with patience.
+        """Ask, and ask again after temporary failures.
 
         Raises:
-            ChatError: when the last attempt failed, or for a failure that waiting does not cure.
+            ChatError: if the last attempt failed, or for a failure that waiting does not cure.
         """
         for attempt in range(1, self.attempts + 1):
             try:
@@ -97,17 +97,16 @@ class RetryingChat:
                 asked = error.retry_after
                 if asked is not None and asked > self.longest_delay:
                     raise ChatError(
-                        f"{error} The server asks to wait {asked:g} s; try again later."
+                        f"the server asks to wait {asked:g} s; try again later. {error}"
                     ) from None
-                most = min(self.attempts, error.patience or self.attempts)
-                if attempt >= most:
-                    raise ChatError(f"gave up after {attempt} attempts. {error}") from None
+                limit = min(self.attempts, error.patience or self.attempts)
+                if attempt >= limit:
+                    raise ChatError(f"gave up after {counted(attempt, 'attempt')}. {error}") from None
                 own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
                 delay = min(own, self.longest_delay) if asked is None else asked
-                _LOG.warning("%s. Asking again in %.0f s (%d of %d).", error, delay, attempt + 1, most)
+                _LOG.warning("%s. Retrying in %.0f s (attempt %d of %d).", error, delay, attempt + 1, limit)
                 (self.gate.pause if error.for_all else self.gate.wait)(delay)
         raise AssertionError("attempts is at least 1")
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """See Chat."""
         self.inner.accepted(request, reply)

@@ -1,10 +1,11 @@
-"""An LLM that plays a script, for tests, tutorials and dry runs."""
+"""A chat that follows a script, for tests, tutorials and dry runs."""
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from falsifier.core.words import counted
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 
@@ -18,7 +19,7 @@ class ScriptedChat:
 
     Attributes:
         script: replies in order, or a function of the request.
-        llm: the name that it bears.
+        llm: name to show.
         requests: what it was asked, in order.
     """
 
@@ -32,14 +33,14 @@ class ScriptedChat:
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """Nothing: nothing is sent."""
+        """Empty: nothing is sent."""
         return {}
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next line of the script.
 
         Raises:
-            ChatError: when the script has ended.
+            ChatError: if the script has ended.
         """
         with self._lock:
             self.requests.append(request)
@@ -51,7 +52,7 @@ class ScriptedChat:
         return ChatReply(text=line, usage=Usage(cost=0.0), source="script")
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Keep nothing."""
+        """Do nothing: a script's replies are not worth storing."""
 
     def _next(self, request: ChatRequest) -> Line:
         if callable(self.script):
@@ -62,5 +63,6 @@ class ScriptedChat:
         except StopIteration:
             asked = len(self.requests)
             raise ChatError(
-                f"the script of {self.llm!r} has {asked - 1} replies, {asked} are asked for"
+                f"the script of {self.llm!r} contains only {counted(asked - 1, 'line')}, but request {asked} "
+                "was made: add lines, or use a function"
             ) from None

@@ -1,10 +1,11 @@
-"""What an LLM may call before it answers: predictions of candidates, without a simulation."""
+"""The tool that an LLM may call before it replies: predictions for candidates, without a simulation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import Tool, ToolCall
 from falsifier.llm.prompts.variants import Variant
@@ -12,30 +13,30 @@ from falsifier.llm.prompts.what_if import NAME, answer, predicted, what_if_tool
 from falsifier.llm.replies import ReplyForm
 from falsifier.stl import Verdict
 
-# Candidates of one call that are predicted; an answer about more would cost tokens and be skimmed.
+# Maximum number of candidates predicted per call; a longer answer would cost tokens for little benefit.
 MOST_CANDIDATES = 10
 
 
 class Predictor(Protocol):
-    """Foretells verdicts without a simulation."""
+    """Predicts verdicts without a simulation."""
 
     @property
     def recent_error(self) -> float:
-        """Root mean square error of recent predictions, as a share of the spread of what was predicted."""
+        """Root mean square error of recent predictions, as a share of the spread of the predicted signals."""
         ...
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
-        """Return the predicted verdict of each candidate, in the requirement's own unit."""
+        """Return the predicted verdict of each candidate; robustness is in the requirement's own unit."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class WhatIf:
-    """Leave to ask for predictions during one turn.
+    """Permission to request predictions during one turn.
 
     Attributes:
-        predictor: whom to ask.
-        calls: how many calls are answered.
+        predictor: makes the predictions.
+        calls: maximum number of calls that are answered.
     """
 
     predictor: Predictor
@@ -47,12 +48,12 @@ class PredictionTool:
     """Answers the calls of one turn.
 
     Attributes:
-        what_if: whom to ask, and how often.
-        form: of the candidates that are asked about.
-        variant: what is told.
-        reveal: from a candidate as the LLM writes it to the real one.
-        hide: from a real verdict to one that the LLM may know.
-        answered: how many calls were answered.
+        what_if: the predictor and the number of calls.
+        form: required form of the candidates.
+        variant: prompt variant, which limits what the answers reveal.
+        reveal: maps a candidate as the LLM writes it to the real one.
+        hide: maps a real verdict to what the LLM may see.
+        answered: number of calls answered so far.
     """
 
     what_if: WhatIf
@@ -64,20 +65,21 @@ class PredictionTool:
 
     @property
     def offer(self) -> Tool:
-        """What the LLM is told of it."""
+        """The tool's description for the LLM."""
         return what_if_tool(self.form.schema(), calls=self.what_if.calls)
 
     def respond(self, call: ToolCall) -> str:
         """Answer one call.
 
         Raises:
-            RejectedReplyError: telling what is wrong with it, or that the limit is reached.
+            RejectedReplyError: stating what is wrong with it, or that the limit is reached.
         """
         if call.name != NAME:
             raise RejectedReplyError(f"there is no tool {call.name!r}, only {NAME!r}")
         if self.answered >= self.what_if.calls:
             raise RejectedReplyError(
-                f"the limit of {self.what_if.calls} calls is reached; reply with your candidates now"
+                f"the limit of {counted(self.what_if.calls, 'call')} is reached; "
+                "reply with your candidates now"
             )
         found = self.form.read_each(call.arguments)
         if all(isinstance(one, RejectedReplyError) for one in found):
@@ -85,7 +87,7 @@ class PredictionTool:
         self.answered += 1
         lines = self._lines(found[:MOST_CANDIDATES])
         if len(found) > MOST_CANDIDATES:
-            lines.append(f"and {len(found) - MOST_CANDIDATES} more: not predicted, ask about fewer at a time")
+            lines.append(f"and {len(found) - MOST_CANDIDATES} more: not predicted; send fewer per call")
         left = self.what_if.calls - self.answered
         return answer(lines, error=self.what_if.predictor.recent_error, left=left)
 

@@ -1,4 +1,4 @@
-"""What a request cost, in tokens and in money; an unknown price is None and never zero."""
+"""What a request cost, in tokens and in money; an unknown cost is None, never zero."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 from falsifier.llm.messages import ChatRequest, Usage
 
-# Rule of thumb for text in English; only used where a provider sends no counts.
+# Rule of thumb for English text; for prompt limits, and for providers that send no counts.
 _CHARACTERS_PER_TOKEN = 4
 
 
@@ -15,8 +15,8 @@ class Price:
     """What an LLM costs.
 
     Attributes:
-        prompt: US dollars for 1000 tokens sent.
-        completion: US dollars for 1000 tokens received.
+        prompt: US dollars per 1000 tokens sent.
+        completion: US dollars per 1000 tokens received.
     """
 
     prompt: float
@@ -31,7 +31,7 @@ class Price:
 
 
 def estimate_tokens(text: str) -> int:
-    """About how many tokens a text has."""
+    """Estimate the number of tokens of a text, rounded up."""
     return -(-len(text) // _CHARACTERS_PER_TOKEN)
 
 
@@ -41,11 +41,12 @@ def usage_of(
     """Usage of one answered request.
 
     Args:
-        response_usage: as the provider sent it, by OpenAI's field names; None or zeros: it sent nothing.
-        request: what was asked.
-        text: what was answered, calls of tools included.
-        price: the user's own price, which goes before anything reported.
-        reported_cost: US dollars as the client library works them out; None where the price is unknown.
+        response_usage: as the provider sent it, with OpenAI's field names; None or zeros: no counts, and
+            tokens are estimated.
+        request: what was sent.
+        text: what was received, including tool calls.
+        price: price stated by the user; overrides any reported cost.
+        reported_cost: US dollars as computed by the client library; None if the price is unknown.
     """
     prompt = int(getattr(response_usage, "prompt_tokens", None) or 0)
     completion = int(getattr(response_usage, "completion_tokens", None) or 0)

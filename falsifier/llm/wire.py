@@ -1,4 +1,4 @@
-"""Messages and tools as the client library takes them, and what comes back of calls."""
+"""Messages and tools in the client library's form, and the tool calls that it returns."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,7 +7,7 @@ from falsifier.llm.messages import Message, Tool, ToolCall
 
 
 def sent_message(message: Message) -> dict[str, Any]:
-    """Message by OpenAI's field names; an assistant's message that only calls has no content."""
+    """Message with OpenAI's field names; an assistant's message that only makes calls has no content."""
     sent: dict[str, Any] = {"role": message.role, "content": message.content}
     if message.tool_call_id:
         sent["tool_call_id"] = message.tool_call_id
@@ -20,16 +20,16 @@ def sent_message(message: Message) -> dict[str, Any]:
 
 
 def sent_tool(tool: Tool) -> dict[str, Any]:
-    """Tool by OpenAI's field names."""
+    """Tool with OpenAI's field names."""
     return {"type": "function", "function": tool.model_dump()}
 
 
 def calls_in(message: Any, echo: Sequence[str]) -> tuple[ToolCall, ...]:
-    """Calls of an answer, in order.
+    """Calls in a reply, in order.
 
     Args:
-        message: as the client library gives it.
-        echo: fields of a call that the provider wants back.
+        message: as the client library returns it.
+        echo: fields of a call that must be sent back to the provider.
     """
     return tuple(
         ToolCall(
@@ -43,13 +43,13 @@ def calls_in(message: Any, echo: Sequence[str]) -> tuple[ToolCall, ...]:
 
 
 def echo_of(source: Any, names: Sequence[str]) -> dict[str, Any]:
-    """Those fields of an answer, or of a call in it, that the provider wants back."""
+    """The non-empty fields of a reply, or of a call in it, that must be sent back to the provider."""
     found = {name: getattr(source, name, None) for name in names}
     return {name: value for name, value in found.items() if value}
 
 
 def storable(text: str) -> str:
-    """Text without the halves of surrogate pairs, which no file can hold."""
+    """Text without unpaired surrogates, which UTF-8 cannot encode: the journal could not store them."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 

@@ -1,1 +1,1 @@
-"""What is simulated, what must hold and what may be varied: from spec files, or an FMU and a formula."""
+"""Problems: what is simulated, required and varied, from a spec file or from an FMU and a formula."""

@@ -1,22 +1,22 @@
-"""What holds when nobody says otherwise."""
+"""Defaults for what neither the user nor the FMU specifies."""
 
 from falsifier.core.model import Interface, ModelInfo
 
-# Control points of an input when nobody says how many: both ends, the middle and two between.
+# Number of control points of an input: both ends, the middle and two in between.
 DEFAULT_POINTS = 5
-# Samples of the output grid when neither the user nor the FMU gives a step.
+# Number of output intervals if neither the user nor the FMU specifies a step.
 _DEFAULT_INTERVALS = 1000
 
 
 def default_interface(info: ModelInfo) -> Interface | None:
-    """Interface to use when nobody says which: co-simulation where the FMU offers it."""
+    """Return the default interface: co-simulation if the FMU offers it, with its exporting tool's solver."""
     if "co-simulation" in info.interfaces:
         return "co-simulation"
     return info.interfaces[0] if info.interfaces else None
 
 
 def default_interval(info: ModelInfo, stop_time: float) -> float:
-    """Output interval in s: the FMU's step where it divides the stop time, else a thousandth of it."""
+    """Return the output interval in s: the FMU's step if it divides the stop time, else 1/1000 of that."""
     step = info.step_size
     if step and stop_time / step >= 1 and abs(stop_time / step - round(stop_time / step)) < 1e-6:
         return step

@@ -1,4 +1,4 @@
-"""A validated spec and its FMU joined: everything that a problem consists of."""
+"""Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,15 +13,15 @@ from falsifier.problem.ranges import fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
-# Share of the output interval by which the stop time may miss a whole multiple of it: 15 / (1/30) is exact
-# only up to rounding.
+# Tolerance, as a share of the output interval, for the stop time to be a multiple of it: with an interval of
+# 1/30 s, rounding prevents an exact multiple.
 _GRID_ROUNDING = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0
 
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """What a problem consists of; the attributes are those of Problem."""
+    """Parts of a problem; the attributes are those of Problem."""
 
     model: Model
     requirement: Requirement
@@ -44,14 +44,14 @@ def join(
     Args:
         spec: the spec.
         requirement: name of the requirement.
-        path: of the spec file, for relative names and for errors.
+        path: path of the spec file, for relative paths and error messages.
         profile: name of a profile of the spec.
-        stl: a formula to judge instead of the spec's.
-        changes: override everything that the spec says of the experiment, inputs and parameters.
+        stl: a formula to use instead of the spec's.
+        changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
 
     Raises:
-        SpecError: naming file, key and cure.
-        ModelError: when the FMU cannot be read or simulated.
+        SpecError: naming the file, the key and the remedy.
+        ModelError: if the FMU cannot be read or simulated.
     """
     file = str(path)
     if requirement not in spec.requirements:
@@ -63,7 +63,7 @@ def join(
     fmu = path.parent / spec.model.fmu
     if not fmu.is_file():
         raise SpecError(
-            f"there is no FMU {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
+            f"no such FMU: {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
         )
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
     model = FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), file))
@@ -88,18 +88,18 @@ def join(
 def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
     """Join an FMU and a formula, without a spec.
 
-    Without any searched input or parameter all real inputs that have a min and a max are searched.
+    If no input or parameter is to be searched, all real inputs with a min and a max are searched.
 
     Raises:
-        SpecError: naming what cannot be known and the option that says it.
-        ModelError: when the FMU cannot be read.
+        SpecError: naming what is unknown and the option that specifies it.
+        ModelError: if the FMU cannot be read.
     """
     if not fmu.is_file():
-        raise SpecError(f"there is no file {fmu}")
+        raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
     info = read_info(fmu)
     stop_time = changes.stop_time or info.stop_time
     if stop_time is None:
-        raise SpecError(f"{fmu}: the FMU has no default stop time: give --stop-time SECONDS")
+        raise SpecError(f"{fmu}: the FMU has no default stop time; add --stop-time SECONDS")
     searched = any(s.value is None for s in changes.inputs.values()) or any(
         s.range is not None for s in changes.parameters.values()
     )
@@ -119,7 +119,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
     if not searched and not spec.inputs:
         known = [v.name for v in info.inputs]
         raise SpecError(
-            f"{fmu}: nothing to search: give --input NAME=LOW:HIGH:POINTS; {did_you_mean('', known)}"
+            f"{fmu}: nothing to search; add --input NAME=LOW:HIGH:POINTS. {did_you_mean('', known)}"
         )
     return join(spec, "stl", path=fmu, changes=changes)
 
@@ -128,14 +128,15 @@ def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file
     stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
     if not info.interfaces:
         raise ModelError(
-            f"{info.name}: it offers neither co-simulation nor model exchange, and scheduled execution is "
-            "not supported; export it for co-simulation"
+            f"{info.name}: the FMU offers neither co-simulation nor model exchange, and scheduled execution "
+            "is not supported; export it for co-simulation"
         )
     if stated is None and len(info.interfaces) == 1:
         return info.interfaces[0]
     offered = " and ".join(info.interfaces)
     if stated is None or stated not in info.interfaces:
-        raise SpecError(f"the FMU offers {offered}: say which", file=file, key="model.interface")
+        advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
+        raise SpecError(f"the FMU offers {offered}{advice}", file=file, key="model.interface")
     return stated
 
 
@@ -149,14 +150,15 @@ def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, fil
 
     stop_time = stated("stop_time") or info.stop_time
     if stop_time is None:
-        raise SpecError("the FMU has no default stop time: add this key", file=file, key="model.stop_time")
+        raise SpecError("the FMU has no default stop time; add this key", file=file, key="model.stop_time")
     output_interval = stated("output_interval") or info.step_size
     if output_interval is None:
-        raise SpecError("the FMU has no default step: add this key", file=file, key="model.output_interval")
+        raise SpecError("the FMU has no default step; add this key", file=file, key="model.output_interval")
     intervals = stop_time / output_interval
     if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
         raise SpecError(
-            f"{output_interval:g} s does not divide the stop time {stop_time:g} s into whole intervals",
+            f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "
+            f"try {stop_time / max(round(intervals), 1):.6g}",
             file=file,
             key="model.output_interval",
         )
@@ -171,7 +173,7 @@ def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, fil
 
 
 def _recording(experiment: Experiment, info: ModelInfo, extra: Iterable[str], file: str) -> Experiment:
-    """Return the experiment that records all outputs and those extra variables that are no inputs."""
+    """Return the experiment that records all outputs and those extra variables that are not inputs."""
     inputs = {v.name for v in info.inputs}
     outputs = [v.name for v in info.outputs if v.kind != "string"]
     for name in extra:
@@ -229,7 +231,7 @@ def _space(
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
     if not searched and not ranges:
         raise SpecError(
-            "nothing to search: add [inputs.NAME] with range and control_points, "
+            "nothing to search; add [inputs.NAME] with range and control_points, "
             "or [parameters.NAME] with range",
             file=file,
             key="inputs",

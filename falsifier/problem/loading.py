@@ -1,6 +1,6 @@
-"""From names and files to problems.
+"""Loading problems by name or file.
 
-``load_problem("AT1")`` loads a bundled one, ``load_problem("my.toml:REQ")`` one of a spec file::
+``load_problem("AT1")`` loads a bundled problem, ``load_problem("my.toml:REQ")`` one from a spec file::
 
     problem = load_problem("specs/AT.toml:AT1", profile="instance2")
 """
@@ -21,13 +21,13 @@ from falsifier.problem.spec import read_spec
 
 
 def find_spec(target: str) -> tuple[Path, str | None]:
-    """Spec file and requirement name that a target means.
+    """Return the spec file and the requirement's name, if any, for a target.
 
     Args:
-        target: ``file.toml``, ``file.toml:REQ``, or something bundled: ``AT``, ``AT:AT1``, ``AT1``.
+        target: ``file.toml``, ``file.toml:REQ``, or a bundled name: ``AT``, ``AT:AT1``, ``AT1``.
 
     Raises:
-        SpecError: when nothing of that name exists, with what there is.
+        SpecError: if there is neither; lists the known names.
     """
     path_part, _, requirement = target.rpartition(":") if ".toml:" in target else (target, "", "")
     if path_part.endswith(".toml"):
@@ -68,20 +68,20 @@ def load_problem(
     """Load one problem.
 
     Args:
-        target: see ProblemSource; the requirement may be left out if the spec has only one, or with stl.
-        stl: a formula to judge instead of the spec's requirement.
+        target: see ProblemSource; the requirement's name is optional if the spec has only one.
+        stl: a formula to use instead of the spec's requirement.
         profile: name of a profile of the spec, e.g. ``instance2``.
-        parameterization: ``free``: engines may place control points within the spec's limits; ``fixed``: only
-            the spec's own.
-        inputs: override the spec's inputs; see InputChoice.
-        parameters: override the spec's parameters; see ParameterChoice.
+        parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
+            only the control points of the spec are allowed.
+        inputs: overrides for the spec's inputs; see InputChoice.
+        parameters: overrides for the spec's parameters; see ParameterChoice.
         stop_time: end of each simulation in s.
-        output_interval: step of the monitored grid in s.
-        interface: how the FMU is simulated.
+        output_interval: step of the monitored time grid in s.
+        interface: interface with which the FMU is simulated.
 
     Raises:
-        SpecError: naming file, key and cure.
-        ModelError: when the FMU cannot be read.
+        SpecError: naming the file, the key and the remedy.
+        ModelError: if the FMU cannot be read.
     """
     changes = changes_from(
         inputs=inputs or {},
@@ -98,15 +98,15 @@ def load_problem(
 
 
 def load_problems(target: str, *, profile: str | None = None) -> list[Problem]:
-    """Load all requirements of a spec as problems, or the one that the target names."""
+    """Load one problem per requirement of a spec, or only the requirement that the target names."""
     return [load_source(source) for source in sources_of(ProblemSource(target=target, profile=profile))]
 
 
 def sources_of(source: ProblemSource) -> list[ProblemSource]:
-    """Sources of all requirements of a spec; the source itself if it names one.
+    """Return one source per requirement of a spec; if the source names one, return only that.
 
     Raises:
-        SpecError: when the target is no spec file and no bundled name.
+        SpecError: if the target is neither a spec file nor a bundled name.
     """
     if source.target.endswith(".fmu") or source.target.startswith("python:"):
         return [source]
@@ -118,7 +118,7 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
 
 
 def spec_file(source: ProblemSource) -> Path | None:
-    """Spec file of a source; None where it has none."""
+    """Return the spec file of a source; None for an FMU or a problem made in Python."""
     if source.target.endswith(".fmu") or source.target.startswith("python:"):
         return None
     return find_spec(source.target)[0]
@@ -128,16 +128,18 @@ def load_source(source: ProblemSource) -> Problem:
     """Load the problem that a source describes.
 
     Raises:
-        SpecError: naming what is wrong and the cure.
-        ModelError: when the FMU cannot be used.
+        SpecError: naming what is wrong and the remedy.
+        ModelError: if the FMU cannot be used.
     """
     if source.target.startswith("python:"):
         if source.model_copy(update={"parameterization": "free"}) != ProblemSource(target=source.target):
-            raise SpecError(f"{source.target}: a problem made in Python cannot be changed from outside")
+            raise SpecError(
+                f"{source.target}: a problem made in Python takes no options; change it where it is made"
+            )
         problem = replace(_python_problem(source.target), source=source)
     elif source.target.endswith(".fmu"):
         if source.stl is None:
-            raise SpecError(f"{source.target}: give the requirement with --stl 'G[0,10] (SIGNAL <= 1)'")
+            raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
         problem = _made(join_fmu(Path(source.target), source.stl, changes=source.changes), source)
     else:
         problem = _of_spec(source)
@@ -147,12 +149,12 @@ def load_source(source: ProblemSource) -> Problem:
 
 
 def load_sources(sources: Sequence[ProblemSource]) -> list[Problem]:
-    """Load several problems; those that are simulated alike record the same signals."""
+    """Load several problems; those that differ only in their requirement record the same signals."""
     return [problem for group in alike(map(load_source, sources)) for problem in group]
 
 
 def reloadable(problem: Problem) -> ProblemSource | None:
-    """Source of a problem; None where it was made in Python, or changed after it was loaded."""
+    """Return the source of a problem; None if it was made in Python or changed after it was loaded."""
     if problem.source is None or load_source(problem.source).fingerprint != problem.fingerprint:
         return None
     return problem.source
@@ -162,12 +164,12 @@ def _of_spec(source: ProblemSource) -> Problem:
     path, requirement = find_spec(source.target)
     spec = read_spec(path)
     if requirement is None and path.stem in spec.requirements:
-        requirement = path.stem  # NN is a spec and one of its requirements
+        requirement = path.stem  # such as NN, which is the name of a spec and of one of its requirements
     if requirement is None:
         if len(spec.requirements) > 1:
             raise SpecError(
-                f"has {len(spec.requirements)} requirements, name one of them like "
-                f"{path}:{next(iter(spec.requirements))}; known: {', '.join(spec.requirements)}",
+                f"has {len(spec.requirements)} requirements; name one of them, for example "
+                f"{path}:{next(iter(spec.requirements))}. Known: {', '.join(spec.requirements)}",
                 file=str(path),
             )
         requirement = next(iter(spec.requirements))
@@ -188,7 +190,7 @@ def _python_problem(target: str) -> Problem:
     try:
         found = getattr(import_module(module), name)
     except (ImportError, ValueError, AttributeError) as error:
-        raise SpecError(f"{target}: expected python:MODULE:NAME of something importable: {error}") from None
+        raise SpecError(f"{target}: expected python:MODULE:NAME that can be imported: {error}") from None
     problem = found() if callable(found) else found
     if not isinstance(problem, Problem):
         raise SpecError(f"{target}: expected a Problem or a function that returns one")

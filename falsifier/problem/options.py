@@ -1,4 +1,4 @@
-"""What a user varies, said in Python values or in options of the command line, as sections of a spec."""
+"""Conversion of Python values and command-line options to the sections of a spec."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -12,7 +12,7 @@ from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection
 
 # A constant value; (low, high), (low, high, points) or (low, high, points, interpolation) to search; None to
-# search between the FMU's min and max; or all keys of a spec's section.
+# search between the FMU's min and max; or a complete section of a spec.
 InputChoice = (
     float
     | tuple[float, float]
@@ -21,7 +21,7 @@ InputChoice = (
     | InputSection
     | None
 )
-# A value, a range to search, or all keys of a spec's section.
+# A value, a range to search, or a complete section of a spec.
 ParameterChoice = float | tuple[float, float] | ParameterSection
 
 
@@ -31,10 +31,15 @@ def changes_from(
     parameters: Mapping[str, ParameterChoice],
     **experiment: float | Interface | None,
 ) -> ModelChanges:
-    """Changes that Python values ask for; experiment: fields of ModelChanges, None where not stated.
+    """Return the changes for Python values.
+
+    Args:
+        inputs: choices by input name.
+        parameters: choices by parameter name.
+        experiment: fields of ModelChanges; None leaves a field unchanged.
 
     Raises:
-        SpecError: naming the input, parameter or field that cannot be understood.
+        SpecError: naming the input, parameter or field that is invalid.
     """
     sections = {name: _input_section(name, choice) for name, choice in inputs.items()}
     return _changes(
@@ -48,23 +53,23 @@ def changes_from_options(
     parameters: Iterable[str] = (),
     **experiment: float | Interface | None,
 ) -> ModelChanges:
-    """Changes that command-line options ask for.
+    """Return the changes for command-line options.
 
     Args:
-        inputs: ``name=low:high``, ``name=low:high:points``, ``name=low:high:points:interpolation``
-            (searched), ``name`` (searched as the spec says, or between the FMU's min and max) or
+        inputs: ``name=low:high``, ``name=low:high:points`` or ``name=low:high:points:interpolation``
+            (searched), ``name`` (searched as in the spec, or between the FMU's min and max) or
             ``name=value`` (kept constant).
         parameters: ``name=value`` (fixed) or ``name=low:high`` (searched).
-        experiment: fields of ModelChanges, None where not stated.
+        experiment: fields of ModelChanges; None leaves a field unchanged.
 
     Raises:
-        SpecError: naming the option that cannot be read.
+        SpecError: naming the option that is invalid.
     """
     return _changes(dict(map(_input, inputs)), dict(map(_parameter, parameters)), experiment)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
-    """Options of the command line that ask for these changes.
+    """Return the command-line options for these changes, the inverse of ``changes_from_options``.
 
     >>> options_from(changes_from_options(inputs=["u=0:1:3"], stop_time=5.0))
     [('--input', 'u=0:1:3'), ('--stop-time', '5.0')]
@@ -129,11 +134,15 @@ def _input(option: str) -> tuple[str, dict[str, object]]:
     section["control_points"] = DEFAULT_POINTS
     if len(parts) > 2:
         if not parts[2].isdigit():
-            raise SpecError(f"--input {option}: {parts[2]!r} is not a number of control points")
+            raise SpecError(
+                f"--input {option}: {parts[2]!r} is not a number of control points; expected 1 or more"
+            )
         section["control_points"] = int(parts[2])
     if len(parts) > 3:
         if parts[3] not in INTERPOLATIONS:
-            raise SpecError(f"--input {option}: {did_you_mean(parts[3], INTERPOLATIONS)}")
+            raise SpecError(
+                f"--input {option}: unknown interpolation; {did_you_mean(parts[3], INTERPOLATIONS)}"
+            )
         section["interpolation"] = parts[3]
     if len(parts) > 4:
         raise SpecError(f"--input {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")

@@ -1,4 +1,4 @@
-"""The unit of work: a model, a requirement, and what may be varied."""
+"""Problems: a model, a requirement, and what may be varied."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,15 +15,15 @@ from falsifier.problem.source import ProblemSource
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Everything that evaluate and an engine need to know; immutable and picklable.
+    """Everything that ``evaluate`` and an engine need to know; immutable and picklable.
 
     Attributes:
-        model: what simulates.
-        requirement: what must hold.
+        model: the model to simulate.
+        requirement: the requirement to violate.
         space: what may be varied.
         experiment: how each simulation is run.
-        parameters: fixed values of parameters, start values and constant inputs by name.
-        source: how it was loaded; None when it was made in Python, by hand or by changing a loaded one.
+        parameters: fixed values of parameters, start values and constant inputs, by name.
+        source: how it was loaded; None if it was made in Python, or changed after it was loaded.
     """
 
     model: Model
@@ -47,23 +47,24 @@ class Problem:
         tolerance: float | None = None,
         interface: Interface | None = None,
     ) -> Self:
-        """Make the problem of an FMU and a formula.
+        """Return the problem for an FMU and a formula.
 
         Args:
             fmu: path of the FMU.
             formula: the requirement, in Signal Temporal Logic.
-            inputs: by name, what to search or to keep constant; see InputChoice. Nothing searched: all real
-                inputs that have a min and a max.
-            parameters: by name, values of parameters and start values, or ranges to search.
+            inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
+                all real inputs with a min and a max are.
+            parameters: values of parameters and start values, or ranges to search, by name.
             stop_time: end of each simulation in s; default: the FMU's.
-            output_interval: step of the monitored grid in s; default: the FMU's, or a thousandth.
-            step_size: communication step or largest solver step in s; default: the output interval.
+            output_interval: step of the monitored time grid in s; default: the FMU's step if it divides the
+                stop time, else a thousandth of the stop time.
+            step_size: communication step or maximum solver step in s; default: the output interval.
             tolerance: relative tolerance of the solver; default: the FMU's.
-            interface: how the FMU is simulated; default: co-simulation where it offers that.
+            interface: interface of the FMU; default: co-simulation if the FMU offers it.
 
         Raises:
-            SpecError: naming what is wrong or cannot be known.
-            ModelError: when the FMU cannot be read or simulated.
+            SpecError: naming what is wrong or unknown.
+            ModelError: if the FMU cannot be read or simulated.
 
         >>> Problem.from_fmu("my.fmu", "G[0,10] (h >= 0)", inputs={"u": (-1, 1)})  # doctest: +SKIP
         """
@@ -86,7 +87,7 @@ class Problem:
 
     @property
     def info(self) -> ModelInfo:
-        """What is known of the model."""
+        """What is known about the model without simulating it."""
         return self.model.info
 
     @property
@@ -96,8 +97,8 @@ class Problem:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of everything but the model's code: requirement, what is searched, how it is simulated."""
-        said = (
+        """SHA-256 of requirement, search space and experiment; the model's code is not included."""
+        content = (
             self.info.name,
             getattr(self.model, "interface", ""),
             self.name,
@@ -106,11 +107,11 @@ class Problem:
             self.experiment,
             sorted(self.parameters.items()),
         )
-        return sha256(repr(said).encode()).hexdigest()
+        return sha256(repr(content).encode()).hexdigest()
 
 
 def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
-    """Group problems that differ in nothing but their requirement; all of a group record the same signals."""
+    """Group problems that differ only in their requirement; within a group all record the same signals."""
     groups: dict[str, list[Problem]] = {}
     for problem in problems:
         bare = replace(problem.experiment, outputs=())

@@ -1,4 +1,4 @@
-"""From the ranges and values of a spec to what is searched, checked against the FMU's variables."""
+"""Ranges and values of a spec, checked against the FMU's variables and completed from them."""
 
 from math import ceil, floor
 
@@ -9,26 +9,26 @@ from falsifier.problem.spec import InputSection
 
 
 def input_range(variable: Variable, section: InputSection, *, file: str | None, key: str) -> InputRange:
-    """Searched input of a section, completed from the FMU's min, max, unit and description.
+    """Return the searched input for a section, completed from the FMU's min, max, unit and description.
 
     Raises:
-        SpecError: when range or control points cannot be known, or the range leaves the FMU's min/max.
+        SpecError: if range or control points are unknown, or the range exceeds the FMU's min and max.
     """
     limits = section.range
     if limits is None:
-        least, most = variable.limits
-        if least is None or most is None:
+        smallest, largest = variable.limits
+        if smallest is None or largest is None:
             raise SpecError(
-                "the FMU gives no min and max for this input: add range = [low, high], or say "
+                "the FMU specifies no min and max for this input; add range = [low, high] or "
                 f"--input {variable.name}=LOW:HIGH[:POINTS]",
                 file=file,
                 key=f"{key}.range",
             )
-        limits = (least, most)
+        limits = (smallest, largest)
     low, high = _within(variable, limits, file, f"{key}.range")
     if section.control_points is None:
         raise SpecError(
-            "this key is missing: say how many evenly spaced control points the signal has",
+            "this key is missing; specify the number of evenly spaced control points",
             file=file,
             key=f"{key}.control_points",
         )
@@ -36,7 +36,7 @@ def input_range(variable: Variable, section: InputSection, *, file: str | None, 
     interpolation = section.interpolation or ("constant" if discrete else "pchip")
     if discrete and interpolation != "constant":
         raise SpecError(
-            f'values of kind {variable.kind} cannot be interpolated: use "constant"',
+            f'values of type {variable.kind} cannot be interpolated; use "constant"',
             file=file,
             key=f"{key}.interpolation",
         )
@@ -59,10 +59,10 @@ def input_range(variable: Variable, section: InputSection, *, file: str | None, 
 def parameter_range(
     variable: Variable, limits: tuple[float, float], *, file: str | None, key: str
 ) -> ParameterRange:
-    """Searched parameter, completed from what the FMU says of it.
+    """Return the searched parameter, completed from the FMU's start value, unit and description.
 
     Raises:
-        SpecError: when the range leaves what the FMU allows, or the type can hold.
+        SpecError: if the range exceeds the FMU's min and max, or the range of the variable's type.
     """
     low, high = _within(variable, limits, file, key)
     return ParameterRange(
@@ -78,14 +78,14 @@ def parameter_range(
 
 
 def fixed_value(variable: Variable, value: float, *, file: str | None, key: str) -> float:
-    """Return a value that is given once and for all.
+    """Return a fixed value after checking it.
 
     Raises:
-        SpecError: when the variable's type cannot hold it.
+        SpecError: if the variable's type does not allow it.
     """
     _check_type(variable, f"{value:g}", (value, value), file, key)
-    if variable.kind != "real" and not _holds_a_number(variable, value, value):
-        expected = "one of " + _items(variable) if variable.literals else "a whole number"
+    if variable.kind != "real" and not _contains_a_number(variable, value, value):
+        expected = "one of " + _items(variable) if variable.literals else "an integer"
         raise SpecError(f"{value:g}: expected {expected} for {variable.name!r}", file=file, key=key)
     return value
 
@@ -99,25 +99,25 @@ def _within(
         variable.high is not None and high > variable.high
     ):
         raise SpecError(
-            f"[{low:g}, {high:g}] leaves the FMU's own limits for {variable.name!r}, "
+            f"[{low:g}, {high:g}] exceeds the FMU's limits for {variable.name!r}, "
             f"[{_limit(variable.low)}, {_limit(variable.high)}]",
             file=file,
             key=key,
         )
-    if variable.kind != "real" and not _holds_a_number(variable, low, high):
-        what = "item of the enumeration" if variable.literals else "whole number"
-        raise SpecError(f"[{low:g}, {high:g}] holds no {what}: widen it", file=file, key=key)
+    if variable.kind != "real" and not _contains_a_number(variable, low, high):
+        what = "item of the enumeration" if variable.literals else "integer"
+        raise SpecError(f"[{low:g}, {high:g}] contains no {what}; widen the range", file=file, key=key)
     return low, high
 
 
 def _check_type(
     variable: Variable, shown: str, limits: tuple[float, float], file: str | None, key: str
 ) -> None:
-    """Refuse numbers that the variable's type cannot hold, or that none of its items reaches."""
+    """Reject limits outside the range of the variable's type or of its enumeration's items."""
     known = variable.type_limits
     if known is not None and not known[0] <= limits[0] <= limits[1] <= known[1]:
         raise SpecError(
-            f"{shown} leaves the limits of the type {variable.type} of {variable.name!r}, "
+            f"{shown} exceeds the range of {variable.name!r}, which has the type {variable.type}, "
             f"[{known[0]}, {known[1]}]",
             file=file,
             key=key,
@@ -125,13 +125,13 @@ def _check_type(
     numbers = variable.literals.values()
     if numbers and not min(numbers) <= limits[0] <= limits[1] <= max(numbers):
         raise SpecError(
-            f"{shown} leaves the items of the enumeration {variable.name!r}: {_items(variable)}",
+            f"{shown} exceeds the items of the enumeration {variable.name!r}: {_items(variable)}",
             file=file,
             key=key,
         )
 
 
-def _holds_a_number(variable: Variable, low: float, high: float) -> bool:
+def _contains_a_number(variable: Variable, low: float, high: float) -> bool:
     if variable.literals:
         return any(low <= number <= high for number in variable.literals.values())
     return floor(high) >= ceil(low)

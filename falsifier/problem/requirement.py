@@ -1,4 +1,4 @@
-"""Requirements: a named formula that must hold."""
+"""Requirements: named formulas, checked against a model and an experiment."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ class Requirement:
     """A named STL formula over the model's signals.
 
     Attributes:
-        name: as the spec names it, e.g. ``AT1``.
+        name: its name in the spec, e.g. ``AT1``.
         formula: the parsed formula; ``str(formula)`` is its text.
-        description: what it means, in words.
+        description: its meaning in words.
     """
 
     name: str
@@ -28,8 +28,8 @@ def parse_requirement(
     """Parse a formula and check its signals and windows against a model and an experiment.
 
     Raises:
-        SpecError: naming file and key, with the parser's position, the unknown signal or the window that
-            reaches past the stop time.
+        SpecError: naming the file and key, and the position of a syntax error, the unknown signal, or the
+            window that extends past the stop time.
     """
     try:
         formula = parse(text)

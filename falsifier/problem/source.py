@@ -1,4 +1,4 @@
-"""Where a problem comes from, as one value: enough to load it again."""
+"""Sources of problems: what is needed to load a problem again, in another process or from a journal."""
 
 from typing import Any, Literal
 
@@ -15,10 +15,11 @@ class ProblemSource(BaseModel):
     Attributes:
         target: ``file.toml:REQ``, ``file.fmu``, a bundled name such as ``AT1``, or ``python:MODULE:NAME``: a
             Problem made in Python, or a function that returns one.
-        stl: formula to judge instead of the spec's requirement.
-        profile: another parameterization that the spec offers.
-        parameterization: ``fixed``: only the spec's own control points.
-        changes: override what spec or FMU say of the experiment, inputs and parameters.
+        stl: formula to use instead of the spec's requirement.
+        profile: name of a profile of the spec.
+        parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
+            only the control points of the spec are allowed.
+        changes: overrides for experiment, inputs and parameters.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -31,7 +32,7 @@ class ProblemSource(BaseModel):
 
     @field_serializer("changes")
     def _stated_only(self, changes: ModelChanges) -> dict[str, Any]:
-        """What is not stated stays so when a source is read again: a None would override the spec."""
+        """Leave unset fields unset when a source is read again: an explicit None would override the spec."""
         return changes.model_dump(mode="json", exclude_unset=True)
 
     def __hash__(self) -> int:
@@ -39,7 +40,7 @@ class ProblemSource(BaseModel):
 
     @property
     def name(self) -> str:
-        """The target's last part: the requirement's name where the target has one.
+        """The last part of the target: the requirement's name, if the target contains one.
 
         >>> ProblemSource(target="specs/AT.toml:AT1").name, ProblemSource(target="AT1").name
         ('AT1', 'AT1')

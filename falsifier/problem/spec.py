@@ -1,10 +1,10 @@
 """Spec files: the TOML schema, its defaults and its errors.
 
-A spec names a model, what may be varied, and requirements. Profiles are other parameterizations of the same
-problem. What a requirement or a profile says of an input, a parameter or the model goes before what the file
-says in general::
+A spec contains a model, what may be varied, and requirements. Profiles are alternative parameterizations. For
+inputs, parameters and the experiment, a requirement or a profile overrides the file's defaults; the last of
+these sections that sets a key wins::
 
-    base <- requirement <- profile <- the profile's own words on that requirement
+    file < requirement < profile < the profile's section on that requirement
 """
 
 import tomllib
@@ -30,8 +30,8 @@ class _Strict(BaseModel):
 class FreeSection(_Strict):
     """Limits of a free parameterization."""
 
-    max_control_points: int = Field(ge=1, description="Most control points an engine may use.")
-    min_interval: Seconds = Field(description="Shortest time between two control points, in s.")
+    max_control_points: int = Field(ge=1, description="Maximum number of control points.")
+    min_interval: Seconds = Field(description="Minimum time between two control points in s.")
 
 
 def _check_order(limits: tuple[float, float]) -> tuple[float, float]:
@@ -41,7 +41,7 @@ def _check_order(limits: tuple[float, float]) -> tuple[float, float]:
 
 
 class InputSection(_Strict):
-    """One input signal: searched within a range, or kept at a value."""
+    """One input signal: searched within a range, or kept constant."""
 
     range: tuple[Number, Number] | None = Field(
         None, description="[low, high]; default: the FMU's min and max."
@@ -52,7 +52,9 @@ class InputSection(_Strict):
         description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
     )
     hold: Seconds | None = Field(None, description="Sample-and-hold period in s.")
-    free: FreeSection | None = Field(None, description="Engines may choose the control points within limits.")
+    free: FreeSection | None = Field(
+        None, description="Limits within which engines may choose the control points."
+    )
     value: Number | None = Field(None, description="Keep this input at a constant value.")
 
     @model_validator(mode="after")
@@ -60,7 +62,7 @@ class InputSection(_Strict):
         if self.range is not None:
             _check_order(self.range)
         if self.value is not None and (self.range is not None or self.control_points is not None):
-            raise ValueError("value keeps the input constant: remove it, or remove range and control_points")
+            raise ValueError("value keeps the input constant; remove it, or remove range and control_points")
         return self
 
 
@@ -91,17 +93,19 @@ class ModelSection(_Strict):
     """What is simulated and how."""
 
     fmu: str = Field(description="Path of the FMU, relative to the spec file.")
-    interface: Interface | None = Field(None, description="Needed where the FMU offers both.")
+    interface: Interface | None = Field(None, description="Required if the FMU offers both.")
     stop_time: Seconds | None = Field(None, description="End of each simulation in s.")
     output_interval: Seconds | None = Field(None, description="Step of the monitored time grid in s.")
-    step_size: Seconds | None = Field(None, description="Communication or largest solver step in s.")
+    step_size: Seconds | None = Field(None, description="Communication or maximum solver step in s.")
     tolerance: Seconds | None = Field(None, description="Relative tolerance of the solver.")
-    time_limit: Seconds | None = Field(None, description="Wall-clock seconds for one simulation.")
-    record: tuple[str, ...] = Field((), description="Internal variables to record beside the outputs.")
+    time_limit: Seconds | None = Field(
+        None, description="Maximum wall-clock time of one simulation in s; default: 60."
+    )
+    record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
 
 
 class ModelChanges(_Strict):
-    """What a requirement or a profile may change of the experiment."""
+    """What a requirement or a profile may override."""
 
     interface: Interface | None = None
     stop_time: Seconds | None = None
@@ -113,14 +117,14 @@ class ModelChanges(_Strict):
 
 
 class RequirementSection(ModelChanges):
-    """One requirement, and what it narrows or changes for itself."""
+    """One requirement, and what it overrides."""
 
-    formula: str = Field(description="Signal Temporal Logic.")
-    description: str = Field("", description="What it means, in words.")
+    formula: str = Field(description="Formula in Signal Temporal Logic.")
+    description: str = Field("", description="Its meaning in words.")
 
 
 class ProfileSection(ModelChanges):
-    """Another parameterization of the same problems."""
+    """An alternative parameterization of the spec's problems."""
 
     description: str = ""
     requirements: dict[str, ModelChanges] = Field(default_factory=dict)
@@ -136,7 +140,7 @@ class Spec(_Strict):
     profiles: dict[str, ProfileSection] = Field(default_factory=dict)
 
     def changes(self, requirement: str, profile: str | None) -> list[ModelChanges]:
-        """Sections that speak of this requirement under this profile, the strongest last."""
+        """Return the sections that apply to this requirement with this profile; later ones override."""
         layers: list[ModelChanges] = [self.requirements[requirement]]
         if profile is not None:
             layers.append(self.profiles[profile])
@@ -149,12 +153,12 @@ def read_spec(path: Path) -> Spec:
     """Read and validate a spec file.
 
     Raises:
-        SpecError: naming the file, the key, and what was expected.
+        SpecError: naming the file, the key and what was expected.
     """
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise SpecError("no such spec file", file=str(path)) from None
+        raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one", file=str(path)) from None
     except (OSError, UnicodeDecodeError) as error:
         raise SpecError(f"cannot be read: {error}", file=str(path)) from None
     try:
@@ -165,7 +169,15 @@ def read_spec(path: Path) -> Spec:
 
 
 def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
-    """Validate the content of a spec file; file names it in errors."""
+    """Validate the content of a spec file.
+
+    Args:
+        data: parsed TOML.
+        file: name of the file in error messages.
+
+    Raises:
+        SpecError: naming the file, the key and what was expected.
+    """
     try:
         return Spec.model_validate(data)
     except ValidationError as error:
@@ -173,15 +185,16 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
 
 
 def overlay(base: Section | None, changes: Section) -> Section:
-    """Return base with those keys replaced that changes states."""
+    """Return ``base`` with the keys replaced that ``changes`` sets."""
     if base is None:
         return changes
     stated = {name: getattr(changes, name) for name in changes.model_fields_set}
     if isinstance(base, InputSection):
-        if "value" in stated:  # a fixed value and a searched range replace each other
+        if "value" in stated:  # a fixed value replaces a searched range and vice versa
             return changes
         stated.setdefault("value", None)
-        if {"control_points", "interpolation"} & stated.keys():  # a parameterization of its own is fixed
+        # Control points or interpolation that are overridden are meant to be used: no free parameterization.
+        if {"control_points", "interpolation"} & stated.keys():
             stated.setdefault("free", None)
     if isinstance(base, ParameterSection):
         return changes
@@ -205,7 +218,7 @@ def _spec_error(error: ValidationError, file: str) -> SpecError:
 
 
 def _fields(location: list[str]) -> dict[str, Any]:
-    """Fields of the section at this place of a spec."""
+    """Return the fields of the section at this location in a spec, for hints in error messages."""
     fields = dict(Spec.model_fields)
     sections: dict[str, type[BaseModel]] = {
         "model": ModelSection,

@@ -1,4 +1,4 @@
-"""The starter spec of an FMU: it loads as it is, and says in comments what to fill in."""
+"""Starter specs: valid spec files for an FMU, with comments on what to fill in."""
 
 from collections.abc import Iterable
 from itertools import islice
@@ -10,16 +10,16 @@ from falsifier.errors import SpecError
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
 from falsifier.stl.names import name_text
 
-# Seconds that the starter spec simulates when the FMU gives no stop time.
+# Stop time in s if the FMU specifies none.
 _DEFAULT_STOP_TIME = 10.0
-# Bound of the starter spec's placeholder requirement when the FMU gives no max.
+# Bound of the placeholder requirement if the FMU specifies no max; no real output reaches it.
 _UNREACHED = 1e9
-# Parameters that the starter spec lists.
+# Maximum number of parameters that are listed.
 _SHOWN_PARAMETERS = 10
 
 
 def starter_spec(fmu: Path, info: ModelInfo) -> str:
-    """Text of a spec file for an FMU: it loads as it is, and says in comments what to fill in."""
+    """Return the text of a spec file for an FMU: it is valid as it is; comments say what to fill in."""
     inputs = [v for v in info.inputs if v.kind != "string"]
     tunable = sorted(
         (v for v in info.parameters if v.settable and v.kind != "string"), key=lambda v: v.kind != "real"
@@ -35,7 +35,7 @@ def starter_spec(fmu: Path, info: ModelInfo) -> str:
 
 def _model_section(fmu: Path, info: ModelInfo) -> str:
     stop_time = info.stop_time or _DEFAULT_STOP_TIME
-    doubt = "" if info.stop_time else "  # the FMU gives none: check this"
+    doubt = "" if info.stop_time else "  # the FMU specifies none: check this"
     about = f"# {info.name}: {info.description}\n\n" if info.description else f"# {info.name}\n\n"
     return (
         f'{about}[model]\nfmu = "{fmu.as_posix()}"\ninterface = "{default_interface(info)}"\n'
@@ -52,7 +52,7 @@ def _input_section(v: Variable) -> str:
     if low == high:
         return f"{comment}[inputs.{_toml_key(v.name)}]\nvalue = {low!r}"
     unknown = least is None or most is None
-    doubt = "  # the FMU gives no min and max: put the real range here" if unknown else ""
+    doubt = "  # the FMU specifies no min and max: replace with the real range" if unknown else ""
     interpolation = "pchip" if v.kind == "real" else "constant"
     return (
         f"{comment}[inputs.{_toml_key(v.name)}]\nrange = {_range(v, low, high)}{doubt}\n"
@@ -66,11 +66,11 @@ def _searched_parameter(v: Variable) -> str:
     least, most = v.limits
     low = start - reach if least is None else least
     high = start + reach if most is None else most
-    return f"[parameters.{_toml_key(v.name)}]  # put the real range here\nrange = {_range(v, low, high)}"
+    return f"[parameters.{_toml_key(v.name)}]  # replace with the real range\nrange = {_range(v, low, high)}"
 
 
 def _range(v: Variable, low: float, high: float) -> str:
-    """A range in TOML; of whole numbers where the variable has no others."""
+    """Return a range in TOML; with integer bounds if the variable has only integer values."""
     if v.kind == "real":
         return f"[{float(low)!r}, {float(high)!r}]"
     return f"[{floor(low)}, {ceil(high)}]"
@@ -86,7 +86,7 @@ def _parameter_hints(parameters: Iterable[Variable]) -> str:
         low, high = v.limits
         limits = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
         hints.append(
-            f"# parameters.{_toml_key(v.name)}.range = {limits}  # starts at {v.start} {v.unit}".rstrip()
+            f"# parameters.{_toml_key(v.name)}.range = {limits}  # default: {v.start} {v.unit}".rstrip()
         )
     return "\n".join(hints)
 
@@ -94,13 +94,13 @@ def _parameter_hints(parameters: Iterable[Variable]) -> str:
 def _requirement_section(info: ModelInfo) -> str:
     output = next((v for v in info.outputs if v.kind != "string"), None)
     if output is None:
-        raise SpecError(f"{info.name}: the FMU has no output that a requirement could speak of")
+        raise SpecError(f"{info.name}: the FMU has no numeric output to write a requirement about")
     bound = _UNREACHED if output.high is None else output.high
     stop_time = info.stop_time or _DEFAULT_STOP_TIME
     return (
         "[requirements.R1]\n"
         f"formula = 'G[0,{stop_time:.10g}] ({name_text(output.name)} <= {bound:.10g})'"
-        '  # put the real requirement here\ndescription = ""'
+        '  # replace with the real requirement\ndescription = ""'
     )
 
 

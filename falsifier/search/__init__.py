@@ -1,1 +1,1 @@
-"""One run: the loop that asks, simulates, judges and tells, within a budget, and its record on disk."""
+"""One run: the loop that asks an engine, simulates and judges within a budget, and its record on disk."""

@@ -2,23 +2,24 @@
 
 from dataclasses import dataclass, replace
 
+from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
 
 @dataclass(frozen=True, slots=True)
 class Spent:
-    """What a run has used so far.
+    """What a run has spent so far.
 
     Attributes:
-        simulations: candidates that were simulated, failed ones included.
+        simulations: number of simulated candidates, including failed simulations.
         seconds: wall-clock time of the run.
-        simulation_seconds: of it inside the simulator.
-        engine_seconds: of it inside the engine, language model included.
+        simulation_seconds: time inside the simulator.
+        engine_seconds: time inside the engine, including the language model.
         calls: requests to a language model that were answered.
         prompt_tokens: tokens sent.
-        completion_tokens: tokens received, reasoning included.
-        reasoning_tokens: of them spent on reasoning, where the provider says so.
-        cost: US dollars; None once the price of any call is unknown.
+        completion_tokens: tokens received, including reasoning.
+        reasoning_tokens: part of them used for reasoning, if the provider reports it.
+        cost: US dollars; None once the cost of any call is unknown.
     """
 
     simulations: int = 0
@@ -50,13 +51,13 @@ class Spent:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """Limits of one run; the first that is reached ends it. None: no limit.
+    """Limits of one run; the first one reached ends it. None: no limit.
 
     Attributes:
-        simulations: most simulations.
-        seconds: most wall-clock seconds.
-        tokens: most tokens sent to and received from a language model.
-        cost: most US dollars spent on a language model.
+        simulations: maximum number of simulations.
+        seconds: maximum wall-clock time in s.
+        tokens: maximum number of tokens sent to and received from a language model.
+        cost: maximum amount in US dollars spent on a language model.
     """
 
     simulations: int | None = 100
@@ -76,26 +77,26 @@ class Budget:
         """Which limit is reached, in words, or None.
 
         Raises:
-            SpecError: with a limit on money when the price of a call is unknown.
+            SpecError: if the cost is limited but the price of a call is unknown.
         """
         if self.simulations is not None and spent.simulations >= self.simulations:
-            return f"the budget of {self.simulations} simulations is used up"
+            return f"the budget of {counted(self.simulations, 'simulation')} is used up"
         if self.seconds is not None and spent.seconds >= self.seconds:
             return f"the time limit of {self.seconds:g} s is reached"
         if self.tokens is not None and spent.tokens >= self.tokens:
-            return f"the budget of {self.tokens} tokens is used up"
+            return f"the budget of {counted(self.tokens, 'token')} is used up"
         if self.cost is not None:
             if spent.cost is None:
                 raise SpecError(
-                    "the price of this language model is unknown, so a limit on its cost cannot be kept: "
-                    "give its price, or limit tokens instead"
+                    "the price of this language model is unknown, so its cost cannot be limited: state the "
+                    "price (--price), or limit the tokens instead (--max-tokens)"
                 )
             if spent.cost >= self.cost:
                 return f"the budget of {self.cost:g} US dollars is used up"
         return None
 
     def remaining(self, spent: Spent, wanted: int) -> int:
-        """How many of the wanted simulations the budget still allows."""
+        """Number of the wanted simulations that the budget still allows."""
         if self.simulations is None:
             return wanted
         return max(0, min(wanted, self.simulations - spent.simulations))

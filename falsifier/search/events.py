@@ -1,4 +1,4 @@
-"""What happens in a run, as values that the journal, displays and callbacks read."""
+"""Events of a run: values for the journal, displays and callbacks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from falsifier.search.result import Result, ResultStatus
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunStarted:
-    """A run begins, or continues.
+    """A run starts or is resumed.
 
     Attributes:
-        problems: what is searched; they differ in their requirement only.
+        problems: what is searched; they differ only in their requirement.
         engines: name of each problem's engine.
-        budget: limits.
-        replayed: how many evaluations come from the run's journal.
+        budget: limits of the run.
+        replayed: number of evaluations taken from the run's journal.
     """
 
     problems: tuple[Problem, ...]
@@ -34,11 +34,11 @@ class Asked:
     """An engine was asked for candidates.
 
     Attributes:
-        first: index of the evaluation that the first candidate becomes.
-        wanted: how many were asked for.
-        candidates: what it gave.
+        first: index that the evaluation of the first candidate will have.
+        wanted: number of candidates asked for.
+        candidates: what the engine suggested.
         seconds: how long it took.
-        problem: whose turn it was.
+        problem: the problem that the engine works on.
     """
 
     first: int
@@ -50,7 +50,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exchanged:
-    """A language model was asked and answered."""
+    """A request was sent to a language model and answered."""
 
     exchange: Exchange
     spent: Spent
@@ -58,17 +58,17 @@ class Exchanged:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluated:
-    """One more candidate was simulated and judged.
+    """A candidate was simulated and judged.
 
     Attributes:
-        index: of the evaluation.
-        problem: whose turn it was.
-        evaluation: judged by that problem's requirement.
-        judged: the same judged by each requirement that was not falsified yet, by its name.
-        improved: whether it is the best so far for any of them.
-        best: the best evaluation so far of the problem whose turn it was.
-        spent: by now.
-        replayed: whether it comes from the run's journal.
+        index: index of the evaluation.
+        problem: the problem whose engine suggested the candidate.
+        evaluation: judged against that problem's requirement.
+        judged: the same simulation judged against each requirement not yet falsified, by name.
+        improved: whether it is the best so far for any of these requirements.
+        best: best evaluation of ``problem`` so far.
+        spent: what the run has spent so far.
+        replayed: whether it was taken from the run's journal.
     """
 
     index: int
@@ -86,9 +86,9 @@ class Confirmed:
     """A violation was simulated again and judged by a second monitor.
 
     Attributes:
-        index: of the evaluation that violates.
-        confirmation: what came of it.
-        spent: by now.
+        index: index of the evaluation that violates.
+        confirmation: the result.
+        spent: what the run has spent so far.
     """
 
     index: int
@@ -98,13 +98,13 @@ class Confirmed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunEnded:
-    """The run is over.
+    """The run has ended.
 
     Attributes:
         status: of all requirements together.
-        reason: in words.
-        results: one for each problem.
-        spent: in all.
+        reason: why it ended, in words.
+        results: one per problem.
+        spent: what the run has spent in total.
     """
 
     status: ResultStatus

@@ -1,14 +1,15 @@
-"""The record of a run: a directory of plain files that a killed run can be continued from.
+"""The record of a run: a directory of plain files from which even a killed run can be resumed.
 
 ::
 
-    manifest.json        what was asked for, and with which versions; written once
-    journal.jsonl        what happened, one JSON object a line, only ever appended to
-    trajectories/N.npz   outputs and inputs of evaluation N; which ones are kept, Keep says
+    manifest.json        what was requested, with which versions; written once
+    journal.jsonl        what happened, one JSON object per line, append-only
+    trajectories/N.npz   outputs and inputs of evaluation N; Keep decides which ones are kept
     lock                 held while a process writes here
 
-Lines are written before and after every simulation and at every reply of a language model. A line that was
-cut off by a crash is dropped when the journal is opened again. Nothing else reads or writes these files.
+Lines are written before and after every simulation and after every reply of a language model. A last line
+that a crash left incomplete is dropped when the journal is opened again. No other module reads or writes
+these files.
 """
 
 import json
@@ -47,27 +48,27 @@ JOURNAL = "journal.jsonl"
 TRAJECTORIES = "trajectories"
 LOCK = "lock"
 
-# Longest time in s that lines may wait in the operating system's cache before they are forced to disk;
-# replies of a language model cost money and never wait.
+# Maximum time in s that lines may stay in the operating system's cache before they are forced to disk;
+# replies of a language model cost money and are forced to disk at once.
 _SYNC_PERIOD = 1.0
-# Which trajectories are kept. history: those of the first evaluations all, later ones where they improve on
-# the best; best: only the best one's, for campaigns of very many runs.
+# Which trajectories are kept. history: the first _KEPT_TRAJECTORIES, then each that improves on the best;
+# best: only the best one, for campaigns of very many runs.
 Keep = Literal["history", "best"]
 _KEPT_TRAJECTORIES = 200
-# Candidates are long: whoever only counts passes over these lines without parsing them.
+# Lines with candidates are long; readers that only count skip them by this prefix, without parsing.
 _ASKED = b'{"kind":"asked"'
 
 
 class Journal:
-    """Writes one run directory, as a listener of the run; the only writer while it is open.
+    """Writes one run directory as a listener of the run; the only writer while it is open.
 
     Args:
-        directory: made where it is missing.
+        directory: run directory; created if missing.
         keep: which trajectories are kept.
-        patience: how long in s to wait for another process that writes here.
+        patience: time in s to wait for another process that writes here.
 
     Raises:
-        JournalError: when another process still writes here after that time.
+        JournalError: if another process still writes here after that time.
     """
 
     def __init__(self, directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> None:
@@ -79,17 +80,19 @@ class Journal:
         try:
             self._lock.acquire(timeout=patience)
         except Timeout:
-            raise JournalError(f"{directory}: another process is writing this run") from None
+            raise JournalError(
+                f"{directory}: another process is writing to this run; wait until it ends"
+            ) from None
         path = directory / JOURNAL
         _drop_torn_line(path)
         self.records = read_journal(directory)
-        # A run that continues repeats what is recorded: so many events of each kind are not written again.
-        self._standing = Counter(type(record) for record in self.records)
+        # A resumed run repeats the events that are recorded already; this many of each kind are not written.
+        self._recorded = Counter(type(record) for record in self.records)
         self._file = path.open("a", encoding="utf-8")
         self._synced = monotonic()
 
     def __call__(self, event: Event) -> None:
-        """Record what happened."""
+        """Record an event."""
         match event:
             case Asked():
                 self._add(
@@ -132,42 +135,43 @@ class Journal:
         self._lock.release()
 
     def _add(self, record: Record, *, at_once: bool = False) -> None:
-        """Append a record, unless the journal holds it already."""
-        if self._standing[type(record)]:
-            self._standing[type(record)] -= 1
+        """Append a record, unless the journal contains it already."""
+        if self._recorded[type(record)]:
+            self._recorded[type(record)] -= 1
         else:
             self.write(record, at_once=at_once)
 
     def _evaluated(self, event: Evaluated) -> None:
-        """Append an evaluation, and save its trajectory where it is one to keep."""
-        if self._standing[EvaluatedRecord]:
-            self._standing[EvaluatedRecord] -= 1
+        """Append an evaluation, and save its trajectory if it is one to keep."""
+        if self._recorded[EvaluatedRecord]:
+            self._recorded[EvaluatedRecord] -= 1
             return
-        evaluation, name = event.evaluation, None
+        evaluation, file = event.evaluation, None
         every = self._keep == "history" and event.index < _KEPT_TRAJECTORIES
         if evaluation.trajectory is not None and (event.improved or every):
-            name = f"{TRAJECTORIES}/{event.index}.npz"
-            evaluation.trajectory.save(self.directory / name)
+            file = f"{TRAJECTORIES}/{event.index}.npz"
+            evaluation.trajectory.save(self.directory / file)
         self.write(
             EvaluatedRecord(
                 index=event.index,
                 status=evaluation.status,
-                verdicts={who: VerdictRecord.of(e.verdict) for who, e in event.judged.items()},
+                verdicts={name: VerdictRecord.of(e.verdict) for name, e in event.judged.items()},
                 reason=evaluation.reason,
                 seconds=evaluation.seconds,
                 log=list(evaluation.log),
-                trajectory=name,
+                trajectory=file,
             )
         )
-        if name is not None and self._keep == "best":
+        # Only after the record: a crash in between must not lose the trajectory that the journal refers to.
+        if file is not None and self._keep == "best":
             for path in (self.directory / TRAJECTORIES).glob("*.npz"):
-                if path != self.directory / name:
+                if path != self.directory / file:
                     path.unlink()
 
 
 @contextmanager
 def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> Iterator[Journal]:
-    """Journal of a run directory, closed at the end whatever happens; see Journal."""
+    """Open the journal of a run directory, and close it even after an exception; see Journal."""
     journal = Journal(directory, keep=keep, patience=patience)
     try:
         yield journal
@@ -176,20 +180,20 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
 
 
 def holds_run(directory: Path) -> bool:
-    """Whether a directory is a run's."""
+    """Whether a directory contains a run."""
     return (directory / MANIFEST).exists()
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:
-    """Read a run directory's manifest.
+    """Read a run directory's manifest as plain JSON.
 
     Raises:
-        JournalError: when there is none.
+        JournalError: if there is none, or it is not valid JSON.
     """
     try:
         manifest: dict[str, Any] = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise JournalError(f"{directory}: not a run directory, it has no {MANIFEST}") from None
+        raise JournalError(f"{directory}: not a run directory: it contains no {MANIFEST}") from None
     except json.JSONDecodeError as error:
         raise JournalError(f"{directory}/{MANIFEST}: not valid JSON: {error}") from None
     return manifest
@@ -201,24 +205,24 @@ def write_manifest(directory: Path, manifest: dict[str, Any]) -> None:
 
 
 def read_journal(directory: Path, *, with_candidates: bool = True) -> list[Record]:
-    """Read all complete records of a run directory in order; empty where there is no journal.
+    """Read all complete records of a run directory in order; empty if there is no journal.
 
     Args:
-        directory: of the run.
-        with_candidates: False: without the records of what engines were asked, which are long.
+        directory: run directory.
+        with_candidates: False: skip the records of what engines suggested, which are long.
 
     Raises:
-        JournalError: when a line other than a torn last one cannot be understood.
+        JournalError: if a line is invalid, unless it is an incomplete last line.
     """
     reader = JournalReader(directory, with_candidates=with_candidates)
     return list(reader.new())
 
 
 class JournalReader:
-    """Reads a growing journal.
+    """Reads a journal that is still growing.
 
     Args:
-        directory: of the run, which need not have begun.
+        directory: run directory; the run need not have started.
         with_candidates: see read_journal.
     """
 
@@ -230,26 +234,26 @@ class JournalReader:
 
     @property
     def shrank(self) -> bool:
-        """Whether the file is shorter than what was read: begin again with another reader."""
+        """Whether the file is shorter than what was read; then start again with a new reader."""
         return self.path.exists() and self.path.stat().st_size < self.offset
 
     @property
     def begun(self) -> bool:
-        """Whether anything was read."""
+        """Whether anything has been read."""
         return self.offset > 0
 
     def new(self) -> Iterator[Record]:
-        """Yield the complete records that were written since the last time.
+        """Yield the complete records written since the last call.
 
         Raises:
-            JournalError: when a line cannot be understood.
+            JournalError: if a line is invalid.
         """
         if not self.path.exists() or self.path.stat().st_size == self.offset:
             return
         with self.path.open("rb") as file:
             file.seek(self.offset)
             for line in file:
-                if not line.endswith(b"\n"):  # torn, or still being written
+                if not line.endswith(b"\n"):  # cut off by a crash, or still being written
                     return
                 self.offset += len(line)
                 self.line += 1
@@ -260,8 +264,8 @@ class JournalReader:
         try:
             return RECORDS.validate_json(line)
         except ValidationError as error:
-            said = error.errors()[0]["msg"]
-            raise JournalError(f"{self.path}: line {self.line} is damaged: {said}") from None
+            message = error.errors()[0]["msg"]
+            raise JournalError(f"{self.path}: line {self.line} is damaged: {message}") from None
 
 
 def recorded_exchanges(records: Iterable[Record]) -> list[Exchange]:
@@ -270,7 +274,7 @@ def recorded_exchanges(records: Iterable[Record]) -> list[Exchange]:
 
 
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
-    """Candidates by the index of their evaluation."""
+    """Recorded candidates by the index of their evaluation."""
     return {
         record.first + i: Candidate.from_json(candidate)
         for record in records
@@ -282,12 +286,13 @@ def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
 def recorded_evaluations(
     directory: Path, records: Sequence[Record], requirement: str | None = None
 ) -> list[Evaluation]:
-    """Finished evaluations in order, each with its trajectory where it was kept.
+    """Recorded evaluations in order, each with its trajectory if that was kept.
 
     Args:
-        directory: of the run.
-        records: of its journal.
-        requirement: who judges; default: the one whose turn it was.
+        directory: run directory.
+        records: records of its journal.
+        requirement: name of the requirement whose verdicts to return; None: of each evaluation, the
+            requirement whose engine suggested the candidate.
     """
     candidates = recorded_candidates(records)
     turn: dict[int, str] = {}
@@ -314,7 +319,7 @@ def recorded_evaluations(
 
 
 def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
-    """Trajectory of a record; None where it was not kept."""
+    """Load the trajectory of a record; None if it was not kept."""
     path = directory / (name or "-")
     return Trajectory.load(path) if path.is_file() else None
 

@@ -1,4 +1,4 @@
-"""Who leads a run: from the names that a user gives to engines."""
+"""Makes the engines that lead a run from the names in a request."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 # Engines that ask a language model.
 _LLM_ENGINES = ("llm", "hybrid")
-# Between the seeds of the engines of one search, which must not draw the same points; larger than any seed
-# that people count up by hand.
+# Distance between the seeds of the engines in one search, so that they do not draw the same points; larger
+# than the consecutive seeds that users choose.
 _SEED_STRIDE = 1_000_003
 
 
 def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
-    """Engines of a request, one for each problem.
+    """Make the engines of a request, one per problem.
 
     Args:
-        request: what was asked for.
+        request: what was requested.
         problems: what is searched.
-        chat: with the request's language model, where it was made in Python.
+        chat: chat with the request's language model, if it was made in Python.
 
     Raises:
-        SpecError: for an unknown engine, an engine and a language model that do not go together, or a limit
-            on cost that cannot be kept.
+        SpecError: for an unknown engine, an engine that does not fit the language model, or a cost limit
+            although the price is unknown.
         ChatError: for an unknown provider or a missing key.
     """
     check_names(request)
@@ -43,10 +43,10 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
 
 
 def check_names(request: RunRequest) -> None:
-    """Refuse unknown names; nothing is imported for that and no key is looked for.
+    """Reject unknown names, without importing an engine or looking for a key.
 
     Raises:
-        SpecError: for an unknown engine or prompt variant, or an engine and an LLM that do not go together.
+        SpecError: for an unknown engine or prompt variant, or an engine that does not fit the language model.
     """
     engine, llm = request.engine, request.llm
     if llm is None:
@@ -60,12 +60,12 @@ def check_names(request: RunRequest) -> None:
 
     variant_named(llm.variant)
     if llm.fallback in _LLM_ENGINES:
-        raise SpecError(f"--fallback {llm.fallback}: name an engine that does not use a language model")
+        raise SpecError(f"--fallback {llm.fallback}: choose an engine that does not use a language model")
     check_engine(llm.fallback or DEFAULT_ENGINE)
 
 
 def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
-    """Chat with a request's language model; nothing is sent."""
+    """Make the chat with a request's language model; nothing is sent."""
     from falsifier.llm.cache import default_cache_directory
     from falsifier.llm.connect import connect, preflight
     from falsifier.llm.litellm_import import listed_price
@@ -75,8 +75,8 @@ def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
     price = Price(*llm.price) if llm.price else None
     if request.budget.cost is not None and (price or listed_price(llm.name)) is None:
         raise SpecError(
-            f"the price of {llm.name} is unknown, so --max-cost cannot be kept: give "
-            "--price SENT:RECEIVED, or limit --max-tokens instead"
+            f"the price of {llm.name} is unknown, so --max-cost cannot be enforced: add "
+            "--price SENT:RECEIVED, or use --max-tokens instead"
         )
     return connect(
         llm.name,
@@ -108,7 +108,7 @@ def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, chat: C
 
 @lru_cache
 def _gate(llm: str, api_base: str | None) -> "Gate":
-    """Return the gate that all runs of this process share on one account."""
+    """Return the gate shared by all runs of this process that use the same account."""
     from falsifier.llm.retry import Gate
 
     return Gate()

@@ -1,4 +1,4 @@
-"""The loop: ask, simulate, judge, tell, until every requirement is violated or the budget is used up."""
+"""The loop: ask, simulate, judge, tell, until every requirement is falsified or the budget is used up."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
@@ -29,29 +29,29 @@ from falsifier.search.events import (
 )
 from falsifier.search.result import Result, ResultStatus
 
-# A model whose first simulations all fail is broken or wrongly set up; more of them would tell nothing new.
-_HOPELESS = 10
+# If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
+_MAX_INITIAL_FAILURES = 10
 
 
 class Steps(Protocol):
-    """What the loop has done for it: by engines, models and monitors, or from a record."""
+    """The steps that the loop delegates: carried out live, or taken from a record."""
 
     @property
     def replayed(self) -> int:
-        """How many evaluations come from a record."""
+        """Number of evaluations taken from a record."""
         ...
 
     @property
     def seconds(self) -> float:
-        """Wall-clock seconds that the recorded part of the run took."""
+        """Wall-clock seconds of the recorded part of the run."""
         ...
 
     def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Candidates of an engine, how many were asked for, and how long that took in s."""
+        """Return an engine's candidates, the number asked for, and the time that took in s."""
         ...
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Yield the candidates' evaluations in their order."""
+        """Yield the candidates' evaluations in order."""
         ...
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
@@ -59,16 +59,16 @@ class Steps(Protocol):
         ...
 
     def chat(self, inner: Chat) -> Chat:
-        """The chat that an engine asks."""
+        """Return the chat that an engine should ask instead of its own."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """Everything is done now.
+    """Carries out every step.
 
     Attributes:
-        executor: where to simulate; None: in this process.
+        executor: runs the simulations; None: this process.
     """
 
     executor: Executor | None = None
@@ -76,21 +76,21 @@ class Live:
     seconds: float = 0.0
 
     def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Ask the engine."""
+        """Ask the engine, and measure the time."""
         started = perf_counter()
         candidates = engine.ask(wanted)
         return candidates, wanted, perf_counter() - started
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Simulate and judge."""
+        """Simulate and judge on the executor."""
         return evaluate_all(problem, candidates, self.executor)
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
-        """Simulate again."""
+        """Simulate again with a fresh instance; the index is for replay only."""
         return confirm(problem, evaluation)
 
     def chat(self, inner: Chat) -> Chat:
-        """Ask the chat itself."""
+        """Return the engine's own chat."""
         return inner
 
 
@@ -104,23 +104,26 @@ def search(
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
 ) -> list[Result]:
-    """Falsify several requirements of one system; one is the case of a list of one.
+    """Falsify one or more requirements of one system.
 
-    Every simulation is judged against all requirements. Those that are not falsified yet take turns in
-    asking; every engine is told every simulation. A result counts the simulations until its requirement was
-    falsified.
+    Every simulation is judged against all requirements. The engines of the requirements not yet falsified
+    take turns; every engine is told every simulation. A result counts the simulations until its requirement
+    was falsified.
 
     Args:
-        problems: what to falsify; they differ in nothing but their requirement.
-        engines: one for each problem.
+        problems: what to falsify; they differ only in their requirement.
+        engines: one per problem.
         budget: limits of the run.
-        steps: who asks, simulates and confirms; default: everything is done in this process.
-        batch: how many candidates are asked for and simulated at a time.
-        directory: where the run is recorded, for the results.
+        steps: how to ask, simulate and confirm; default: everything in this process.
+        batch: number of candidates to ask for and simulate at a time.
+        directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
 
+    Returns:
+        One result per problem, in their order.
+
     Raises:
-        SpecError: when the problems differ in what is varied or in how it is simulated.
+        SpecError: if the problems differ in more than their requirement.
     """
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
@@ -130,13 +133,13 @@ def search(
     try:
         loop.attach()
         reason = loop.run(batch)
-        status = "failed" if loop.is_hopeless() else "not falsified"
+        status = "failed" if loop.all_failed() else "not falsified"
     except KeyboardInterrupt:
         status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
         status, reason = "failed", str(error)
     except BaseException as error:
-        with suppress(Exception):  # the first error is the one to hear of
+        with suppress(Exception):  # an error in a listener must not hide the first one
             loop.end("failed", f"{type(error).__name__}: {error}")
         raise
     return loop.end(status, reason)
@@ -155,16 +158,16 @@ class _Target:
     spent: Spent | None = None
 
     def note(self, evaluation: Evaluation) -> bool:
-        """Remember an evaluation; return whether it is the best so far."""
+        """Add an evaluation; return whether it is the best so far."""
         improved = _smaller(evaluation, self.best)
         if improved:
             self.best = evaluation
-        self.evaluations.append(replace(evaluation, trajectory=None))
+        self.evaluations.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
         return improved
 
 
 class _Loop:
-    """State of one running search: the imperative shell around values and pure functions."""
+    """State of a running search: the imperative shell around values and pure functions."""
 
     def __init__(
         self, budget: Budget, steps: Steps, directory: Path | None, listeners: tuple[Listener, ...]
@@ -179,13 +182,13 @@ class _Loop:
         self.spent = Spent()
 
     def attach(self) -> None:
-        """Hear of every exchange of engines that ask a language model."""
+        """Connect to the engines that ask a language model, to count and record every exchange."""
         for target in self.targets:
             if isinstance(target.engine, AsksLLM):
                 target.engine.attach(self.exchanged, self.steps.chat)
 
     def run(self, batch: int) -> str:
-        """Search until nothing is left to falsify or to spend; return why it ended."""
+        """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         self.emit(
             RunStarted(
                 problems=tuple(t.problem for t in self.targets),
@@ -197,14 +200,15 @@ class _Loop:
         turns = 0
         while standing := [t for t in self.targets if t.counterexample is None]:
             limit = self.budget.exceeded(self.clock())
-            if limit is not None or self.count >= _HOPELESS:
-                if self.is_hopeless():
-                    return self.hopelessness()
+            if limit is not None or self.count >= _MAX_INITIAL_FAILURES:
+                if self.all_failed():
+                    return self.failure_text()
                 if limit is not None:
                     return limit
             turn = standing[turns % len(standing)]
             turns += 1
             told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
+            # One by one, as they finish: what an interruption leaves of a batch is counted and recorded.
             for evaluation in self.steps.evaluate(turn.problem, self.ask(turn, batch)):
                 judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
                 self.note(turn, evaluation, judged)
@@ -218,14 +222,15 @@ class _Loop:
             self.think(perf_counter() - started)
         return "all requirements are falsified"
 
-    def is_hopeless(self) -> bool:
-        """Whether no simulation has succeeded."""
+    def all_failed(self) -> bool:
+        """Whether every simulation so far has failed."""
         return self.count > 0 and all(t.best is None for t in self.targets)
 
-    def hopelessness(self) -> str:
-        """Say in words that every simulation failed."""
+    def failure_text(self) -> str:
+        """The reason of a run in which every simulation failed."""
         last = self.targets[0].evaluations[-1]
-        return f"all {self.count} simulations failed; the last one: {last.reason}"
+        failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
+        return f"{failed} failed; the last error: {last.reason}"
 
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
@@ -243,13 +248,13 @@ class _Loop:
         return candidates
 
     def think(self, seconds: float) -> None:
-        """Count seconds of engines."""
+        """Add to the time spent in engines."""
         self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
 
     def note(
         self, turn: _Target, evaluation: Evaluation, judged: Sequence[tuple[_Target, Evaluation]]
     ) -> None:
-        """Count and announce one simulation, judged by each requirement that is not falsified yet."""
+        """Count and announce one simulation, judged against each requirement not yet falsified."""
         improved = [target.note(seen) for target, seen in judged]
         self.spent = replace(
             self.clock(),
@@ -271,7 +276,7 @@ class _Loop:
         self.count += 1
 
     def consider(self, target: _Target, evaluation: Evaluation) -> None:
-        """Confirm a violation of one requirement; a fragile or refuted one does not end its search."""
+        """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
         if not evaluation.violated or target.counterexample is not None:
             return
         confirmation = self.steps.confirm(target.problem, evaluation, self.count - 1)
@@ -286,7 +291,7 @@ class _Loop:
         """Count and announce an exchange with a language model.
 
         Raises:
-            ChatError: when the budget is used up while the LLM is in the middle of its turn.
+            ChatError: if the budget is used up in the middle of the LLM's turn.
         """
         usage = exchange.usage
         self.spent = self.spent.plus_call(
@@ -296,13 +301,14 @@ class _Loop:
             cost=usage.cost,
         )
         self.emit(Exchanged(exchange=exchange, spent=self.clock()))
-        goes_on = exchange.reply is not None and bool(exchange.reply.tool_calls)
+        # run() checks the budget between turns; a turn with tool calls takes several paid requests.
+        continues = exchange.reply is not None and bool(exchange.reply.tool_calls)
         is_new = exchange.reply is not None and exchange.reply.source != "recording"
-        if goes_on and is_new and (limit := self.budget.exceeded(self.clock())):
-            raise ChatError(f"the LLM's turn was cut short: {limit}")
+        if continues and is_new and (limit := self.budget.exceeded(self.clock())):
+            raise ChatError(f"the language model's turn was cut short: {limit}")
 
     def clock(self) -> Spent:
-        """What is spent by now."""
+        """Update and return what has been spent."""
         self.spent = replace(self.spent, seconds=perf_counter() - self.started)
         return self.spent
 
@@ -311,11 +317,11 @@ class _Loop:
             listener(event)
 
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
-        """Announce the end; return how it ended for each requirement."""
+        """Announce the end; return one result per requirement."""
         results = [self.result(target, status, reason) for target in self.targets]
         overall = "falsified" if all(r.falsified for r in results) else status
-        said = results[0].reason if len(results) == 1 else reason
-        self.emit(RunEnded(status=overall, reason=said, results=tuple(results), spent=self.clock()))
+        stated = results[0].reason if len(results) == 1 else reason
+        self.emit(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
         return results
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
@@ -338,8 +344,8 @@ def _check_alike(one: Problem, other: Problem) -> None:
     alike = replace(other, requirement=one.requirement, source=one.source)
     if alike != one:
         raise SpecError(
-            f"{one.name} and {other.name} differ in what is varied or in how it is simulated: "
-            "search for them one after the other"
+            f"{one.name} and {other.name} differ in what is varied or in how it is simulated, so they cannot "
+            "share a search: falsify them one after the other"
         )
 
 

@@ -1,4 +1,4 @@
-"""What a run directory says of how it came to be."""
+"""The manifest of a run directory: what was requested, with which versions, files and ranges."""
 
 import platform
 import sys
@@ -29,7 +29,7 @@ class _Strict(BaseModel):
 
 
 class InputRecord(_Strict):
-    """One searched input or parameter, so that a run can be drawn without its model."""
+    """One searched input or parameter, so that reports can draw a run without its model."""
 
     name: str
     low: float
@@ -54,29 +54,31 @@ class RequirementRecord(_Strict):
 
 
 class Manifest(_Strict):
-    """What a run directory says of how it came to be."""
+    """Content of manifest.json: everything needed to repeat the run and to report on it."""
 
     falsifier: str = Field(description="Version of this package.")
     python: str
     platform: str
-    packages: dict[str, str] = Field(description="Versions of the packages that decide numbers.")
+    packages: dict[str, str] = Field(description="Versions of the packages that influence the numbers.")
     started: str = Field(description="Date and time in UTC.")
     request: RunRequest
-    engine: str = Field(description="Name of the engine, also of one made in Python.")
+    engine: str = Field(description="Name of the engine, even if it was made in Python.")
     requirements: tuple[RequirementRecord, ...] = Field(min_length=1)
-    fingerprints: dict[str, str] = Field(description="By requirement, of what is searched and how.")
+    fingerprints: dict[str, str] = Field(
+        description="Hash of what is searched and how it is simulated, by requirement."
+    )
     model: str = Field(description="Name of the model.")
     parameterization: Parameterization = Field(
-        description="free: engines could place control points of an input themselves."
+        description="free: engines could choose the control points of at least one input."
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
     stop_time: float = Field(description="End of each simulation in s.")
-    hashes: dict[str, str] = Field(description="SHA-256 by path of the FMU and the spec.")
+    hashes: dict[str, str] = Field(description="SHA-256 of the FMU and the spec, by path.")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the requirements; several where they share a search."""
+        """Names of the requirements; several if they share a search."""
         return tuple(r.name for r in self.requirements)
 
     @property
@@ -86,19 +88,19 @@ class Manifest(_Strict):
 
     @property
     def requirement(self) -> RequirementRecord:
-        """The requirement; the first one where several share a search."""
+        """The requirement; the first one if several share a search."""
         return self.requirements[0]
 
     @property
     def fmu_sha256(self) -> str | None:
-        """Hash of the FMU; None where the model is none."""
+        """SHA-256 of the FMU; None if the model is not an FMU."""
         return next((digest for path, digest in self.hashes.items() if path.endswith(".fmu")), None)
 
     def of(self, name: str) -> "Manifest":
-        """Return the same with one of the requirements alone.
+        """Return the manifest reduced to one requirement.
 
         Raises:
-            JournalError: for another name; it says which ones there are.
+            JournalError: for an unknown name; it lists the known ones.
         """
         if name not in self.names:
             raise JournalError(f"this run searched {', '.join(self.names)}, not {name}")
@@ -108,10 +110,10 @@ class Manifest(_Strict):
 
 
 def read(directory: Path) -> Manifest:
-    """Manifest of a run directory.
+    """Read the manifest of a run directory.
 
     Raises:
-        JournalError: when there is none, or it cannot be understood.
+        JournalError: if there is none, or it is invalid.
     """
     try:
         return Manifest.model_validate(read_manifest(directory))
@@ -122,7 +124,7 @@ def read(directory: Path) -> Manifest:
 
 
 def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> Manifest:
-    """Describe a run before it starts."""
+    """Make the manifest of a run before it starts."""
     problem = problems[0]
     space = problem.space
     return Manifest(
@@ -141,7 +143,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
 
 
 def environment() -> dict[str, Any]:
-    """Versions, platform and time, as manifests state them."""
+    """Versions, platform and time, as keyword arguments of a manifest."""
     return {
         "falsifier": __version__,
         "python": sys.version.split()[0],
@@ -152,26 +154,26 @@ def environment() -> dict[str, Any]:
 
 
 def file_hashes(problem: Problem) -> dict[str, str]:
-    """SHA-256 by path of the files that decide what is simulated: the FMU and the spec."""
+    """SHA-256, by path, of the files that determine what is simulated: the FMU and the spec."""
     spec = None if problem.source is None else spec_file(problem.source)
     paths: list[Path | None] = [getattr(problem.model, "path", None), spec]
     return {str(p): sha256(p.read_bytes()).hexdigest() for p in paths if p is not None}
 
 
 def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
-    """Refuse to continue with other files or problems than those that a run or campaign was started with.
+    """Refuse to resume a run or campaign if a file or problem differs from when it was started.
 
     Args:
-        directory: of the run or campaign.
-        recorded: hashes by path, or fingerprints by requirement.
-        found: the same today.
+        directory: directory of the run or campaign.
+        recorded: hashes by path, or fingerprints by requirement, from the record.
+        found: the same, computed now.
 
     Raises:
         JournalError: naming what has changed.
     """
     for name, digest in found.items():
         if recorded.get(name, digest) != digest:
-            raise JournalError(f"{directory}: {name} has changed since this was started; start a new run")
+            raise JournalError(f"{directory}: {name} has changed since the start; start a new run instead")
 
 
 def _range_record(range_: InputRange | ParameterRange) -> InputRecord:

@@ -1,4 +1,4 @@
-"""Lines of a journal: what happened in a run, as typed records."""
+"""The lines of a journal as typed records."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, fields
@@ -17,18 +17,18 @@ class _Record(BaseModel):
 
 
 class AskedRecord(_Record):
-    """The engine was asked for n candidates and gave these, as evaluations first, first + 1, ..."""
+    """An engine was asked for n candidates and suggested these: evaluations first, first + 1, ..."""
 
     kind: Literal["asked"] = "asked"
     first: int
     n: int
     candidates: list[dict[str, Any]]
     seconds: float
-    requirement: str = Field(description="Whose turn it was.")
+    requirement: str = Field(description="Requirement whose engine was asked.")
 
 
 class VerdictRecord(_Record):
-    """A verdict."""
+    """Robustness, and what decided it."""
 
     robustness: float = Field(allow_inf_nan=False)
     critical_time: float
@@ -37,7 +37,7 @@ class VerdictRecord(_Record):
 
     @classmethod
     def of(cls, verdict: Verdict | None) -> "VerdictRecord | None":
-        """Return the record of a verdict, None where there is none."""
+        """Return the record of a verdict; None without a verdict."""
         if verdict is None:
             return None
         return cls(
@@ -49,34 +49,34 @@ class VerdictRecord(_Record):
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict."""
+        """The verdict that was recorded."""
         return Verdict(self.robustness, self.critical_time, self.predicate, self.values)
 
 
 class EvaluatedRecord(_Record):
-    """Evaluation index has ended."""
+    """An evaluation ended."""
 
     kind: Literal["evaluated"] = "evaluated"
     index: int
     status: Status
     verdicts: dict[str, VerdictRecord | None] = Field(
-        description="By requirement, of each that was not falsified yet; null where it could not be judged."
+        description="Verdict on each requirement not yet falsified, by name; null if it could not be judged."
     )
     reason: str = ""
     seconds: float
     log: list[str] = []
-    trajectory: str | None = Field(None, description="File below the run directory.")
+    trajectory: str | None = Field(None, description="File, relative to the run directory.")
 
 
 class ExchangeRecord(_Record):
-    """A language model was asked and answered."""
+    """A request was sent to a language model and answered."""
 
     kind: Literal["exchange"] = "exchange"
     exchange: dict[str, Any]
 
 
 class ConfirmedRecord(_Record):
-    """A violation was checked."""
+    """A violation was simulated again and judged by a second monitor."""
 
     kind: Literal["confirmed"] = "confirmed"
     index: int
@@ -86,7 +86,7 @@ class ConfirmedRecord(_Record):
     reference: float | None
     reason: str
     halved: float | None = None
-    spent: dict[str, float | None] = Field(description="What the run had used by then.")
+    spent: dict[str, float | None] = Field(description="What the run had spent by then.")
 
     @classmethod
     def of(cls, confirmation: Confirmation, *, index: int, spent: Spent) -> "ConfirmedRecord":
@@ -104,7 +104,7 @@ class ConfirmedRecord(_Record):
 
 
 class EndedRecord(_Record):
-    """The run ended, or was interrupted."""
+    """The run ended or was interrupted."""
 
     kind: Literal["ended"] = "ended"
     status: str
@@ -117,7 +117,7 @@ RECORDS: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator
 
 
 def spent_of(recorded: Mapping[str, float | None]) -> Spent:
-    """Spent from its record, in which all numbers are floats."""
+    """Rebuild Spent from its record, in which all numbers are floats."""
     whole = {f.name for f in fields(Spent) if f.type is int}
     numbers = {name: int(v) if name in whole and v is not None else v for name, v in recorded.items()}
     return Spent(**numbers)  # type: ignore[arg-type]

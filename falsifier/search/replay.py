@@ -1,6 +1,6 @@
-"""Continuing a run: what its journal holds is taken from there, and only then is anything done anew.
+"""Resumes a run by replay: steps that the journal contains are taken from it, the rest is carried out.
 
-The engine is asked as before and must give what was recorded, which restores its state; evaluations,
+The engine is asked again and must suggest what was recorded; that restores its state. Evaluations,
 confirmations and replies of a language model come from the journal and cost nothing.
 """
 
@@ -23,15 +23,15 @@ from falsifier.search.records import AskedRecord, ConfirmedRecord, EndedRecord, 
 
 @dataclass(slots=True)
 class Replayed:
-    """Steps of a run that a journal holds, then live ones.
+    """The steps that a journal contains, then live ones.
 
     Attributes:
-        live: what does the rest.
-        asked: what engines gave, in order.
-        evaluations: in order.
-        confirmed: by evaluation and requirement.
-        recording: replies of a language model.
-        seconds: that the recorded part took.
+        live: carries out the rest.
+        asked: what engines suggested, in order.
+        evaluations: recorded evaluations in order.
+        confirmed: recorded confirmations by evaluation index and requirement.
+        recording: recorded replies of a language model.
+        seconds: wall-clock seconds of the recorded part.
     """
 
     live: Steps
@@ -47,19 +47,20 @@ class Replayed:
         self.replayed = len(self.evaluations)
 
     def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Have the engine repeat what it gave.
+        """Let the engine repeat its recorded suggestions.
 
         Raises:
-            JournalError: when it gives something else.
+            JournalError: if it suggests something else.
         """
         if not self.asked:
             return self.live.ask(engine, wanted)
         record = self.asked.pop(0)
+        # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
         candidates = engine.ask(record.n)
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
             raise JournalError(
-                f"cannot continue: candidate {record.first} of the engine {engine.name!r} differs from the "
-                "journal, which was written with other settings or another version"
+                f"cannot resume: candidate {record.first} of the engine {engine.name!r} differs from the "
+                "journal, which was written with other settings or another version; start a new run"
             )
         return candidates, record.n, record.seconds
 
@@ -73,7 +74,7 @@ class Replayed:
             yield from self.live.evaluate(problem, candidates[len(known) :])
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
-        """What was found out about a violation."""
+        """Return the recorded confirmation of a violation; without one, confirm it."""
         record = self.confirmed.get((index, problem.name))
         if record is None:
             return self.live.confirm(problem, evaluation, index)
@@ -88,12 +89,12 @@ class Replayed:
         )
 
     def chat(self, inner: Chat) -> Chat:
-        """Play recorded replies first."""
+        """Return a chat that plays the recorded replies first."""
         return RecordedChat(self.recording, self.live.chat(inner))
 
 
 def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
-    """Steps that take what a journal holds from there; the live ones where it holds nothing."""
+    """Return steps that replay a journal; with an empty journal, the live ones."""
     if not records:
         return live
     ended = [r.spent["seconds"] or 0.0 for r in records if isinstance(r, ConfirmedRecord | EndedRecord)]
@@ -108,7 +109,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
 
 
 def _with_trajectory(problem: Problem, evaluation: Evaluation) -> Evaluation:
-    """Simulate a recorded evaluation again when its trajectory was not kept."""
+    """Simulate a recorded evaluation again if its trajectory was not kept, because engines need it."""
     if evaluation.verdict is None or evaluation.trajectory is not None:
         return evaluation
     return replace(evaluation, trajectory=evaluate(problem, evaluation.candidate).trajectory)

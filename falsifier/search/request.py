@@ -1,4 +1,4 @@
-"""What a user asked for, as one value: enough to run it, to record it and to run it again."""
+"""What a user requested, as one value: enough to run it, record it and repeat it."""
 
 from typing import Literal
 
@@ -17,30 +17,32 @@ class _Strict(BaseModel):
 
 
 class LLMSettings(_Strict):
-    """Which language model, and how it is asked."""
+    """Which language model to ask, and how."""
 
-    # An option that holds a key is refused, and must not stand in the error's text either.
+    # An option that contains a key is rejected, and the error must not show it either.
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
 
     name: str
     effort: Effort | None = None
     api_base: str | None = None
     variant: str | None = Field(default=None, description="Prompt variant; default: the best one.")
-    options: dict[str, str | float] = Field(
-        default_factory=dict, description="Passed to litellm as they are."
-    )
+    options: dict[str, str | float] = Field(default_factory=dict, description="Passed to litellm unchanged.")
     price: tuple[float, float] | None = Field(
-        default=None, description="US dollars for 1000 tokens sent and received; default: litellm's table."
+        default=None,
+        description="US dollars per 1000 tokens sent, and per 1000 received; default: litellm's table.",
     )
-    anonymous: bool = Field(default=False, description="The LLM is told neutral names only.")
+    anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")
-    cache: bool = Field(default=True, description="Equal questions are answered from disk.")
+    cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 
     @field_validator("options")
     @classmethod
     def _without_keys(cls, options: dict[str, str | float]) -> dict[str, str | float]:
         for name in filter(is_secret_option, options):
-            raise ValueError(f"{name}: keys are read from the environment only; requests are recorded")
+            raise ValueError(
+                f"{name}: may contain a key; keys are read from the environment only, because requests are "
+                "recorded"
+            )
         return options
 
 
@@ -48,7 +50,7 @@ class RunRequest(_Strict):
     """One run. Naming a language model without an engine means that it leads the search."""
 
     problems: tuple[ProblemSource, ...] = Field(
-        description="Requirements that are falsified in one search; empty: problems made in Python."
+        description="Requirements falsified in one search; empty: the problems were made in Python."
     )
     engine: str | None = None
     llm: LLMSettings | None = None
@@ -59,5 +61,5 @@ class RunRequest(_Strict):
 
     @property
     def source(self) -> ProblemSource | None:
-        """Where the first problem comes from; None where it was made in Python."""
+        """Where the first problem comes from; None if it was made in Python."""
         return self.problems[0] if self.problems else None

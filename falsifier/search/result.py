@@ -1,4 +1,4 @@
-"""How a run ended."""
+"""The result of a run."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,19 +14,19 @@ ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """How a run ended.
+    """The result of a run for one requirement.
 
     Attributes:
         problem: what was searched.
         status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
             ``interrupted`` or ``failed`` (the simulator or the language model).
-        reason: in words.
+        reason: why the run ended, in words.
         counterexample: the confirmed violation, or None.
-        best: evaluation with the smallest robustness, or None when every simulation failed.
-        evaluations: all evaluations in order, without trajectories except the best's.
+        best: evaluation with the smallest robustness, or None if every simulation failed.
+        evaluations: all evaluations in order, without trajectories; ``best`` has its own.
         refuted: violations that a second simulation or the second monitor did not confirm.
-        fragile: violations that vanish at half the communication step.
-        spent: what the run used.
+        fragile: violations that disappear at half the communication step.
+        spent: what the run has spent; if falsified, until the counterexample was confirmed.
         directory: the run directory, or None.
     """
 
@@ -48,10 +48,10 @@ class Result:
 
     @property
     def shown(self) -> Evaluation | None:
-        """The counterexample's evaluation, else the best one."""
+        """The evaluation to show: the counterexample's, otherwise the best one."""
         return self.best if self.counterexample is None else self.counterexample.evaluation
 
     @property
     def robustness(self) -> float | None:
-        """Robustness of the counterexample, else the smallest one; None when every simulation failed."""
+        """Robustness of the counterexample, otherwise the smallest; None if every simulation failed."""
         return None if self.shown is None else self.shown.robustness

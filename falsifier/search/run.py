@@ -1,4 +1,4 @@
-"""The one way to search: ``falsify`` starts a run, ``resume`` continues one."""
+"""The entry points of the search: ``falsify`` starts a run, ``resume`` continues one."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
@@ -67,31 +67,31 @@ def falsify(
     jobs: int = 1,
     listeners: Iterable[Listener] = (),
 ) -> Result | list[Result]:
-    """Search for inputs that violate a requirement, or several.
+    """Search for inputs that violate one requirement, or several.
 
-    Several requirements of one system share a search: every simulation is judged for all of them, and they
-    share one budget. Those that differ in what is varied or how it is simulated are searched one after the
-    other, each group with the budget and a directory of its own below the given one.
+    Requirements that differ in nothing else share a search: every simulation is judged against all of them,
+    and they share one budget. Requirements that differ in what is varied or how it is simulated are searched
+    in groups, one after the other, each with the full budget and its own directory below the given one.
 
     Args:
-        problem: what to falsify: a Problem, or what ``falsifier run`` takes, such as ``"AT1"``; or several.
+        problem: what to falsify: a Problem, or a target of ``falsifier run`` such as ``"AT1"``; or a list.
         engine: name of an engine, or an engine made in Python; default: ``surrogate``, or the language model
-            where one is given.
+            if one is given.
         llm: name of a language model such as ``"openai/gpt-5-mini"``, its settings, or a chat with it.
-        budget: limits; a number means simulations.
-        seed: of engines that are given by name.
-        directory: where to record the run so that it can be continued; None: nowhere.
-        jobs: simulations at a time.
+        budget: limits; a plain number limits the simulations.
+        seed: seed of an engine given by name.
+        directory: where to record the run, so that it can be resumed; None: no record.
+        jobs: number of simulations at a time.
         listeners: called with every event.
 
     Returns:
-        one result; several in the order of the problems where several were given.
+        One result, or for a list of problems a list of results in the same order.
 
     Raises:
-        SpecError: when a problem, an engine or a language model is not what it should be.
-        ModelError: when the FMU cannot be used.
-        ChatError: when the language model cannot be asked, before the first simulation.
-        JournalError: when the directory holds a run already.
+        SpecError: if a problem, an engine or a language model is not valid.
+        ModelError: if the FMU cannot be used.
+        ChatError: if the language model cannot be asked; raised before the first simulation.
+        JournalError: if the directory already contains a run.
 
     >>> falsify("AT1", budget=20).status  # doctest: +SKIP
     'falsified'
@@ -135,21 +135,21 @@ def resume(
     budget: Budget | int | None = None,
     listeners: Iterable[Listener] = (),
 ) -> list[Result]:
-    """Continue a recorded run; what it holds is neither simulated nor asked for again.
+    """Continue a recorded run; nothing that is recorded is simulated or asked again.
 
     Args:
-        directory: of the run; or a folder of runs, which are continued one after the other.
-        problems: what is searched, where it was made in Python.
-        engine: who suggests, where it was made in Python; new, as it was before the run.
-        chat: with the language model, where it was made in Python.
-        budget: limits of the whole run, what is recorded included; default: those it was started with.
+        directory: run directory, or a folder of run directories, which are continued one after the other.
+        problems: what is searched, if it was made in Python.
+        engine: the engine, if it was made in Python: a new instance in its initial state.
+        chat: chat with the language model, if it was made in Python.
+        budget: limits of the whole run, including what is recorded; default: the original limits.
         listeners: called with every event.
 
     Returns:
-        one result for each requirement.
+        One result per requirement.
 
     Raises:
-        JournalError: when the directory holds no run, or the FMU, the spec or the problem has changed.
+        JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
     """
     directory = Path(directory)
     places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
@@ -160,9 +160,13 @@ def resume(
         if budget is not None:
             request = request.model_copy(update={"budget": _budget(budget)})
         if not problems and not request.problems:
-            raise JournalError(f"{place}: this run's problem was made in Python: give problems=[...]")
+            raise JournalError(
+                f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
+            )
         if engine is None and request.llm is None and described.engine not in ENGINES:
-            raise JournalError(f"{place}: this run's engine was made in Python: give engine=...")
+            raise JournalError(
+                f"{place}: this run's engine was made in Python: call resume() with engine=..."
+            )
         loaded = list(problems) or load_sources(request.problems)
         results += carry_out(
             request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
@@ -186,29 +190,31 @@ def carry_out(
 
     Args:
         request: what to run.
-        problems: what is searched, alike but for their requirement.
-        directory: of the run; None: nothing is recorded.
-        described: manifest of the request; made where it is not given.
-        engine: who suggests, where it was made in Python.
-        chat: with the language model, where it was made in Python.
+        problems: what is searched; they differ only in their requirement.
+        directory: run directory; None: no record.
+        described: manifest of the request; None: it is made here.
+        engine: the engine, if it was made in Python.
+        chat: chat with the language model, if it was made in Python.
         listeners: called with every event.
-        resume: continue where the directory's journal ends; start where there is none.
-        patience: how long in s to wait for another process that writes to the directory.
+        resume: continue from the directory's journal; without a journal, start.
+        patience: time in s to wait for another process that writes to the directory.
     """
     if engine is not None and len(problems) > 1:
-        raise SpecError("an engine made in Python searches one requirement: give the name of an engine")
+        raise SpecError(
+            "an engine made in Python can search only one requirement: pass the name of an engine instead"
+        )
     with ExitStack() as stack:
         begun = directory is not None and holds_run(directory)
         if begun and not resume:
             raise JournalError(
-                f"{directory} already holds a run: choose another --out, or to continue it: "
+                f"{directory} already contains a run: choose another --out, or to continue it: "
                 f"falsifier resume {directory}"
             )
-        # Before anything is written: a wrong engine or a missing key leaves no folder.
+        # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         engines = [engine] if engine is not None else make_engines(request, problems, chat)
         live = Live(stack.enter_context(local_executor(request.jobs)))
         steps: Steps = live
-        heard = tuple(listeners)
+        all_listeners = tuple(listeners)
         if directory is not None:
             described = described or manifest.describe(request, problems, engines[0].name)
             if begun:
@@ -217,7 +223,7 @@ def carry_out(
             if not begun:
                 write_manifest(directory, described.model_dump(mode="json"))
             steps = replayed(directory, journal.records, live)
-            heard = (journal, *heard)
+            all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
         for problem in problems:
             stack.callback(problem.model.close)
         return search(
@@ -227,7 +233,7 @@ def carry_out(
             steps=steps,
             batch=request.jobs,
             directory=directory,
-            listeners=heard,
+            listeners=all_listeners,
         )
 
 
@@ -238,7 +244,7 @@ def _problem(given: Falsifiable) -> Problem:
 
 
 def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
-    """Where the problems come from; empty where one of them was made or changed in Python."""
+    """Where the problems come from; empty if any of them was made or changed in Python."""
     sources = [reloadable(problem) for problem in problems]
     return tuple(s for s in sources if s is not None) if all(sources) else ()
 

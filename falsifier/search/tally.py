@@ -1,4 +1,4 @@
-"""What a run's journal says in numbers, record by record, as it grows."""
+"""A run's journal in numbers, updated record by record as it grows."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,21 +26,21 @@ FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
 
 
 class Tally:
-    """Numbers of one requirement in one run, kept up to date by adding records in order.
+    """Numbers of one requirement in one run, updated by adding records in order.
 
-    They stop at the requirement's counterexample: where several share a search, it goes on for the others.
+    They stop at the requirement's counterexample: a shared search continues for the other requirements.
 
     Args:
-        requirement: which one; None: the run has only one.
+        requirement: name of the requirement; None: the run has only one.
 
     Attributes:
         status: ``waiting`` before the first record; ``running`` until the run has ended.
         reason: why it ended, in words.
-        best: index of the smallest robustness, or None.
-        verdict: of the counterexample; without one, of the best evaluation.
+        best: index of the evaluation with the smallest robustness, or None.
+        verdict: verdict of the counterexample; without one, of the best evaluation.
         counterexample: index of the confirmed violation, or None.
-        unconfirmed: what was said of violations that were not confirmed.
-        trajectories: file names of kept trajectories by evaluation.
+        unconfirmed: outcome and reason of violations that were not confirmed, by index.
+        trajectories: file names of kept trajectories, by index.
     """
 
     def __init__(self, requirement: str | None = None) -> None:
@@ -59,14 +59,14 @@ class Tally:
 
     @property
     def spent(self) -> Spent:
-        """What the run has used; wall-clock seconds are known once it has ended."""
+        """What the run has spent; wall-clock seconds are known only after it has ended."""
         return replace(
             self._spent, simulations=len(self._robustness), simulation_seconds=self._simulation_seconds
         )
 
     @property
     def robustness(self) -> NDArray[np.float64]:
-        """Robustness of each evaluation, NaN where there is none, shape (n,)."""
+        """Robustness of each evaluation, shape (n,); NaN without a verdict."""
         return np.array(self._robustness, dtype=np.float64)
 
     @property
@@ -75,12 +75,12 @@ class Tally:
         return None if self.best is None else self._robustness[self.best]
 
     def begin(self) -> None:
-        """Note that the run has begun, whatever its first record is."""
+        """Set the status to running even if the first record was skipped by the reader."""
         if self.status == "waiting":
             self.status = "running"
 
     def add(self, record: Record) -> None:
-        """Take in one record."""
+        """Update the numbers with one record."""
         if self.counterexample is not None:
             return
         self.status = "running"
@@ -128,10 +128,10 @@ class Tally:
 
 
 def read_tally(directory: Path, requirement: str | None = None) -> Tally:
-    """Numbers of a run directory's whole journal; see Tally.
+    """Read the numbers of a run directory's complete journal; see Tally.
 
     Raises:
-        JournalError: when a line other than a torn last one cannot be understood.
+        JournalError: if a line is invalid, unless it is an incomplete last line.
     """
     tally = Tally(requirement)
     for record in read_journal(directory):

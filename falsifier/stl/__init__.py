@@ -1,4 +1,4 @@
-"""Signal Temporal Logic: formulas, robustness, and what decided it.
+"""Signal Temporal Logic: formulas, robustness, critical time and diagnosis.
 
 >>> formula = parse("G[0,20] (speed <= 120)")
 >>> formula.signals, formula.horizon()

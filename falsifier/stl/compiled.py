@@ -1,4 +1,4 @@
-"""Numba's decorator with a cache that can be written wherever the package is installed."""
+"""Numba's decorator, with an on-disk cache that works even if the package folder is read-only."""
 
 import os
 import tempfile
@@ -10,15 +10,15 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
-    """Compile a function at its first call and keep the machine code for later processes.
+    """Compile a function at its first call and cache the machine code for later processes.
 
-    Numba keeps it beside the source or in the user's cache folder. Where it can write neither (a read-only
-    container without a home) it goes to a folder for temporary files, and where that is not this user's own,
-    nowhere.
+    Numba writes the cache next to the source or to the user's cache folder. If both are read-only (for
+    example in a container without a home directory), a temporary folder is used; if that belongs to another
+    user, nothing is cached.
 
     Args:
-        function: to compile.
-        forceinline: whether its machine code is copied to where it is called.
+        function: the function to compile.
+        forceinline: whether to inline its machine code at every call.
     """
     import numba
 
@@ -26,7 +26,7 @@ def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
 
     try:
         result: _Function = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # no folder that can be written
+    except RuntimeError:  # numba found no writable cache folder
         folder = _own_temporary_folder()
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)
@@ -35,7 +35,7 @@ def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
 
 
 def _own_temporary_folder() -> Path | None:
-    """Folder for temporary files that nobody else can write to: machine code is loaded from it."""
+    """Return a temporary folder that no other user can write to, because machine code is loaded from it."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"falsifier-numba-{user}"
     try:

@@ -1,8 +1,8 @@
-"""Compiles a formula for one time grid.
+"""Compiler from a formula to a program for one time grid.
 
-Every distinct sub-formula and expression gets the samples at which the formula's value needs it, a place in
-one flat buffer, and the steps that fill it. Nothing outside those samples is computed; a part that stands in
-a formula twice is computed once.
+First pass (``demand``): determine at which samples each sub-formula and expression is needed. Second pass
+(``place``): assign each a place in one flat buffer and emit the steps that fill it. Samples that are not
+needed are not computed; a part that occurs twice in a formula is computed once.
 """
 
 import math
@@ -28,7 +28,7 @@ from falsifier.stl.formula import (
 )
 from falsifier.stl.program import Part, Place, Program
 
-_BOUND_TOLERANCE = 1e-6  # of one sampling step
+_BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
 _ARITHMETIC = {"+": op.ADD, "-": op.SUBTRACT, "*": op.MULTIPLY, "/": op.DIVIDE, "^": op.POWER}
 _FUNCTIONS = {
     "abs": op.ABS, "sqrt": op.SQRT, "exp": op.EXP, "log": op.LOG, "sin": op.SIN, "cos": op.COS,
@@ -38,17 +38,17 @@ Node = Formula | Expression
 
 
 def compile_formula(formula: Formula, *, step: float, samples: int, first: int = 0, last: int = 0) -> Program:
-    """Compile a formula for trajectories of one grid.
+    """Compile a formula for trajectories on one time grid.
 
     Args:
-        formula: what to compute.
+        formula: the formula.
         step: sampling step in s.
         samples: number of samples of a trajectory.
-        first: first sample at which the formula's value is wanted.
-        last: last such sample.
+        first: first sample at which the formula's robustness is needed.
+        last: last sample at which it is needed.
 
     Raises:
-        FormulaError: naming the window that reaches past the end or is no multiple of the step.
+        FormulaError: naming the window that ends after the trajectory or is not a multiple of the step.
     """
     compiler = _Compiler(formula, step, samples, size=len(formula.signals) * samples)
     compiler.demand(formula, first, last)
@@ -57,10 +57,10 @@ def compile_formula(formula: Formula, *, step: float, samples: int, first: int =
 
 
 def window_samples(window: Window, step: float) -> tuple[int, int]:
-    """Bounds of a window in samples.
+    """Return the bounds of a window in samples.
 
     Raises:
-        FormulaError: when a bound is not a multiple of the step.
+        FormulaError: if a bound is not a multiple of the step.
     """
     start, end = (_bound_samples(bound, window, step) for bound in (window.start, window.end))
     return start, end
@@ -88,10 +88,10 @@ class _Compiler:
     checked: dict[int, tuple[Predicate, Place]] = field(default_factory=dict)
     size: int = 0
 
-    # -- where each part is needed -----------------------------------------------------------------------
+    # -- at which samples each part is needed ------------------------------------------------------------
 
     def demand(self, node: Node, first: int, last: int) -> None:
-        """Note that a part is needed at the samples from first to last, and all that this needs below it."""
+        """Record that a part, and everything below it, is needed at the samples from first to last."""
         if last >= self.samples:
             self._fail_past_end(node, last)
         reach = (first, last)
@@ -115,16 +115,16 @@ class _Compiler:
         what = f"the window {window} of {node}" if window else f"{node}"
         hint = "shorten the windows or simulate longer"
         if any(isinstance(f, Always | Eventually | Until) and f.window is None for f in self.formula.walk()):
-            hint += "; an operator without a window reaches to the stop time: give it one that ends earlier"
+            hint += "; an operator without a window extends to the stop time: give it one that ends earlier"
         raise FormulaError(
-            f"{what} is needed up to {number_text(round(last * self.step, 9))} s, but the trajectory ends at "
-            f"{number_text(round(end, 9))} s; {hint}"
+            f"{what} needs values up to {number_text(round(last * self.step, 9))} s, but the trajectory ends "
+            f"at {number_text(round(end, 9))} s; {hint}"
         )
 
     # -- the steps ---------------------------------------------------------------------------------------
 
     def place(self, node: Node) -> Place:
-        """Emit the steps of a part, once, and return where its values lie."""
+        """Emit the steps of a part, only once, and return the place of its values."""
         if node not in self.places:
             if isinstance(node, Expression):
                 self.places[node] = self._expression(node)
@@ -143,7 +143,7 @@ class _Compiler:
         p: float = 0.0,
         q: float = 0.0,
     ) -> int:
-        """Append one step and return the offset of what it writes."""
+        """Append one step and return the offset of its result."""
         self.rows.append((code, self.size, first, second, length, width))
         self.numbers.append((p, q))
         self.size += length
@@ -180,6 +180,7 @@ class _Compiler:
     def _arithmetic(self, node: Arithmetic, first: int, n: int) -> int:
         left, right, operator = node.left, node.right, node.operator
         if operator == "^" and not right.signals and _constant(right) == 2:
+            # One multiplication is much faster than pow, and squares are frequent.
             base = self.place(left).at(first)
             return self._emit(op.MULTIPLY, base, base, length=n)
         if not right.signals and operator in "+-*":
@@ -258,10 +259,11 @@ class _Compiler:
         return Place(offset - first, first, last)
 
     def _until(self, node: Until, first: int, last: int) -> Place:
-        """Emit until as: left up to the window, then both within it, and until itself from there to the end.
+        """Emit ``l U[a,b] r`` as ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, in samples.
 
-        Beyond its window an unbounded until only says that left goes on holding, so the three together are
-        the bounded one.
+        The three parts together are equivalent to the bounded until, and each takes linear time. The
+        unbounded until in the last part ensures that l holds from a until r does; the middle part bounds
+        when.
         """
         left, right = (self.place(child) for child in node.children)
         if node.window is None:
@@ -282,7 +284,7 @@ class _Compiler:
         return Place(offset - first, first, last)
 
     def part(self, node: Formula) -> Part:
-        """Sub-formula with its place and all below it."""
+        """Return a sub-formula with its place and all parts below it."""
         window: tuple[int, int | None] | None = None
         if isinstance(node, Always | Eventually | Until):
             window = window_samples(node.window, self.step) if node.window else (0, None)
@@ -290,7 +292,7 @@ class _Compiler:
         return Part(node, str(node), self.places[node], window, self.samples, children)
 
     def program(self) -> Program:
-        """Return what was compiled."""
+        """Return the compiled program; ``place`` must have been called before."""
         return Program(
             self.part(self.formula),
             self.formula.signals,
@@ -306,7 +308,9 @@ class _Compiler:
 def _constant(node: Expression) -> float:
     value = float(node.evaluate({}))
     if not math.isfinite(value):
-        raise FormulaError(f"the constant {node} has no finite value")
+        raise FormulaError(
+            f"the constant {node} has no finite value; write a number or correct the expression"
+        )
     return value
 
 

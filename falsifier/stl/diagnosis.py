@@ -1,4 +1,4 @@
-"""Why a robustness value is what it is, for people, prompts and plots."""
+"""Why a robustness value is what it is, in words and as data for plots."""
 
 from dataclasses import dataclass
 
@@ -21,18 +21,18 @@ from falsifier.stl.formula import (
     Until,
 )
 from falsifier.stl.program import Part
-from falsifier.stl.witness import trace
+from falsifier.stl.witness import path_to_decider
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One formula on the way to the predicate that decided.
+    """One formula on the path to the deciding predicate.
 
     Attributes:
         formula: the formula.
-        time: where its value was asked for, in s.
-        value: its robustness there.
-        window: begin and end in s of what its operator looked at; None without a window.
+        time: time in s at which it was evaluated.
+        value: its robustness at that time.
+        window: start and end in s of its operator's window; None if it has no window.
         text: what happened here, in words.
     """
 
@@ -45,14 +45,14 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Vacuity:
-    """An implication whose left side was never true at any time at which it was asked.
+    """An implication whose condition was false at every time at which it was evaluated.
 
     Attributes:
         implication: the implication.
-        window: first and last time in s at which it was asked.
-        nearest: time in s at which the left side came nearest to being true.
-        margin: robustness of the left side there.
-        only: whether the implication held only for that reason, as its right side failed somewhere.
+        window: first and last time in s at which it was evaluated.
+        nearest: time in s at which the condition came closest to being true.
+        margin: robustness of the condition at that time.
+        only: whether the implication held only for that reason, because its consequence failed at some time.
     """
 
     implication: Implies
@@ -65,25 +65,25 @@ class Vacuity:
     def text(self) -> str:
         """The finding in words."""
         over = _moment(self.window)
-        near = f"it missed by {_n(-self.margin)}"
+        near = f"it was false by {_n(-self.margin)}"
         if self.window[0] < self.window[1]:
-            near = f"it came nearest at {_s(self.nearest)}, missing by {_n(-self.margin)}"
+            near = f"it came closest at {_s(self.nearest)}, false by {_n(-self.margin)}"
         if self.only:
             return (
-                f"Vacuous: {self.implication} held {over} only because its left side was never true; {near}."
+                f"Vacuous: {self.implication} held {over} only because its condition was never true; {near}."
             )
-        return f"The left side of {self.implication} was never true {over}; {near}."
+        return f"The condition of {self.implication} was never true {over}; {near}."
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The way from a formula to the predicate that decided its value.
+    """The path from a formula to the predicate that decided its robustness.
 
     Attributes:
-        robustness: of the formula at time 0.
+        robustness: robustness of the formula at time 0.
         critical_time: time in s that decided it.
         path: from the formula down to the deciding predicate.
-        vacuities: implications whose left side was never true.
+        vacuities: implications whose condition was never true.
     """
 
     robustness: float
@@ -93,32 +93,33 @@ class Diagnosis:
 
     @property
     def vacuous(self) -> bool:
-        """Whether an implication held only because its left side was never true."""
+        """Whether an implication held only because its condition was never true."""
         return any(v.only for v in self.vacuities)
 
     @property
     def text(self) -> str:
-        """The way in words, and what was vacuous."""
-        way = ", where ".join(step.text for step in self.path)
-        return " ".join((f"{way}.", *(v.text for v in self.vacuities)))
+        """The path in words, followed by the vacuous implications."""
+        *above, predicate = (step.text for step in self.path)
+        decided = f"{'; '.join(above)}: {predicate}" if above else predicate
+        return " ".join((f"{decided}.", *(v.text for v in self.vacuities)))
 
 
 def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
-    """Diagnosis of an evaluated formula.
+    """Return the diagnosis of an evaluated formula.
 
     Args:
         root: the compiled formula.
         buffer: values of all its parts.
-        trajectory: what was judged.
+        trajectory: the trajectory on which it was evaluated.
     """
     times = trajectory.times
-    way = trace(root, buffer)
+    path = path_to_decider(root, buffer)
     steps = []
-    for here, following in zip(way, [*way[1:], way[-1]], strict=True):
+    for here, following in zip(path, [*path[1:], path[-1]], strict=True):
         formula, time = here.part.formula, float(times[here.sample])
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
         if isinstance(formula, Predicate):
-            text = _judged(formula, here.value, trajectory.at(time))
+            text = _comparison(formula, here.value, trajectory.at(time))
         else:
             decided_at = float(times[following.sample])
             text = _words(formula, following.part.formula, window, decided_at, here.value)
@@ -126,8 +127,8 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
     vacuities = {
         v.implication: v for part in root.walk() for v in [_vacuity(part, buffer, times)] if v is not None
     }
-    critical = float(times[way[-1].sample])
-    return Diagnosis(way[0].value, critical, tuple(steps), tuple(vacuities.values()))
+    critical = float(times[path[-1].sample])
+    return Diagnosis(path[0].value, critical, tuple(steps), tuple(vacuities.values()))
 
 
 def _vacuity(part: Part, buffer: NDArray[np.float64], times: NDArray[np.float64]) -> Vacuity | None:
@@ -149,30 +150,37 @@ def _words(
 ) -> str:
     match formula:
         case Always():
-            return f"G {_over(window)} was worst at {_s(time)}"
+            return f"G {_over(window)} was lowest at {_s(time)}"
         case Eventually():
-            return f"F {_over(window)} was best at {_s(time)}"
+            return f"F {_over(window)} was highest at {_s(time)}"
         case Until(left, _):
             side = "left" if decider is left else "right"
             return f"U {_over(window)} was decided by its {side} side at {_s(time)}"
         case Next():
-            return f"X looked at {_s(time)}"
+            return f"the next sample is at {_s(time)}"
         case Not():
-            return f"not {'holds' if value >= 0 else 'fails'}"
+            return f"'not' {'holds' if value >= 0 else 'fails'}"
         case Implies(left, _):
-            return "the condition of -> decided" if decider is left else "the consequence of -> decided"
+            if decider is left:
+                return "the condition of -> decided"
+            return f"the consequence of -> {'decided' if value >= 0 else 'failed'}"
         case And(left, _) | Or(left, _) | Iff(left, _):
             name = {And: "and", Or: "or", Iff: "<->"}[type(formula)]
             return f"the {'left' if decider is left else 'right'} side of '{name}' decided"
     return ""
 
 
-def _judged(predicate: Predicate, value: float, values: dict[str, float]) -> str:
+def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:
+    """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
     left, right = (_valued(side, values) for side in (predicate.left, predicate.right))
-    outcome = f"misses by {_n(-value)}" if value < 0 else f"holds by {_n(value)}"
     if value == 0:
-        outcome = "holds with nothing to spare"
-    return f"{left} {predicate.operator} {right} {outcome}"
+        return f"{left} equals {right}"
+    if predicate.operator in ("==", "!="):
+        relation = "differs from"
+    else:
+        is_left_larger = (value > 0) == (predicate.operator in (">", ">="))
+        relation = "exceeds" if is_left_larger else "is below"
+    return f"{left} {relation} {right} by {_n(abs(value))}"
 
 
 def _valued(side: Expression, values: dict[str, float]) -> str:

@@ -1,4 +1,4 @@
-"""Runs a compiled formula on trajectories and says what is wrong with those that cannot be judged."""
+"""Runs a compiled formula on trajectories and explains why a trajectory cannot be evaluated."""
 
 from collections.abc import Mapping
 from types import ModuleType
@@ -18,11 +18,11 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
 
     Args:
         program: the compiled formula.
-        trajectory: what was simulated.
-        buffer: room for all values, shape (program.size,); written.
+        trajectory: the trajectory.
+        buffer: receives all values, shape (program.size,).
 
     Raises:
-        MonitorError: when the trajectory cannot be judged.
+        MonitorError: if the trajectory cannot be evaluated.
     """
     kernels = _kernels()
     n, times = program.samples, trajectory.times
@@ -41,10 +41,10 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
         return buffer
     if status == kernels.BAD_TIME:
         raise MonitorError(
-            f"the time grid is not uniform: sample {position} lies at {times[position]:g} s, expected "
+            f"the time grid is not uniform: sample {position} is at {times[position]:g} s, expected "
             f"{position * program.step:g} s"
         )
-    raise MonitorError(_complaint(program, buffer, status, position))
+    raise MonitorError(_problem(program, buffer, status, position))
 
 
 def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
@@ -52,10 +52,10 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
 
     Args:
         program: the compiled formula.
-        columns: samples of all trajectories by signal, shape (m, n) each.
+        columns: samples of all trajectories by signal name, shape (m, n) each.
 
     Raises:
-        MonitorError: naming the trajectory and the signal that cannot be judged.
+        MonitorError: naming the first trajectory that cannot be evaluated, and the signal.
     """
     kernels = _kernels()
     for name in program.signals:
@@ -71,7 +71,7 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
     root = program.root.place.at(0)
     status, which, position = kernels.judge_many(program.rows, program.numbers, buffer, stacked, root, result)
     if status != kernels.FINE:
-        raise MonitorError(f"trajectory {which}: {_complaint(program, buffer, status, position)}")
+        raise MonitorError(f"trajectory {which}: {_problem(program, buffer, status, position)}")
     return result
 
 
@@ -81,7 +81,7 @@ def _kernels() -> ModuleType:
     return kernels
 
 
-def _complaint(program: Program, buffer: Floats, status: int, position: int) -> str:
+def _problem(program: Program, buffer: Floats, status: int, position: int) -> str:
     n = program.samples
     if status == _kernels().BAD_SIGNAL:
         signal, sample = divmod(position, n)
@@ -94,5 +94,5 @@ def _complaint(program: Program, buffer: Floats, status: int, position: int) -> 
     values = ", ".join(f"{side} = {float(side.evaluate(here)):g}" for side in sides)
     return (
         f"{predicate} has no finite value at {sample * program.step:g} s, where {values}; "
-        "/, sqrt, log, exp and ^ must stay where they are defined"
+        "the operands of /, sqrt, log, exp and ^ must stay in their domain"
     )

@@ -1,7 +1,7 @@
 """Arithmetic over signals: the terms that predicates compare.
 
-An expression is an immutable tree. ``str(expression)`` is a text that parses to the same tree, and
-``expression.evaluate(columns)`` its value, for whole columns or for single numbers.
+An expression is an immutable tree. ``str(expression)`` parses back to the same tree;
+``expression.evaluate(columns)`` computes its value, for whole columns or for single numbers.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -33,7 +33,7 @@ OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
     "^": np.float_power,
 }
 
-# How tightly a form binds; the parser climbs the same ladder. Formulas hold the levels below.
+# Precedence levels, also used by the parser; the levels of formulas (formula.py) are lower.
 SUM, PRODUCT, SIGN, POWER, ATOM = 7, 8, 9, 10, 11
 
 
@@ -60,10 +60,10 @@ class Expression:
         return tuple(dict.fromkeys(e.name for e in self.walk() if isinstance(e, Name)))
 
     def evaluate(self, columns: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Value over columns by name, in the shape that they have; a constant is a number.
+        """Return the value, in the shape of the given columns; that of a constant has no dimension.
 
-        Where the value is not defined (square root of a negative number, division by zero) it is NaN or
-        infinite, without a warning.
+        Outside the domain (square root of a negative number, division by zero) the value is NaN or infinite;
+        there is no warning.
         """
         with np.errstate(all="ignore"):
             value: NDArray[np.float64] = np.asarray(self._value(columns), dtype=np.float64)
@@ -81,7 +81,7 @@ class Number(Expression):
 
     @property
     def binding(self) -> int:  # type: ignore[override]
-        """A negative number binds like a sign."""
+        """That of a unary minus for a negative number, which needs parentheses in the same places."""
         return SIGN if self.value < 0 else ATOM
 
     def __str__(self) -> str:
@@ -93,7 +93,7 @@ class Number(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Name(Expression):
-    """A signal by the name that the model gives it."""
+    """A signal, by its name in the model."""
 
     name: str
 
@@ -133,7 +133,7 @@ class Arithmetic(Expression):
 
     @property
     def binding(self) -> int:  # type: ignore[override]
-        """Binding of the operator."""
+        """Precedence of the operator."""
         return {"+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "^": POWER}[self.operator]
 
     @property
@@ -153,7 +153,7 @@ class Arithmetic(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Call(Expression):
-    """A function of one expression, or the smallest or largest of several."""
+    """A function of one expression, or the minimum or maximum of several."""
 
     function: Function
     operands: tuple[Expression, ...]
@@ -172,12 +172,12 @@ class Call(Expression):
 
 
 def embraced(part: Any, binding: int) -> str:
-    """Text of a part, in parentheses where it binds less tightly than its place asks."""
+    """Return the text of a part, in parentheses if its precedence is lower than ``binding``."""
     return str(part) if part.binding >= binding else f"({part})"
 
 
 def number_text(value: float) -> str:
-    """Shortest text that reads back as this number.
+    """Return the shortest text that parses to this number.
 
     >>> number_text(120.0), number_text(0.05), number_text(1e-7)
     ('120', '0.05', '1e-07')

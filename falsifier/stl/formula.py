@@ -1,7 +1,7 @@
 """Formulas of Signal Temporal Logic as immutable trees.
 
-``falsifier.stl.parse`` makes them from text and ``str(formula)`` is a text that parses to the same tree.
-Engines and prompts walk them: ``formula.walk()``, ``formula.children``, ``formula.predicates``.
+``falsifier.stl.parse`` builds them from text; ``str(formula)`` parses back to the same tree. To inspect one,
+use ``formula.walk()``, ``formula.children`` and ``formula.predicates``.
 """
 
 from collections.abc import Iterator
@@ -12,16 +12,16 @@ from falsifier.stl.expression import SUM, Expression, Name, Number, embraced, nu
 
 Comparison = Literal["<", "<=", ">", ">=", "==", "!="]
 
-# How tightly a form binds, from the loosest; expressions continue the ladder.
+# Precedence levels, lowest first; those of expressions (expression.py) follow.
 EQUIVALENCE, IMPLICATION, DISJUNCTION, CONJUNCTION, UNTIL, PREFIX, COMPARISON = range(7)
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A closed interval of times relative to where a temporal operator stands.
+    """The closed time interval of a temporal operator, relative to the time at which it is evaluated.
 
     Attributes:
-        start: begin in s.
+        start: start in s.
         end: end in s.
     """
 
@@ -33,7 +33,7 @@ class Window:
 
 
 class Formula:
-    """A formula of Signal Temporal Logic; the classes below are its forms."""
+    """A formula of Signal Temporal Logic; base of the classes below."""
 
     __slots__ = ()
     binding: ClassVar[int] = PREFIX
@@ -62,26 +62,28 @@ class Formula:
 
     @property
     def expressions(self) -> tuple[Expression, ...]:
-        """Compared expressions that are more than a signal or a number: signals of their own, for plots.
+        """Compared expressions other than single signals and numbers: derived signals, worth plotting.
 
-        ``expression.evaluate(trajectory.columns)`` gives one over a trajectory.
+        ``expression.evaluate(trajectory.columns)`` returns the values on a trajectory.
         """
         sides = dict.fromkeys(side for p in self.predicates for side in (p.left, p.right))
         return tuple(side for side in sides if side.signals and not isinstance(side, Name))
 
     def horizon(self, step: float = 0.0) -> float:
-        """Seconds of trajectory that the value at time 0 needs at least.
+        """Return the minimum length in s of a trajectory on which the formula can be evaluated at time 0.
+
+        An operator without a window extends to the end of the trajectory, however long that is, and adds
+        nothing.
 
         Args:
-            step: sampling step in s; each ``X`` on the way needs one. An operator without a bound reaches to
-                the end of the trajectory, however long that is, and needs nothing of itself.
+            step: sampling step in s; each ``X`` adds one.
         """
         return max((child.horizon(step) for child in self.children), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Predicate(Formula):
-    """A comparison of two expressions; its robustness is the signed margin, 0 where both are equal."""
+    """A comparison of two expressions; its robustness is the signed margin, 0 if both are equal."""
 
     operator: Comparison
     left: Expression
@@ -143,7 +145,7 @@ class Or(Formula):
 
 @dataclass(frozen=True, slots=True)
 class Implies(Formula):
-    """Implication, the same as ``not left or right``."""
+    """Implication, equivalent to ``not left or right``."""
 
     left: Formula
     right: Formula
@@ -160,7 +162,7 @@ class Implies(Formula):
 
 @dataclass(frozen=True, slots=True)
 class Iff(Formula):
-    """Equivalence, the same as both implications joined by ``and``."""
+    """Equivalence, the conjunction of both implications."""
 
     left: Formula
     right: Formula
@@ -188,7 +190,7 @@ class Always(Formula):
         return (self.operand,)
 
     def horizon(self, step: float = 0.0) -> float:
-        """See Formula.horizon."""
+        """Return the end of the window plus the operand's horizon, in s."""
         return _end(self.window) + self.operand.horizon(step)
 
     def __str__(self) -> str:
@@ -197,7 +199,7 @@ class Always(Formula):
 
 @dataclass(frozen=True, slots=True)
 class Eventually(Formula):
-    """The operand holds somewhere in the window; without a window, before the end of the trajectory."""
+    """The operand holds at some time in the window; without a window, before the trajectory ends."""
 
     operand: Formula
     window: Window | None = None
@@ -208,7 +210,7 @@ class Eventually(Formula):
         return (self.operand,)
 
     def horizon(self, step: float = 0.0) -> float:
-        """See Formula.horizon."""
+        """Return the end of the window plus the operand's horizon, in s."""
         return _end(self.window) + self.operand.horizon(step)
 
     def __str__(self) -> str:
@@ -217,7 +219,7 @@ class Eventually(Formula):
 
 @dataclass(frozen=True, slots=True)
 class Until(Formula):
-    """The right operand holds somewhere in the window, and the left one from now to then, both included."""
+    """The right operand holds at some time in the window, the left one from now until then inclusive."""
 
     left: Formula
     right: Formula
@@ -230,7 +232,7 @@ class Until(Formula):
         return (self.left, self.right)
 
     def horizon(self, step: float = 0.0) -> float:
-        """See Formula.horizon."""
+        """Return the end of the window plus the larger horizon of the operands, in s."""
         return _end(self.window) + max(self.left.horizon(step), self.right.horizon(step))
 
     def __str__(self) -> str:
@@ -249,7 +251,7 @@ class Next(Formula):
         return (self.operand,)
 
     def horizon(self, step: float = 0.0) -> float:
-        """See Formula.horizon."""
+        """Return one sampling step plus the operand's horizon, in s."""
         return step + self.operand.horizon(step)
 
     def __str__(self) -> str:
@@ -257,7 +259,7 @@ class Next(Formula):
 
 
 def is_flag(predicate: Predicate) -> bool:
-    """Whether a predicate reads a Boolean signal: ``b`` alone in a formula means ``b >= 0.5``."""
+    """Whether a predicate is a Boolean signal: ``b`` alone in a formula means ``b >= 0.5``."""
     return predicate.operator == ">=" and isinstance(predicate.left, Name) and predicate.right == Number(0.5)
 
 
@@ -266,5 +268,5 @@ def _end(window: Window | None) -> float:
 
 
 def _prefixed(operand: Formula) -> str:
-    # Predicates need no parentheses here, but readers do.
+    # The grammar needs no parentheses around a predicate; they are for the reader.
     return embraced(operand, PREFIX) if not isinstance(operand, Predicate) else f"({operand})"

@@ -1,9 +1,9 @@
 """Compiled loops: one call evaluates a whole formula, on one trajectory or on many.
 
-Importing this module imports numba, so the monitor does it when it judges its first trajectory. Sliding
-windows take linear time whatever their length, by van Herk's algorithm (M. van Herk, "A fast algorithm for
-local minimum and maximum filters on rectangular and octagonal kernels", Pattern Recognition Letters 13,
-1992).
+Importing this module imports numba, so the monitor does so only when it evaluates its first trajectory.
+Sliding windows take linear time for any window length, with van Herk's algorithm (M. van Herk, "A fast
+algorithm for local minimum and maximum filters on rectangular and octagonal kernels", Pattern Recognition
+Letters 13, 1992).
 """
 
 from typing import Any
@@ -17,22 +17,22 @@ from falsifier.stl.compiled import compiled
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# What can be wrong with a trajectory: its time grid, a signal's sample, the value of a step.
+# Status of an evaluation: fine, uneven time grid, non-finite sample of a signal, non-finite result of a step.
 FINE, BAD_TIME, BAD_SIGNAL, BAD_STEP = 0, 1, 2, 3
 
-_TIME_TOLERANCE = 1e-6  # of one sampling step
+_TIME_TOLERANCE = 1e-6  # as a fraction of one sampling step
 
 
 @compiled
 def judge(
     program: Integers, numbers: Floats, buffer: Floats, signal_size: int, times: Floats, step: float
 ) -> tuple[int, int]:
-    """Check one trajectory and evaluate a program on it; return what is wrong and where.
+    """Check one trajectory and evaluate a program on it; return a status and the position of the problem.
 
     Args:
         program: rows as described in opcodes, shape (r, 6).
         numbers: two constants for each row, shape (r, 2).
-        buffer: signals, one after the other, then room for the results of all rows.
+        buffer: all signals, one after the other, then space for the results of all rows.
         signal_size: length of the signals' part.
         times: time grid in s, shape (n,).
         step: sampling step in s that the grid must have.
@@ -47,15 +47,15 @@ def judge(
 def judge_many(
     program: Integers, numbers: Floats, buffer: Floats, columns: Any, root: int, result: Floats
 ) -> tuple[int, int, int]:
-    """Evaluate a program on many trajectories; return what is wrong, in which one and where.
+    """Evaluate a program on many trajectories; return a status, the trajectory's index and the position.
 
     Args:
         program: see judge.
         numbers: see judge.
         buffer: see judge.
-        columns: for each signal the samples of all trajectories, shape (k, m, n).
+        columns: samples by signal and trajectory, shape (k, m, n).
         root: offset of the formula's value at time 0.
-        result: robustness of each trajectory, shape (m,); written.
+        result: receives the robustness of each trajectory, shape (m,).
     """
     signals, count, samples = columns.shape
     for j in range(count):
@@ -160,9 +160,9 @@ def _temporal(code: int, out: Floats, a: Floats, b: Floats) -> None:
 
 @compiled
 def _slide(out: Floats, a: Floats, sign: float) -> None:
-    """Minimum (sign 1) or maximum (sign -1) of each window of a that begins at a sample of out.
+    """Write to ``out`` the minimum (sign 1) or maximum (sign -1) of ``a`` over the window from each sample.
 
-    Blocks are as long as a window, so each window is the rest of one block and the beginning of the next.
+    Blocks are as long as a window, so each window consists of the end of one block and the start of the next.
     """
     length, width = out.size, a.size - out.size
     if length == 1:
@@ -191,7 +191,8 @@ def _smallest(a: Floats, sign: float) -> float:
 
 @compiled
 def _first_infinite(a: Floats) -> int:
-    """Position of the first value that is NaN or infinite, -1 where there is none."""
+    """Return the position of the first value that is NaN or infinite, -1 if there is none."""
+    # The first loop has no branch, so it is vectorised; the search runs only if there is something to find.
     count = 0
     for i in range(a.size):
         count += a[i] - a[i] != 0.0
@@ -204,7 +205,7 @@ def _first_infinite(a: Floats) -> int:
 
 @compiled
 def _first_uneven(times: Floats, step: float) -> int:
-    """Position of the first sample that does not lie on the grid 0, step, 2*step, ...; -1 if all do."""
+    """Return the position of the first sample that is not on the grid 0, step, 2*step, ...; -1 if all are."""
     count = 0
     tolerance = _TIME_TOLERANCE * step
     for i in range(times.size):

@@ -1,4 +1,4 @@
-"""Text to tokens, and errors that point into the text."""
+"""Tokens of a formula's text, and errors that point to a position in it."""
 
 import re
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _SPELLINGS = {
 }  # fmt: skip
 _HINTS = {
     "=": "equality is ==",
-    "%": "write the plain number, without a percent sign",
+    "%": "write the number without a percent sign",
     "'": "a single quote opens a Modelica name and needs a second one",
     '"': "a double quote opens a name and needs a second one",
     "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
@@ -26,13 +26,12 @@ _HINTS = {
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """The smallest piece of a formula's text.
+    """One token of a formula's text.
 
     Attributes:
-        kind: what it is.
-        text: the number, the name as the model has it, or the one spelling of a symbol or reserved word.
-        written: as the formula has it.
-        position: where it begins, from 0.
+        kind: its kind.
+        text: the number, the signal's name in the model, or the canonical spelling of a symbol or reserved
+        word. written: the text as written in the formula. position: position of its first character, from 0.
     """
 
     kind: Literal["number", "name", "symbol", "end"]
@@ -42,31 +41,31 @@ class Token:
 
     @property
     def end(self) -> int:
-        """Position behind it."""
+        """Position after its last character."""
         return self.position + len(self.written)
 
     @property
     def shown(self) -> str:
-        """How error messages call it."""
+        """How error messages refer to it."""
         return "the end" if self.kind == "end" else repr(self.written)
 
 
 def tokenize(text: str) -> list[Token]:
-    """Tokens of a text; the last one is its end.
+    """Return the tokens of a text; the last one marks its end.
 
     Raises:
-        FormulaError: pointing at a character that begins no token.
+        FormulaError: pointing at a character that cannot start a token.
     """
     tokens: list[Token] = []
-    position = _behind_space(text, 0)
+    position = _after_space(text, 0)
     while position < len(text):
         tokens.append(_token(text, position))
-        position = _behind_space(text, tokens[-1].end)
+        position = _after_space(text, tokens[-1].end)
     return [*tokens, Token("end", "", "", len(text.rstrip()))]
 
 
 def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaError:
-    """Error with the line that it is about, a caret under the position (counted from 0) and a hint."""
+    """Return an error that shows the line, a caret under the position (counted from 0) and a hint."""
     start = text.rfind("\n", 0, position) + 1
     line = text[start:].split("\n", 1)[0].rstrip()
     caret = " " * (position - start) + "^"
@@ -82,10 +81,12 @@ def _token(text: str, position: int) -> Token:
         return Token("name", name[0], text[position : name[1]], position)
     if symbol := _SYMBOL.match(text, position):
         return Token("symbol", _SPELLINGS.get(symbol[0], symbol[0]), symbol[0], position)
-    hint = _HINTS.get(text[position], "it has no meaning in a formula; names with it need double quotes")
+    hint = _HINTS.get(
+        text[position], "it has no meaning in a formula; put names that contain it in double quotes"
+    )
     raise syntax_error(text, f"unexpected character {text[position]!r}", position, hint)
 
 
-def _behind_space(text: str, position: int) -> int:
+def _after_space(text: str, position: int) -> int:
     space = _SPACE.match(text, position)
     return space.end() if space else position

@@ -1,4 +1,4 @@
-"""The monitor: robustness, critical time and diagnosis of a formula on trajectories of one time grid."""
+"""The monitor: robustness, critical time and diagnosis of a formula on trajectories with one time grid."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,20 +16,20 @@ from falsifier.stl.evaluator import fill, fill_many
 from falsifier.stl.formula import Formula
 from falsifier.stl.program import Program
 from falsifier.stl.verdict import Verdict
-from falsifier.stl.witness import trace
+from falsifier.stl.witness import path_to_decider
 
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
-    """A formula, compiled for one time grid when the monitor is made.
+    """A formula, compiled for one time grid when the monitor is created.
 
     Attributes:
-        formula: the requirement.
+        formula: the formula.
         step: sampling step of the trajectories in s.
-        samples: their number of samples, both ends included.
+        samples: their number of samples, including both ends.
 
     Raises:
-        FormulaError: when a window reaches past the end of the grid or a bound is no multiple of the step.
+        FormulaError: if a window extends past the end of the grid or a bound is not a multiple of the step.
     """
 
     formula: Formula
@@ -45,34 +45,34 @@ class Monitor:
             )
         program = compile_formula(self.formula, step=self.step, samples=self.samples)
         object.__setattr__(self, "_program", program)
-        object.__setattr__(self, "_spare", [])  # buffers of finished evaluations, to be written over
+        object.__setattr__(self, "_spare", [])  # buffers of earlier evaluations, for reuse
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel as what it was made from and compile again on arrival."""
+        """Pickle the arguments only; the formula is compiled again on unpickling."""
         return Monitor, (self.formula, self.step, self.samples)
 
     def evaluate(self, trajectory: Trajectory) -> Verdict:
-        """Robustness at time 0 and what decided it.
+        """Return the robustness at time 0 and what decided it.
 
         Raises:
-            MonitorError: when the trajectory cannot be judged: other time grid, missing signal, NaN or inf.
+            MonitorError: if the trajectory cannot be evaluated: other time grid, missing signal, NaN or inf.
         """
         buffer = fill(self._program, trajectory, self._take_buffer())
-        way = trace(self._program.root, buffer)
+        path = path_to_decider(self._program.root, buffer)
         self._spare.append(buffer)
-        decider, sample = way[-1].part, way[-1].sample
+        decider, sample = path[-1].part, path[-1].sample
         time = trajectory.times.item(sample)
         values = {name: float(column.item(sample)) for name, column in trajectory.columns.items()}
         for name, value in values.items():
             if not isfinite(value):
                 raise MonitorError(f"signal {name!r} is {value} at {time:g} s")
-        return Verdict(way[0].value, time, decider.text, values)
+        return Verdict(path[0].value, time, decider.text, values)
 
     def diagnose(self, trajectory: Trajectory) -> Diagnosis:
-        """Way from the formula to the predicate that decided its value, in words too, and vacuity.
+        """Return the path from the formula to the deciding predicate, and the vacuous implications.
 
         Raises:
-            MonitorError: when the trajectory cannot be judged.
+            MonitorError: if the trajectory cannot be evaluated.
         """
         buffer = fill(self._program, trajectory, self._take_buffer())
         diagnosis = diagnose(self._program.root, buffer, trajectory)
@@ -80,16 +80,16 @@ class Monitor:
         return diagnosis
 
     def robustness(self, trajectory: Trajectory, time: float = 0.0) -> dict[Formula, float]:
-        """Robustness of every distinct sub-formula at one time in s.
+        """Return the robustness of every distinct sub-formula at one time in s.
 
-        Sub-formulas whose windows reach past the end from there are left out; at time 0 there are none.
+        Sub-formulas whose windows extend past the end from that time are omitted; at time 0 there are none.
 
         Raises:
-            MonitorError: when the trajectory cannot be judged or the time lies outside it.
+            MonitorError: if the trajectory cannot be evaluated or the time is outside it.
         """
         sample = round(time / self.step)
         if not 0 <= sample < self.samples:
-            raise MonitorError(f"{time:g} s lies outside the trajectory, which ends at {self._end:g} s")
+            raise MonitorError(f"{time:g} s is outside the trajectory, which ends at {self._end:g} s")
         result: dict[Formula, float] = {}
         for part in dict.fromkeys(self.formula.walk()):
             if sample + self._reach(part) < self.samples:
@@ -97,29 +97,29 @@ class Monitor:
         return result
 
     def course(self, trajectory: Trajectory, part: Formula | None = None) -> NDArray[np.float64]:
-        """Robustness of a sub-formula, or of the formula, over time.
+        """Return the robustness over time of a sub-formula, or of the whole formula.
 
         Returns:
-            One value per sample from time 0 on, as far as the windows do not reach past the end, shape (k,).
+            One value per sample from time 0 to the last sample from which all windows fit, shape (k,).
 
         Raises:
-            FormulaError: when the part cannot be judged on this grid.
-            MonitorError: when the trajectory cannot be judged.
+            FormulaError: if the part cannot be evaluated on this grid.
+            MonitorError: if the trajectory cannot be evaluated.
         """
         part = self.formula if part is None else part
         return self._values(part, trajectory, 0, self.samples - 1 - self._reach(part))
 
     def batch(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Robustness at time 0 of many trajectories at once.
+        """Return the robustness at time 0 of many trajectories at once.
 
         Args:
-            columns: samples of all trajectories by signal, shape (m, n) each.
+            columns: samples of all trajectories by signal name, shape (m, n) each.
 
         Returns:
             One robustness per trajectory, shape (m,).
 
         Raises:
-            MonitorError: naming the trajectory and the signal that cannot be judged.
+            MonitorError: naming the first trajectory that cannot be evaluated, and the signal.
         """
         return fill_many(self._program, columns)
 

@@ -1,8 +1,8 @@
-"""Names of signals in formulas, as FMUs have them.
+"""Names of FMU variables in formulas.
 
-Plain names are written as they are: ``speed``, ``a.b[1]``, ``x[1,2]``, ``der(x)``, and Modelica names whose
-single quotes belong to the name: ``car.'front left'.v``. Any other name is written in double quotes, which do
-not belong to it: ``"G"``, ``"wheel speed"``.
+Most names need no quotes: ``speed``, ``a.b[1]``, ``x[1,2]``, ``der(x)``, and Modelica names whose single
+quotes are part of the name: ``car.'front left'.v``. Any other name is written in double quotes, which are not
+part of it: ``"G"``, ``"wheel speed"``.
 """
 
 import re
@@ -22,9 +22,9 @@ _QUOTED_PATTERN = re.compile(r'"((?:[^"\\\n]|\\.)+)"')
 
 
 def scan_name(text: str, start: int) -> tuple[str, int] | None:
-    """Name that stands at this position, as the model has it, and where it ends; None if there is none.
+    """Return the variable's name at this position and the position after it; None if there is no name.
 
-    Reserved words are names only inside quotes or as part of a longer name (``G.x``).
+    Reserved words are names only in quotes or as part of a longer name (``G.x``).
     """
     if quoted := _QUOTED_PATTERN.match(text, start):
         return re.sub(r"\\(.)", r"\1", quoted[1]), quoted.end()
@@ -42,7 +42,7 @@ def scan_name(text: str, start: int) -> tuple[str, int] | None:
 
 
 def scan_word(text: str, start: int) -> str | None:
-    """Reserved word that stands at this position, or a function's name before its parenthesis."""
+    """Return the reserved word at this position, or the function name if a parenthesis follows it."""
     match = _WORD_PATTERN.match(text, start)
     if match is None:
         return None
@@ -51,7 +51,7 @@ def scan_word(text: str, start: int) -> str | None:
 
 
 def name_text(name: str) -> str:
-    """How a formula writes this name: as it is where that reads back, else in double quotes.
+    """Return a name as written in a formula: unchanged if it can be parsed that way, else in double quotes.
 
     >>> print(name_text("der(x)"), name_text("G"), name_text("wheel speed"))
     der(x) "G" "wheel speed"

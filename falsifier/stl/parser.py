@@ -1,6 +1,6 @@
-"""Text to formula: exactly one formula, or an error that points at the place.
+"""Parser: exactly one formula, or an error that points to the position of the mistake.
 
-From the loosest to the tightest binding::
+Operators, lowest precedence first::
 
     <->  <=>                        left associative
     ->   =>                         right associative
@@ -15,9 +15,9 @@ From the loosest to the tightest binding::
     ^                               right associative, so -x^2 is -(x^2)
     numbers, names, abs sqrt exp log sin cos min max, parentheses
 
-So ``G[0,5] x <= 3 -> y <= 1`` reads ``(G[0,5] (x <= 3)) -> (y <= 1)``. Windows are closed, in seconds unless
-each bound has a unit (``us ms s min h``); an operator without a window reaches to the stop time. A signal
-that stands alone is a Boolean one: ``b`` means ``b >= 0.5``. Names: see ``falsifier.stl.names``.
+So ``G[0,5] x <= 3 -> y <= 1`` means ``(G[0,5] (x <= 3)) -> (y <= 1)``. Windows are closed intervals, in
+seconds unless each bound has a unit (``us ms s min h``); an operator without a window extends to the stop
+time. A signal on its own is Boolean: ``b`` means ``b >= 0.5``. Names: see ``falsifier.stl.names``.
 """
 
 import math
@@ -65,6 +65,7 @@ from falsifier.stl.formula import (
 from falsifier.stl.lexer import Token, syntax_error, tokenize
 from falsifier.stl.names import FUNCTIONS, RESERVED
 
+# Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100
 UNITS = {"us": (1, 1_000_000), "ms": (1, 1000), "s": (1, 1), "min": (60, 1), "h": (3600, 1)}  # seconds
 
@@ -77,7 +78,7 @@ _RIGHT_ASSOCIATIVE = {"->", "U", "^"}
 _CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
     "<->": Iff, "->": Implies, "or": Or, "and": And,
 }  # fmt: skip
-_CLOSED = "only closed windows in seconds are understood: [a,b]"
+_CLOSED = "only closed windows in seconds are supported: [a,b]"
 _HINTS = {
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
     "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
@@ -91,13 +92,13 @@ def parse(text: str) -> Formula:
     """Parse a text that is exactly one formula.
 
     Raises:
-        FormulaError: with the position, a caret under it and a hint.
+        FormulaError: with the position of the mistake, a caret under it and a hint.
     """
     return _Parser(text).formula()
 
 
 class _Parser:
-    """Precedence climbing over one grammar for formulas and expressions; each operator checks its sides."""
+    """Precedence climbing with one grammar for formulas and expressions; operators check their operands."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -126,15 +127,15 @@ class _Parser:
         if self._next.kind == "end":
             self._fail("the formula is empty", 0, "for example: G[0,20] (speed <= 120)")
         formula = self._as_formula(self._climb(EQUIVALENCE), 0)
-        behind = self._next
-        if behind.kind != "end":
-            self._fail_behind(behind)
+        rest = self._next
+        if rest.kind != "end":
+            self._fail_after(rest)
         if _depth(formula) > MAX_DEPTH:
             self._fail_depth(0)
         return formula
 
     def _climb(self, level: int) -> Node:
-        """Parse everything that binds at least as tightly as this level."""
+        """Parse everything of at least this precedence."""
         self.depth += 1
         if self.depth > MAX_DEPTH:
             self._fail_depth(self._next.position)
@@ -183,7 +184,7 @@ class _Parser:
         if token.kind == "number":
             value = float(token.text)
             if not math.isfinite(value):
-                self._fail(f"the number {token.text} is too large", token.position, "numbers end at 1e308")
+                self._fail(f"the number {token.text} is too large", token.position, "the maximum is 1e308")
             return Number(value)
         if token.kind == "name":
             return self._named(token)
@@ -199,9 +200,9 @@ class _Parser:
         if token.text in ("not", "G", "F", "X"):
             if level > PREFIX:
                 self._fail(
-                    f"{token.shown} opens a formula, but a number or a signal is expected here",
+                    f"{token.shown} starts a formula, but a number or a signal is expected here",
                     token.position,
-                    f'is a parenthesis missing? A signal of that name is written "{token.written}"',
+                    f'is a parenthesis missing? Write a signal of that name as "{token.written}"',
                 )
             return self._prefix(token)
         self._fail_operand(token)
@@ -222,9 +223,9 @@ class _Parser:
                 self._fail(f"unknown function {token.text!r}", token.position, hint)
             if self._next.text == "[":
                 self._fail(
-                    f"{token.text!r} has no index that can be read",
+                    f"the index of {token.text!r} cannot be read",
                     self._next.position,
-                    "indices are whole numbers as in x[1,2]; any other name stands in double quotes",
+                    "indices are integers, as in x[1,2]; put any other name in double quotes",
                 )
         return Name(token.text)
 
@@ -238,7 +239,7 @@ class _Parser:
         if is_pair != (len(operands) > 1):
             wanted = "two or more expressions" if is_pair else "one expression"
             self._fail(
-                f"{token.text} takes {wanted}, got {len(operands)}", token.position, "check the commas"
+                f"{token.text} expects {wanted}, got {len(operands)}", token.position, "check the commas"
             )
         return Call(cast(Function, token.text), tuple(operands))
 
@@ -257,7 +258,7 @@ class _Parser:
     def _window(self) -> Window | None:
         bracket = self._next
         if bracket.text == "(" and self._looks_like_open_window():
-            self._fail("open windows are not understood", bracket.position, _CLOSED)
+            self._fail("open windows are not supported", bracket.position, _CLOSED)
         if not self._accept("["):
             return None
         start, start_unit = self._bound()
@@ -269,9 +270,9 @@ class _Parser:
             self._fail(f"expected ']' before {self._next.shown}", self._next.position, _CLOSED)
         if start > 0 and bool(start_unit) != bool(end_unit):
             self._fail(
-                "one bound has a unit, the other has none",
+                "one bound has a unit, the other does not",
                 bracket.position,
-                f"write it at both, for example [{number_text(start)}{start_unit or end_unit},"
+                f"give both a unit, for example [{number_text(start)}{start_unit or end_unit},"
                 f"{number_text(end)}{end_unit or start_unit}]",
             )
         window = Window(_seconds(start, start_unit), _seconds(end, end_unit))
@@ -279,19 +280,19 @@ class _Parser:
             self._fail(
                 f"the window {window} ends before it starts",
                 bracket.position,
-                f"the smaller bound comes first: {Window(window.end, window.start)}",
+                f"write the smaller bound first: {Window(window.end, window.start)}",
             )
         if not math.isfinite(window.end):
-            self._fail("the bound is too large", end_token.position, "leave the window out")
+            self._fail("the bound is too large", end_token.position, "omit the window")
         return window
 
     def _bound(self) -> tuple[float, str]:
         token = self._take()
         if token.kind != "number":
             hint = {
-                "-": "windows look forward: bounds are 0 or more",
-                "inf": "leave the window out to reach to the stop time",
-            }.get(token.text, f"bounds are plain numbers; {_CLOSED}")
+                "-": "windows look forward: bounds are at least 0",
+                "inf": "omit the window to extend it to the stop time",
+            }.get(token.text, f"bounds are numbers; {_CLOSED}")
             self._fail(f"expected a bound, not {token.shown}", token.position, hint)
         unit = ""
         if self._next.kind == "name":
@@ -316,15 +317,15 @@ class _Parser:
         hint = f"compare it, for example {node} >= 0"
         if "=>" in self.text:
             hint += "; => is an implication, greater or equal is >="
-        self._fail(f"{what}, {node}, stands where a formula is expected", start, hint)
+        self._fail(f"expected a formula, got {what}, {node}", start, hint)
 
     def _as_expression(self, node: Node, start: int) -> Expression:
         if isinstance(node, Expression):
             return node
         self._fail(
-            "a formula stands where a number or a signal is expected",
+            "expected a number or a signal, got a formula",
             start,
-            "comparisons and arithmetic take numbers and signals; join formulas with and, or, ->, <->",
+            "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->",
         )
 
     def _fail_operand(self, token: Token) -> NoReturn:
@@ -334,38 +335,38 @@ class _Parser:
         hint = "something is missing before it"
         previous = self.tokens[self.index - 2] if self.index > 1 else None
         if token.text in ("true", "false"):
-            problem, hint = f"{token.text} has no margin", "a Boolean signal b is written b or not b"
+            problem, hint = f"{token.text} has no margin", "write a Boolean signal b as b or not b"
         elif token.text == "U":
-            hint = f'it stands between two formulas; a signal of that name is written "{token.written}"'
+            hint = f'it belongs between two formulas; write a signal of that name as "{token.written}"'
         elif token.text in ("[", "]"):
-            hint = "windows stand directly behind G, F or U"
+            hint = "write windows directly after G, F or U"
         elif token.text == ")":
             hint = "there is nothing between the parentheses, or one parenthesis too many"
         elif token.text == "*":
-            hint = "powers are written x^y"
+            hint = "write powers as x^y"
         elif token.kind == "symbol" and previous and previous.written in RESERVED:
             word = previous.written
-            hint = f'{word} is a reserved word; a signal of that name is written "{word}"'
+            hint = f'{word} is a reserved word; write a signal of that name as "{word}"'
         self._fail(problem, token.position, hint)
 
-    def _fail_behind(self, token: Token) -> NoReturn:
+    def _fail_after(self, token: Token) -> NoReturn:
         previous = self.tokens[self.index - 1]
         hint = "join two formulas with and, or, ->; numbers and signals with + - * /"
         if token.text in _HINTS or previous.text in _HINTS:
             hint = _HINTS.get(token.text) or _HINTS[previous.text]
         elif token.text.lower() in RESERVED and token.kind == "name":
-            hint = f"operators are written in small letters: {token.text.lower()}"
+            hint = f"write operators in lower case: {token.text.lower()}"
         elif token.text in UNITS and previous.kind == "number":
-            hint = "only the bounds of windows have units; compare in the signal's own unit"
+            hint = "only the bounds of windows have units; convert the number to the signal's own unit"
         elif token.text == ")":
             hint = "there is one ')' too many"
         elif token.text == "[":
-            hint = "windows stand directly behind G, F or U, indices directly behind a name"
-        self._fail(f"unexpected {token.shown} behind a complete formula", token.position, hint)
+            hint = "write windows directly after G, F or U, indices directly after a name"
+        self._fail(f"unexpected {token.shown} after a complete formula", token.position, hint)
 
     def _fail_depth(self, position: int) -> NoReturn:
         self._fail(
-            f"the formula is nested deeper than {MAX_DEPTH} levels", position, "split it into requirements"
+            f"the formula has more than {MAX_DEPTH} levels", position, "split it into several requirements"
         )
 
     def _fail(self, problem: str, position: int, hint: str) -> NoReturn:
@@ -378,6 +379,7 @@ def _seconds(bound: float, unit: str) -> float:
 
 
 def _depth(formula: Formula) -> int:
+    # Iterative: a chain such as ``a and b and ...`` is parsed in a loop and may be too deep to recurse into.
     deepest = 0
     below: list[tuple[Node, int]] = [(formula, 1)]
     while below:

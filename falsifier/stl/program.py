@@ -1,4 +1,4 @@
-"""A compiled formula: the steps for the kernels, and where they leave the value of each part."""
+"""A compiled formula: the steps for the kernels, and the place of each part's values in the buffer."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from falsifier.stl.formula import Formula, Predicate
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the values of one part lie.
+    """Location of one part's values in the buffer.
 
     Attributes:
-        base: offset of the value at sample k is ``base + k``.
-        first: first sample that was computed.
-        last: last sample that was computed.
+        base: the value at sample k has the offset ``base + k``.
+        first: first computed sample.
+        last: last computed sample.
     """
 
     base: int
@@ -24,21 +24,21 @@ class Place:
     last: int
 
     def at(self, sample: int) -> int:
-        """Offset in the buffer of the value at this sample."""
+        """Return the offset in the buffer of the value at this sample."""
         return self.base + sample
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A sub-formula and where its values lie.
+    """A sub-formula and the location of its values.
 
     Attributes:
         formula: the sub-formula.
         text: its text.
         place: its samples and their offsets.
-        window: of a temporal operator, in samples from where it stands; without an end it reaches to the last
-            sample of all.
-        samples: samples of one trajectory.
+        window: window of a temporal operator, in samples from the sample at which it is evaluated; an end of
+            None is the last sample of the trajectory.
+        samples: number of samples of one trajectory.
         children: parts directly below.
     """
 
@@ -50,15 +50,15 @@ class Part:
     children: tuple["Part", ...]
 
     def at(self, buffer: NDArray[np.float64], sample: int) -> float:
-        """Robustness at a sample."""
+        """Return the robustness at a sample."""
         return buffer.item(self.place.base + sample)
 
     def over(self, buffer: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
-        """Robustness at the samples from first to last."""
+        """Return the robustness at the samples from first to last inclusive."""
         return buffer[self.place.base + first : self.place.base + last + 1]
 
     def window_at(self, sample: int) -> tuple[int, int] | None:
-        """First and last sample that a temporal operator looks at from here."""
+        """Return the first and last sample of a temporal operator's window if evaluated at this sample."""
         if self.window is None:
             return None
         start, end = self.window
@@ -73,17 +73,17 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Steps for the kernels, and where they leave the value of each part.
+    """Steps for the kernels, and the place of each part's values.
 
     Attributes:
         root: the whole formula.
-        signals: names in the order in which the buffer holds them.
+        signals: names of the signals, in their order in the buffer.
         step: sampling step in s.
-        samples: samples of one trajectory.
+        samples: number of samples of one trajectory.
         rows: steps as described in opcodes, shape (r, 6).
         numbers: two constants for each step, shape (r, 2).
         size: length of the buffer.
-        checked: the predicate that each checking row looks at, and its place.
+        checked: the predicate that each CHECK row checks, and its place, by row.
     """
 
     root: Part

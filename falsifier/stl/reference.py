@@ -1,15 +1,15 @@
-"""rtamt as an independent second opinion on the robustness at time 0.
+"""rtamt as an independent second monitor for the robustness at time 0.
 
-rtamt (D. Nickovic, T. Yamaguchi, "RTAMT: Online robustness monitors from STL", ATVA 2020) reads some texts
-silently in another way than they look, so it never sees a formula as written. It gets a text made of our
-tree: every operator in parentheses, signals under plain aliases, times counted in samples of one second. What
-its discrete-time semantics has not is rewritten:
+rtamt (D. Nickovic, T. Yamaguchi, "RTAMT: Online robustness monitors from STL", ATVA 2020) silently parses
+some formulas differently from what one would expect, so it never gets a formula as written. It gets a text
+generated from our tree: every operator in parentheses, signals under simple aliases, times counted in samples
+of one second. Where its discrete-time semantics differ from ours, the formula is rewritten:
 
-- the compared expressions are columns of their own, because versions differ in the arithmetic they know;
-- its ``until`` leaves the last sample of the left operand out: ``l U r`` becomes ``l U (l and r)``;
-- ``l U[a,b] r`` takes cubic time there and becomes
-  ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, which is equivalent;
-- its ``iff`` and ``xor`` have no sign: ``<->`` becomes two implications.
+- the compared expressions become separate columns, because rtamt's versions support different arithmetic;
+- its ``until`` ignores the last sample of the left operand: ``l U r`` becomes ``l U (l and r)``;
+- its ``l U[a,b] r`` takes cubic time and becomes the equivalent
+  ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``;
+- its ``iff`` and ``xor`` are unsigned: ``<->`` becomes two implications.
 """
 
 import sys
@@ -42,35 +42,35 @@ from falsifier.stl.formula import (
 
 
 def robustness(formula: Formula, trajectory: Trajectory) -> float:
-    """Robustness at time 0 as rtamt computes it.
+    """Return the robustness at time 0 computed by rtamt.
 
     Raises:
-        FormulaError: when a window's bound is not a multiple of the trajectory's step.
-        MonitorError: when the trajectory is empty, too short, not finite or lacks a signal, or rtamt fails.
+        FormulaError: if the bound of a window is not a multiple of the trajectory's step.
+        MonitorError: if the trajectory is empty, too short, not finite or lacks a signal, or rtamt fails.
     """
     if len(trajectory) == 0:
         raise MonitorError("the trajectory is empty")
     end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
     if needed > end + 1e-6 * trajectory.step:
-        raise MonitorError(f"the formula needs {needed:g} s, the trajectory ends at {end:g} s")
+        raise MonitorError(f"the formula needs {needed:g} s, but the trajectory ends at {end:g} s")
     translation = _Translation(trajectory)
     text = translation.formula(formula)
     columns = translation.columns
-    if len(trajectory) == 1:  # rtamt fails on one sample; a second one like it changes no value at time 0
+    if len(trajectory) == 1:  # rtamt fails on one sample; repeating it does not change the value at time 0
         columns = {name: values * 2 for name, values in columns.items()}
     return _evaluate(text, columns or {"v0": [0.0] * max(2, len(trajectory))})
 
 
 @dataclass(slots=True)
 class _Translation:
-    """Text for rtamt and the columns that it speaks of."""
+    """Text for rtamt and the columns that it refers to."""
 
     trajectory: Trajectory
     columns: dict[str, list[float]] = field(default_factory=dict)
     aliases: dict[Expression, str] = field(default_factory=dict)
 
     def formula(self, f: Formula) -> str:
-        """Text of a formula, in parentheses."""
+        """Return the text of a formula, in parentheses."""
         match f:
             case Predicate("!=", left, right):
                 return f"(not ({self.side(left)} == {self.side(right)}))"
@@ -97,7 +97,7 @@ class _Translation:
         raise TypeError(f"not a formula: {f!r}")
 
     def until(self, left: Formula, right: Formula, window: Window | None) -> str:
-        """Text of an until whose left operand includes the last sample."""
+        """Return the text of an until whose left operand includes the last sample."""
         text, both = self.formula(left), self.formula(And(left, right))
         until = f"({text} until {both})"
         if window is None:
@@ -107,14 +107,14 @@ class _Translation:
         return f"((always[0,{start - 1}] {text}) and {within})" if start else within
 
     def window(self, window: Window | None) -> str:
-        """Text of a window in samples."""
+        """Return the text of a window in samples."""
         if window is None:
             return ""
         start, end = window_samples(window, self.trajectory.step or 1.0)
         return f"[{start},{end}]"
 
     def side(self, expression: Expression) -> str:
-        """Text of a compared expression: a number, or the alias of its column."""
+        """Return the text of a compared expression: a number, or the alias of its column."""
         if isinstance(expression, Number):
             return number_text(expression.value)
         if expression not in self.aliases:
@@ -135,7 +135,7 @@ def _evaluate(text: str, columns: dict[str, list[float]]) -> float:
     specification.spec = text
     specification.parse()
     if len(specification.ast.specs) != 1:
-        raise MonitorError(f"rtamt reads {len(specification.ast.specs)} formulas in {text}")
+        raise MonitorError(f"rtamt parsed {len(specification.ast.specs)} formulas instead of one in {text}")
     samples = len(next(iter(columns.values())))
     values = specification.evaluate({"time": [float(k) for k in range(samples)], **columns})
     return float(values[0][1])
@@ -143,7 +143,7 @@ def _evaluate(text: str, columns: dict[str, list[float]]) -> float:
 
 def _rtamt() -> Any:
     if sys.version_info >= (3, 13) and "typing.io" not in sys.modules:
-        # The antlr runtime that rtamt asks for imports a module that Python 3.13 no longer has.
+        # rtamt needs an antlr runtime that imports typing.io, which Python 3.13 removed.
         shim = types.ModuleType("typing.io")
         vars(shim)["TextIO"] = typing.TextIO
         sys.modules["typing.io"] = shim

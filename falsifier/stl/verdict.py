@@ -1,4 +1,4 @@
-"""Verdicts: what the monitor says of one trajectory."""
+"""Verdicts: the result of monitoring one trajectory."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Robustness of a requirement on one trajectory and what decided it.
+    """Robustness of a requirement on one trajectory, and what decided it.
 
     Attributes:
         robustness: signed margin at time 0; < 0 is a violation, exactly 0 is not.
@@ -22,5 +22,5 @@ class Verdict:
 
     @property
     def violated(self) -> bool:
-        """Whether the requirement is violated."""
+        """Whether the robustness is below 0; exactly 0 is not a violation."""
         return self.robustness < 0

@@ -1,8 +1,8 @@
-"""What decided a robustness value: the way from a formula down to one predicate at one sample.
+"""What decided a robustness value: the path from a formula down to one predicate at one sample.
 
-At each operator the way goes to the operand whose value became the operator's value. Ties go to the earliest
-sample and to the left operand; ``or`` and ``->`` are read as their negated conjunctions, which gives the left
-operand too. Until goes to its left operand only where that is strictly smaller.
+At each operator the path continues with the operand whose value became the operator's value. Ties go to the
+earliest sample and the left operand; ``or`` and ``->`` are treated as negated conjunctions, so their ties go
+to the left operand too. For until, the path goes to the left operand only if its value is strictly smaller.
 """
 
 from typing import NamedTuple
@@ -17,13 +17,13 @@ Floats = NDArray[np.float64]
 
 
 class Waypoint(NamedTuple):
-    """One sub-formula on the way.
+    """One sub-formula on the path.
 
     Attributes:
         part: the compiled sub-formula.
-        sample: where its value was asked for.
-        value: its robustness there.
-        window: first and last sample that its operator looked at; None without a window.
+        sample: sample at which it was evaluated.
+        value: its robustness at that sample.
+        window: first and last sample of its operator's window; None if it has no window.
     """
 
     part: Part
@@ -32,20 +32,20 @@ class Waypoint(NamedTuple):
     window: tuple[int, int] | None
 
 
-def trace(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoint]:
-    """Way from a compiled formula at this sample to the predicate that decided its value.
+def path_to_decider(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoint]:
+    """Return the path from a compiled formula at this sample to the predicate that decided its value.
 
     Args:
         part: the compiled formula.
-        buffer: after the kernels filled it.
-        sample: where the formula's value is asked for.
+        buffer: values of all parts, filled by the kernels.
+        sample: sample at which the formula was evaluated.
     """
-    way: list[Waypoint] = []
+    path: list[Waypoint] = []
     while True:
         window = part.window_at(sample)
-        way.append(Waypoint(part, sample, part.at(buffer, sample), window))
+        path.append(Waypoint(part, sample, part.at(buffer, sample), window))
         if not part.children:
-            return way
+            return path
         part, sample = _decider(part, buffer, sample, window)
 
 
@@ -65,7 +65,7 @@ def _decider(part: Part, buffer: Floats, sample: int, window: tuple[int, int] | 
 
 
 def _side(kind: type[Formula], left: float, right: float) -> int:
-    """Which operand decided, 0 for the left one."""
+    """Return which operand decided: 0 for the left one, 1 for the right one."""
     if kind is And:
         return int(left > right)
     if kind is Or:

@@ -1,4 +1,4 @@
-"""Formulas read aloud, for prompts and reports."""
+"""Formulas in words, for prompts and reports."""
 
 from falsifier.stl.expression import Arithmetic, Call, Number
 from falsifier.stl.formula import (
@@ -35,28 +35,28 @@ _MIRRORED: dict[Comparison, Comparison] = {
 
 
 def in_words(formula: Formula) -> str:
-    """One plain sentence that says what a formula demands.
+    """Return one sentence that states what a formula requires.
 
     >>> from falsifier.stl import parse
     >>> print(in_words(parse("G[0,20] (speed <= 120)")))
     At all times from 0 to 20 s, speed is at most 120.
     """
     text = _read(formula, later=False)
-    begins_with_word = text.startswith(("at ", "if ", "it "))  # not with a signal, whose case matters
-    return f"{text[0].upper() + text[1:] if begins_with_word else text}."
+    starts_with_word = text.startswith(("at ", "if ", "it "))  # not with a signal, whose case matters
+    return f"{text[0].upper() + text[1:] if starts_with_word else text}."
 
 
 def _read(formula: Formula, *, later: bool) -> str:
-    """Read a formula; times count from the beginning or, later, from wherever the formula stands."""
+    """Put a formula into words, with absolute times or, if ``later``, relative to an enclosing operator."""
     match formula:
         case Predicate():
             return _predicate(formula)
         case Not(Predicate() as predicate):
             return _negated(predicate)
         case Not(operand):
-            return f"it is not so that {_part(operand, later=later)}"
+            return f"it is not the case that {_part(operand, later=later)}"
         case And(Predicate() as low, Predicate() as high) if _is_range(formula):
-            return f"{low.right} lies between {low.left} and {high.right}"
+            return f"{low.right} is between {low.left} and {high.right}"
         case And(left, right):
             return f"{_part(left, later=later, within=And)} and {_part(right, later=later, within=And)}"
         case Or(left, right):
@@ -83,7 +83,7 @@ def _condition(formula: Formula, *, later: bool) -> str:
 
 
 def _part(formula: Formula, *, later: bool, within: type[Formula] | None = None) -> str:
-    """Read an operand, in parentheses where its words could run into its neighbour's."""
+    """Put an operand into words, in parentheses if its end could otherwise be misread."""
     text = _read(formula, later=later)
     is_short = isinstance(formula, Predicate) or (
         isinstance(formula, Not) and isinstance(formula.operand, Predicate)
@@ -109,7 +109,8 @@ def _predicate(predicate: Predicate) -> str:
         case Call("abs", (Arithmetic("-", a, b),)), "<" | "<=":
             return f"{a} is within {right} of {b}"
         case Call("abs", (Arithmetic("-", a, b),)), ">" | ">=":
-            return f"{a} is {right} or more away from {b}"
+            least = "more than" if operator == ">" else "at least"
+            return f"{a} differs from {b} by {least} {right}"
     return f"{left} {_IS[operator]} {right}"
 
 

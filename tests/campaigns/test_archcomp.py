@@ -41,16 +41,16 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
 @pytest.mark.parametrize(
     ("line", "holds", "reason"),
     [
-        ('S,HARD,1,"[0 1]",[],yes,3,1,1,-0.4,10', True, "violates again"),
-        ('S,HARD,1,"[0 1; 5 1; 10 1]",[],true,3,1,1,-0.4,', True, "violates again"),
-        ('S,HARD,1,"[0 -1; 10 -1]",[],yes,3,1,1,-0.4,10', False, "does not violate"),
-        ('S,HARD,1,"[0 1]",[],yes,1501,1,1,-0.4,10', False, "1501 simulations, over 1500"),
+        ('S,HARD,1,"[0 1]",[],yes,3,1,1,-0.4,10', True, "reproduced"),
+        ('S,HARD,1,"[0 1; 5 1; 10 1]",[],true,3,1,1,-0.4,', True, "reproduced"),
+        ('S,HARD,1,"[0 -1; 10 -1]",[],yes,3,1,1,-0.4,10', False, "not reproduced"),
+        ('S,HARD,1,"[0 1]",[],yes,1501,1,1,-0.4,10', False, "1501 simulations, more than the limit of 1500"),
         ('S,HARD,1,"[0 1.5]",[],yes,3,1,1,-0.4,10', False, "1.5 is outside its range [-1, 1]"),
-        ('S,HARD,1,"[0 1 1]",[],yes,3,1,1,-0.4,10', False, "2 inputs and 0 parameters; expected 1 and 0"),
+        ('S,HARD,1,"[0 1 1]",[],yes,3,1,1,-0.4,10', False, "2 inputs and 0 parameters, expected 1 and 0"),
         ('S,HARD,1,"[0 1; 0 1]",[],yes,3,1,1,-0.4,10', False, "must increase strictly from 0"),
         # easy() with half the input has robustness 0.4: within CC's tolerance of 1, but AT5x has none.
         ('S,CC1,1,"[0 0.5]",[],yes,3,1,1,-0.4,10', True, "within the tolerance of 1"),
-        ('S,AT51,1,"[0 0.5]",[],yes,3,1,1,-0.4,10', False, "does not violate"),
+        ('S,AT51,1,"[0 0.5]",[],yes,3,1,1,-0.4,10', False, "not reproduced"),
     ],
 )
 def test_claims_are_judged_by_the_rules(tmp_path: Path, line: str, holds: bool, reason: str) -> None:
@@ -110,4 +110,4 @@ def test_another_tools_counterexample_of_the_bundled_transmission_holds(tmp_path
     line = 'AT,AT1,2,"[0 100 0; 5 100 0; 25 100 0]",[],1,7,1,1,-1.0,30'
     (finding,) = validate(read_rows(rows(tmp_path, line)))
     assert finding.holds
-    assert finding.reason == "violates again"
+    assert finding.reason == "reproduced"

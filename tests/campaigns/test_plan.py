@@ -63,7 +63,7 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
         "hybrid + gpt-5-mini high MP4, instance2"
     )
     named = Method(llm="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
-    assert named.label == "gpt-5-mini, neutral names, then surrogate"
+    assert named.label == "gpt-5-mini, neutral names, fallback surrogate"
     assert method_of(cross([AT1], [named], seeds=[0], budget=Budget(1))[0]) == named
 
 

@@ -53,7 +53,7 @@ def test_resume_repeats_nothing_that_is_finished(tmp_path: Path) -> None:
 def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path) -> None:
     directory = tmp_path / "c"
     run_campaign(request("easy"), directory)
-    with pytest.raises(JournalError, match="already holds a campaign"):
+    with pytest.raises(JournalError, match="already contains a campaign"):
         run_campaign(request("easy"), directory)
     with locked(directory), pytest.raises(JournalError, match="another process is working on this campaign"):
         resume_campaign(directory)
@@ -124,7 +124,7 @@ def test_a_changed_model_is_refused(tmp_path: Path) -> None:
 
 
 def test_requirements_of_the_same_name_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="both called 'EASY'"):
+    with pytest.raises(SpecError, match="both named 'EASY'"):
         run_campaign(request("easy", "easy_again"), tmp_path / "c")
 
 

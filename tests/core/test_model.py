@@ -65,7 +65,7 @@ def test_it_travels_between_processes() -> None:
         (divide, ("level",), "tank: output 'level' is inf at t = 0.5 s"),
         (broken, ("level",), "tank: ZeroDivisionError: no water"),
         (short, ("level",), r"output 'level' has shape \(10,\), expected \(11,\)"),
-        (tank, ("levle",), "no output 'levle'; did you mean 'level'"),
+        (tank, ("levle",), "the output 'levle'; did you mean 'level'"),
     ],
 )
 def test_what_goes_wrong_is_a_failed_simulation(

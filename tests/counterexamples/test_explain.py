@@ -23,9 +23,10 @@ def test_a_signal_that_is_needed_is_named_with_what_happens_without_it() -> None
     # At rest x falls from 0.5 to 0: the margin is smallest at the start.
     assert effects["u"].robustness == pytest.approx(0.4)
     assert not effects["x0"].needed
-    assert "LAG demands: At all times from 0 to 10 s, x is at most 0.9." in explanation.text
-    assert "It takes u (at 0 V, its rest value, the robustness is +0.4)." in explanation.text
-    assert "It does not need x0 (at 0, its rest value, it is still -0.09997)." in explanation.text
+    assert "LAG requires: At all times from 0 to 10 s, x is at most 0.9." in explanation.text
+    assert "u is necessary: at rest (0 V) robustness would be +0.4." in explanation.text
+    text = "x0 is not necessary: at its nominal value (0) robustness would still be -0.09997."
+    assert text in explanation.text
     assert explanation.diagnosis.critical_time == 10.0
 
 
@@ -35,7 +36,7 @@ def test_of_a_signal_the_stretches_that_count_are_named() -> None:
     explanation = explain(problem, evaluate(problem, Candidate({"u": signal})))
     spans = {e.span: e.needed for e in explanation.effects if e.span is not None}
     assert spans == {(0.0, 2.0): False, (2.0, 5.0): False, (5.0, 10.0): True}
-    assert "Of u, what counts is 5 to 10 s" in explanation.text
+    assert "u is decisive from 5 to 10 s: at rest (0 V) during that time" in explanation.text
 
 
 def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
@@ -44,8 +45,8 @@ def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
     explanation = explain(problem, evaluate(problem, problem.space.decode([0.0] * 4 + [0.0])))
     x0 = next(e for e in explanation.effects if e.name == "x0")
     assert (x0.instead, x0.is_rest, x0.was_rest) == (0.5, False, True)
-    assert "It does not need " in explanation.text
-    assert "x0 at rest (at 0.5, the middle of its range, it is still" in explanation.text
+    assert "x0 at its nominal value is not necessary: " in explanation.text
+    assert "at the middle of its range (0.5) robustness would still be" in explanation.text
 
 
 def test_a_part_without_which_the_simulation_fails_is_said() -> None:
@@ -56,7 +57,7 @@ def test_a_part_without_which_the_simulation_fails_is_said() -> None:
 
     problem = lag_problem("G[0,10] (x >= 0.5)", function=fails_at_rest)
     explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-    assert "Without u the simulation fails." in explanation.text
+    assert "With u at rest (0 V) the simulation fails." in explanation.text
 
 
 def test_a_failed_simulation_cannot_be_explained() -> None:

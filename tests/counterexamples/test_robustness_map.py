@@ -36,7 +36,7 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
     np.testing.assert_array_equal(found.robustness < 0, found.values[:, 0] + 1e-9 > 0.5)
     assert found.sizes.max() <= 0.1 + 1e-12
     assert found.surface.shape == (11, 11)
-    assert "still violating: 100% up to 0.0125" in found.text
+    assert "100 % of changes up to 1.25 % of the range still violate, " in found.text
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:

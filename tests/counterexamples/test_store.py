@@ -85,7 +85,7 @@ def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPa
     assert replayed.evaluation is not None
     assert replayed.evaluation.robustness == pytest.approx(10 + stored.robustness)
     assert "the FMU has changed since" in replayed.text
-    assert "the requirement was G[0,20] (speed <= 120) then" in replayed.text
+    assert "the requirement has changed from G[0,20] (speed <= 120) to" in replayed.text
 
 
 def test_a_counterexample_of_another_parameterization_does_not_fit() -> None:
@@ -116,7 +116,7 @@ def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> 
 
 
 def test_what_is_not_there_is_said(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="has found no confirmed counterexample"):
+    with pytest.raises(SpecError, match="contains no confirmed counterexample"):
         load(tmp_path)
     with pytest.raises(SpecError, match="no such file"):
         load(tmp_path / "gone.json")
@@ -138,14 +138,14 @@ def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
     problem = lag_problem()
     for name in ("counterexample-A.json", "counterexample-B.json"):
         save(to_store(violation(problem)), tmp_path / name)
-    with pytest.raises(SpecError, match=r"several counterexamples, .*counterexample-A\.json"):
+    with pytest.raises(SpecError, match=r"several counterexamples; .*counterexample-A\.json"):
         load(tmp_path)
 
 
 def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
     problem = lag_problem()
     path = save(to_store(violation(problem)), tmp_path / "c.json")
-    with pytest.raises(SpecError, match="LAG is of a problem made in Python"):
+    with pytest.raises(SpecError, match="LAG was made in Python"):
         problem_of(load(path))
 
 

@@ -106,7 +106,7 @@ def test_the_road_to_a_valid_reply() -> None:
         chat = RetryingChat(LadderChat(client), Gate(), first_delay=0.01)
         engine = make_llm_engine(problem, chat, variant="MP4", on_exchange=exchanges.append)
         engine.tell([evaluate(problem, *engine.ask())])
-        with pytest.raises(ChatError, match="no valid reply in 3 tries"):
+        with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
             engine.ask()
         assert evaluate(problem, *engine.ask()).violated
         assert len(server.received) == 7

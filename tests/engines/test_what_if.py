@@ -99,7 +99,7 @@ def test_it_calls_twice_and_then_answers() -> None:
     # 9 minus what y reaches in ten seconds from 0.
     assert robustness == pytest.approx([8.5, 7.5, 7.25], abs=0.3)
     assert "by y <= 9" in third[0]
-    assert "2 more calls are answered" in third[0] and "1 more call is answered" in third[1]
+    assert "2 more calls can be answered" in third[0] and "1 more call can be answered" in third[1]
     assert any(re.fullmatch(r"best \[predicted robustness 7\.\d+\]", r) for r in rationales)
     assert not any("was not simulated" in m.content for r in chat.requests for m in r.messages)
 

@@ -44,7 +44,7 @@ def test_a_bomb_is_refused_before_anything_is_written(tmp_path: Path) -> None:
 
 
 def test_an_absurd_total_size_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archive, "_MOST_BYTES", 1000)
+    monkeypatch.setattr(archive, "_MAX_BYTES", 1000)
     with pytest.raises(ModelError, match="would unpack to"):
         archive.extract(write(tmp_path / "big.fmu", ("a", bytes(600)), ("b", bytes(600))), tmp_path / "out")
 

@@ -104,7 +104,7 @@ def test_integers_keep_their_limits(kind: str, low: int, high: int) -> None:
     for value in (low, high):
         got = run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (float(value),))})
         assert got[f"out_{kind}"][-1] == value
-    with pytest.raises(SimulationError, match=rf"do not fit 'in_{kind}', whose type takes {low} to {high}"):
+    with pytest.raises(SimulationError, match=rf"do not fit 'in_{kind}', .* from {low} to {high}"):
         run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (high + 1.0,))})
 
 

@@ -43,7 +43,7 @@ def commit(model: FmuModel, misdeed: int, *, time_limit: float = 60.0) -> Simula
     [
         (CRASH, "crashed", "signal SIGSEGV"),
         (ABORT, "crashed", "signal SIGABRT; its last message: assertion failed: pressure > 0"),
-        (EXIT, "crashed", "it ended itself with exit code 7"),
+        (EXIT, "crashed", "it exited with code 7"),
         (ALLOCATE, "failed", "the step returned error at t = 0.5 s.*no memory for the table"),
         (NAN, "failed", "output 'y' is nan at t = 0.6 s"),
         (DISCARD, "failed", "the step returned discard at t = 0.5 s, before the stop time 1 s"),
@@ -134,7 +134,7 @@ def test_repeated_runs_are_equal_whatever_the_reset_does(name: str, reuse: str) 
 def test_workers_are_replaced_before_they_have_made_too_many_instances() -> None:
     model = isolated("NoReset_2")
     pids = set()
-    for _ in range(worker._MOST_INSTANCES + 20):
+    for _ in range(worker._MAX_INSTANCES + 20):
         assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
         (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.sha256]
         pids |= {fmu._worker.pid} if fmu._worker else set()
@@ -150,7 +150,7 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
     (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.sha256]
     assert fmu._worker is not None
     pid = fmu._worker.pid
-    for _ in range(5 * worker._MOST_INSTANCES):
+    for _ in range(5 * worker._MAX_INSTANCES):
         assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
     assert fmu._worker is not None and fmu._worker.pid == pid
     model.close()
@@ -197,7 +197,7 @@ def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
 
 def test_no_binary_for_this_platform_says_what_there_is_and_what_to_do() -> None:
     with pytest.raises(
-        ModelError, match=r"no library for .*no binaries; .*compile them with `falsifier build`"
+        ModelError, match=r"no binary for .*no binaries at all; .*compile them with `falsifier build`"
     ):
         run(isolated("Lag_2sources"), ("y",))
 

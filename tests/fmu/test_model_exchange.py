@@ -169,7 +169,7 @@ def test_discrete_inputs_change_at_events_only() -> None:
 
 
 def test_events_that_pile_up_are_an_error() -> None:
-    with pytest.raises(SimulationError, match="events follow each other without end at t = "):
+    with pytest.raises(SimulationError, match="its events never end at t = "):
         run(local("Ticker_2", ME), ("x",), parameters={"period": 1e-9})
 
 

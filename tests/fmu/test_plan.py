@@ -13,7 +13,7 @@ LAG = read_description(fixtures.path("Lag_2"))
     ("inputs", "parameters", "outputs", "message"),
     [
         (["v"], [], ["y"], "no variable 'v'"),
-        (["y"], [], ["y"], "'y' is not an input .its causality is output.; inputs are: u"),
+        (["y"], [], ["y"], "'y' is not an input, its causality is output; the inputs are: u"),
         (["u"], ["y"], ["y"], "'y' cannot be set: the model computes"),
         (["u"], ["gian"], ["y"], "did you mean 'gain'"),
         (["u"], [], ["z"], "no variable 'z'"),

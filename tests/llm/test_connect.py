@@ -24,7 +24,7 @@ from tests.llm.server import Step, serving
     ],
 )
 def test_a_missing_key_names_its_variable(model: str, variables: str) -> None:
-    with pytest.raises(ChatError, match=f"{model}: no key: set {variables}"):
+    with pytest.raises(ChatError, match=f"{model}: no API key: set {variables}"):
         connect(model)
 
 
@@ -41,7 +41,7 @@ def test_local_servers_need_no_key(model: str) -> None:
 
 def test_an_empty_key_is_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "  ")
-    with pytest.raises(ChatError, match="no key"):
+    with pytest.raises(ChatError, match="no API key"):
         preflight("openai/gpt-5-mini")
 
 

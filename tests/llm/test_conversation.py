@@ -46,7 +46,7 @@ def test_a_rejected_reply_goes_back_with_its_problem() -> None:
 def test_two_reasks_at_most() -> None:
     exchanges: list[Exchange] = []
     chat = ScriptedChat(["a", "b", "c", "4"])
-    with pytest.raises(NoValidReplyError, match=r"no valid reply in 3 tries.*'a'.*'b'.*'c'"):
+    with pytest.raises(NoValidReplyError, match=r"no valid reply in 3 attempts.*'a'.*'b'.*'c'"):
         converse(chat, QUESTION, number, exchanges.append)
     assert len(chat.requests) == len(exchanges) == 3
 

@@ -72,7 +72,7 @@ def test_where_nothing_listens_on_this_machine_little_patience_helps(model: str)
     address = f"http://127.0.0.1:{free_port()}/v1"
     naps: list[float] = []
     chat = RetryingChat(LiteLLMChat(model, api_base=address), Gate(sleep=naps.append))
-    with pytest.raises(ChatError, match=f"nothing listens at {address}: start the ") as caught:
+    with pytest.raises(ChatError, match=f"nothing is listening at {address}: start the ") as caught:
         chat.complete(REQUEST)
     assert len(naps) == 2
     assert sum(naps) < 5
@@ -91,9 +91,9 @@ def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: py
         )
         return str(told)
 
-    assert "nothing listens at http://localhost:11434" in refused()
+    assert "nothing is listening at http://localhost:11434" in refused()
     monkeypatch.setenv("OLLAMA_API_BASE", "http://127.0.0.1:4444")
-    assert "nothing listens at http://127.0.0.1:4444" in refused()
+    assert "nothing is listening at http://127.0.0.1:4444" in refused()
 
 
 def test_servers_elsewhere_that_refuse_are_waited_for() -> None:

@@ -32,7 +32,7 @@ def test_a_recording_alone_ends() -> None:
     chat = RecordedChat([exchange("one")])
     assert chat.llm == "recording of openai/m"
     chat.complete(QUESTION)
-    with pytest.raises(ChatError, match="ends after 1 repl"):
+    with pytest.raises(ChatError, match="ends after 1 exchange"):
         chat.complete(QUESTION)
 
 
@@ -43,7 +43,7 @@ def test_a_recorded_failure_happens_again() -> None:
 
 def test_script_of_a_function_and_its_end() -> None:
     assert ScriptedChat(lambda request: request.messages[0].content).complete(QUESTION).text == "?"
-    with pytest.raises(ChatError, match="has 1 replies, 2 are asked for"):
+    with pytest.raises(ChatError, match="contains only 1 line, but request 2 was made"):
         chat = ScriptedChat(["only"])
         chat.complete(QUESTION)
         chat.complete(QUESTION)
@@ -62,5 +62,5 @@ def test_an_unreadable_recording_names_its_file(tmp_path: Path, content: str | N
     path = tmp_path / "talk.jsonl"
     if content is not None:
         path.write_text(content)
-    with pytest.raises(ChatError, match=r"talk\.jsonl: no recording"):
+    with pytest.raises(ChatError, match=r"talk\.jsonl: not a readable recording"):
         read_recording(path)

@@ -146,8 +146,8 @@ class TestFreeParameterization:
         [
             ({"times": [1, 2], "values": [3, 4]}, "increase strictly from 0"),
             ({"times": [0, 2], "values": [3]}, "2 times and 1 values"),
-            ({"times": [0, 0.01], "values": [3, 4]}, "closer than 0.1 s"),
-            ({"times": [0, 11], "values": [3, 4]}, "behind the stop time"),
+            ({"times": [0, 0.01], "values": [3, 4]}, "less than 0.1 s apart"),
+            ({"times": [0, 11], "values": [3, 4]}, "after the stop time"),
             ({"values": ["1 x 201"]}, "at most 200"),
             ({"values": ["1 x 99999999999"]}, "longer than"),
             ({"interpolation": "spline", "values": [1]}, "pchip"),

@@ -303,7 +303,7 @@ class TestPredictionTool:
 
     def test_the_limit(self) -> None:
         made, _ = tool(calls=2)
-        assert "1 more call is" in made.respond(about(0.5))
+        assert "1 more call can be answered" in made.respond(about(0.5))
         assert "last call" in made.respond(about(0.6))
         with pytest.raises(RejectedReplyError, match="limit of 2 calls is reached"):
             made.respond(about(0.7))

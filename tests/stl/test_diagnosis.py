@@ -18,13 +18,13 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
     gap[170] = 7.1
     found = diagnose("G[0,30] F[0,8] (y5 - y4 >= 8)", 0.1, y5=(gap + 1).tolist(), y4=[1.0] * 501)
     assert found.text == (
-        "G over [0, 30] s was worst at 17.1 s, where F over [17.1, 25.1] s was best at 17.1 s, "
-        "where y5 - y4 = 7 >= 8 misses by 1."
+        "G over [0, 30] s was lowest at 17.1 s; F over [17.1, 25.1] s was highest at 17.1 s: "
+        "y5 - y4 = 7 is below 8 by 1."
     )
     found = diagnose("G[0,15] F[0,8] (y5 - y4 >= 8)", 0.1, y5=(gap + 1).tolist(), y4=[1.0] * 501)
     assert found.text == (
-        "G over [0, 15] s was worst at 12.3 s, where F over [12.3, 20.3] s was best at 17 s, "
-        "where y5 - y4 = 7.1 >= 8 misses by 0.9."
+        "G over [0, 15] s was lowest at 12.3 s; F over [12.3, 20.3] s was highest at 17 s: "
+        "y5 - y4 = 7.1 is below 8 by 0.9."
     )
     assert [str(step.formula)[0] for step in found.path] == ["G", "F", "y"]
     assert [step.time for step in found.path] == pytest.approx([0.0, 12.3, 17.0])
@@ -36,19 +36,24 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("x <= 3", "x = 3 <= 3 holds with nothing to spare."),
-        ("x + 1 >= y", "x + 1 = 4 >= y = 2 holds by 2."),
-        ("not (x <= 3)", "not holds, where x = 3 <= 3 holds with nothing to spare."),
-        ("not (x <= 4)", "not fails, where x = 3 <= 4 holds by 1."),
-        ("x <= 5 and y <= 3", "the right side of 'and' decided, where y = 2 <= 3 holds by 1."),
-        ("x <= 5 or y <= 3", "the left side of 'or' decided, where x = 3 <= 5 holds by 2."),
-        ("x <= 5 -> y <= 3", "the consequence of -> decided, where y = 2 <= 3 holds by 1."),
-        ("x <= 5 <-> y <= 3", "the right side of '<->' decided, where y = 2 <= 3 holds by 1."),
-        ("X (x <= 3)", "X looked at 1 s, where x = 1 <= 3 holds by 2."),
-        ("(x <= 9) U[0,1] (y >= 8)", "U over [0, 1] s was decided by its right side at 1 s, "
-         "where y = 7 >= 8 misses by 1."),
-        ("(x <= 2) U (y >= 5)", "U over [0, 1] s was decided by its left side at 0 s, "
-         "where x = 3 <= 2 misses by 1."),
+        ("x <= 3", "x = 3 equals 3."),
+        ("x + 1 >= y", "x + 1 = 4 exceeds y = 2 by 2."),
+        ("x > 4", "x = 3 is below 4 by 1."),
+        ("x == 4", "x = 3 differs from 4 by 1."),
+        ("x != 4", "x = 3 differs from 4 by 1."),
+        ("not (x <= 3)", "'not' holds: x = 3 equals 3."),
+        ("not (x <= 4)", "'not' fails: x = 3 is below 4 by 1."),
+        ("x <= 5 and y <= 3", "the right side of 'and' decided: y = 2 is below 3 by 1."),
+        ("x <= 5 or y <= 3", "the left side of 'or' decided: x = 3 is below 5 by 2."),
+        ("x <= 5 -> y <= 3", "the consequence of -> decided: y = 2 is below 3 by 1."),
+        ("x <= 5 -> y >= 3", "the consequence of -> failed: y = 2 is below 3 by 1."),
+        ("x <= 4 -> y >= 9", "the condition of -> decided: x = 3 is below 4 by 1."),
+        ("x <= 5 <-> y <= 3", "the right side of '<->' decided: y = 2 is below 3 by 1."),
+        ("X (x <= 3)", "the next sample is at 1 s: x = 1 is below 3 by 2."),
+        ("(x <= 9) U[0,1] (y >= 8)", "U over [0, 1] s was decided by its right side at 1 s: "
+         "y = 7 is below 8 by 1."),
+        ("(x <= 2) U (y >= 5)", "U over [0, 1] s was decided by its left side at 0 s: "
+         "x = 3 exceeds 2 by 1."),
     ],
 )  # fmt: skip
 def test_each_operator_in_words(text: str, words: str) -> None:
@@ -63,15 +68,15 @@ def test_a_condition_that_was_never_true_is_reported_as_vacuous() -> None:
     (finding,) = found.vacuities
     assert (finding.window, finding.nearest, finding.margin, finding.only) == ((0.0, 3.0), 1.0, -0.5, True)
     assert found.text.endswith(
-        "Vacuous: x >= 3 -> y <= 4 held over [0, 3] s only because its left side was never true; "
-        "it came nearest at 1 s, missing by 0.5."
+        "Vacuous: x >= 3 -> y <= 4 held over [0, 3] s only because its condition was never true; "
+        "it came closest at 1 s, false by 0.5."
     )
 
 
 def test_a_condition_that_was_never_true_is_not_the_only_reason_where_the_consequence_held() -> None:
     found = diagnose("G[0,1] (x >= 3 -> y <= 4)", x=[1.0, 2.0], y=[3.0, 4.0])
     assert not found.vacuous
-    assert "The left side of x >= 3 -> y <= 4 was never true over [0, 1] s" in found.text
+    assert "The condition of x >= 3 -> y <= 4 was never true over [0, 1] s" in found.text
 
 
 def test_a_condition_that_was_true_once_is_not_vacuous() -> None:
@@ -83,8 +88,8 @@ def test_only_the_times_at_which_an_implication_is_asked_count() -> None:
     assert found.vacuous
     single = diagnose("(G[0,1] (x <= 3)) -> y <= 4", x=[1.0, 4.0], y=[9.0, 9.0])
     assert single.vacuities[0].text == (
-        "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its left side was never true; "
-        "it missed by 1."
+        "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its condition was never true; "
+        "it was false by 1."
     )
 
 

@@ -216,10 +216,10 @@ def test_bounds_are_counted_in_steps_without_rounding_errors(step: float) -> Non
         (trajectory(x=[1.0, 1.0]), "2 samples, expected 3"),
         (trajectory(x=[]), "0 samples, expected 3"),
         (trajectory(y=[1.0, 1.0, 1.0]), "no signal 'x'"),
-        (trajectory(0.5, x=[1.0, 1.0, 1.0]), "not uniform: sample 1 lies at 0.5 s"),
-        (Trajectory(np.array([0.0, 1.0, 1.5]), {"x": np.ones(3)}), "sample 2 lies at 1.5 s"),
-        (Trajectory(np.array([0.0, np.nan, 2.0]), {"x": np.ones(3)}), "sample 1 lies at nan s"),
-        (Trajectory(np.array([1.0, 2.0, 3.0]), {"x": np.ones(3)}), "sample 0 lies at 1 s"),
+        (trajectory(0.5, x=[1.0, 1.0, 1.0]), "not uniform: sample 1 is at 0.5 s"),
+        (Trajectory(np.array([0.0, 1.0, 1.5]), {"x": np.ones(3)}), "sample 2 is at 1.5 s"),
+        (Trajectory(np.array([0.0, np.nan, 2.0]), {"x": np.ones(3)}), "sample 1 is at nan s"),
+        (Trajectory(np.array([1.0, 2.0, 3.0]), {"x": np.ones(3)}), "sample 0 is at 1 s"),
     ],
 )
 def test_bad_trajectories_are_errors_and_never_a_number(t: Trajectory, message: str) -> None:

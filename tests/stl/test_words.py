@@ -17,9 +17,10 @@ from tests.stl.randoms import random_formula
         ("G[4,4] (not b)", "At 4 s, b is false."),
         ("3 >= x", "x is at most 3."),
         ("abs(x) <= 3", "abs(x) is at most 3."),
-        ("1 <= x <= 3", "x lies between 1 and 3."),
+        ("1 <= x <= 3", "x is between 1 and 3."),
         ("not (x == 3)", "x differs from 3."),
         ("abs(gear - 1) <= 0.5", "gear is within 0.5 of 1."),
+        ("abs(gear - 1) > 0.5", "gear differs from 1 by more than 0.5."),
         (
             "G[0,65] F[0,30] G[0,5] (y5 - y4 >= 8)",
             "At all times from 0 to 65 s, at some time within the next 30 s, throughout the next 5 s, "
@@ -40,7 +41,7 @@ from tests.stl.randoms import random_formula
             "then at some time from 1 to 2 s later, b is true.",
         ),
         ("(a or b) and c <-> d", "((a is true or b is true) and c is true) exactly when d is true."),
-        ("not (a and b)", "It is not so that (a is true and b is true)."),
+        ("not (a and b)", "It is not the case that (a is true and b is true)."),
     ],
 )
 def test_formulas_read_aloud(text: str, words: str) -> None:

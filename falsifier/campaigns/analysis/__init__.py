@@ -1,4 +1,4 @@
-"""Numbers of runs and campaigns, read from their directories.
+"""The results of runs and campaigns in numbers, read from their directories.
 
 ::
 

@@ -1,4 +1,4 @@
-"""Curves over simulations."""
+"""Curves over the number of simulations."""
 
 from collections.abc import Iterable
 
@@ -11,38 +11,38 @@ Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def falsification_curve(runs: Iterable[Run]) -> Curve:
-    """Share of finished runs that are falsified after so many simulations.
+    """Share of finished runs that are falsified, over the number of simulations.
 
     Returns:
-        Numbers of simulations from 0 to the most that any run used, and the shares there; the share holds
-        until the next number. Shape (k,) both.
+        Numbers of simulations, from 0 to the maximum of all runs, and the share at each, both of shape (k,);
+        the share is constant between two numbers.
     """
     finished = [run for run in runs if run.finished]
     counts = sorted(run.simulations for run in finished if run.falsified)
     shares = np.arange(len(counts) + 1) / max(len(finished), 1)
-    most = max((run.simulations for run in finished), default=0)
-    return np.array([0.0, *counts, most]), np.append(shares, shares[-1])
+    largest = max((run.simulations for run in finished), default=0)
+    return np.array([0.0, *counts, largest]), np.append(shares, shares[-1])
 
 
-def thinned(robustness: NDArray[np.float64], most: int) -> Curve:
-    """Robustness values for drawing: all of them, or the lowest of each of so many equal stretches.
+def thinned(robustness: NDArray[np.float64], limit: int) -> Curve:
+    """Robustness values for drawing: all of them, or the lowest in each of ``limit`` equal parts.
 
     Args:
-        robustness: of each simulation, shape (n,), NaN where there is none.
-        most: number of values to keep.
+        robustness: robustness of each simulation, shape (n,); NaN without a verdict.
+        limit: maximum number of values to keep.
 
     Returns:
-        Numbers of the simulations from 1, and the values there; without NaN.
+        Numbers of the simulations, from 1, and their values; without NaN.
     """
     valid = np.flatnonzero(~np.isnan(robustness))
-    if len(valid) > most:
-        stretches = np.array_split(valid, most)
-        valid = np.array([s[np.argmin(robustness[s])] for s in stretches])
+    if len(valid) > limit:
+        parts = np.array_split(valid, limit)
+        valid = np.array([part[np.argmin(robustness[part])] for part in parts])
     return (valid + 1).astype(np.float64), robustness[valid]
 
 
 def improvements(robustness: NDArray[np.float64]) -> Curve:
-    """Where the smallest robustness so far falls: numbers of the simulations from 1, and the values."""
+    """Simulations that improve on the smallest robustness so far: their numbers, from 1, and the values."""
     if not len(robustness):
         return robustness, robustness
     best = np.fmin.accumulate(robustness)

@@ -1,4 +1,4 @@
-"""Published numbers, and ranks among them."""
+"""Published results, and the rank of our own among them."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -10,19 +10,19 @@ from typing import Any
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 
-# Published means have one decimal, so ours are compared at one decimal: 1.3 and 1.34 share a rank.
+# Published means have one decimal, so means are compared with one decimal: 1.3 and 1.34 share a rank.
 _DECIMALS = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """One cell of a table: how often, and in how many simulations.
+    """One cell of a table: how often a requirement was falsified, and in how many simulations.
 
     Attributes:
-        falsified: falsified runs.
-        runs: all runs.
-        mean: mean simulations over the falsified runs, None where there is none.
-        tool: whose, where a column is not one tool's.
+        falsified: number of falsified runs.
+        runs: number of all runs.
+        mean: mean number of simulations over the falsified runs; None if there is none.
+        tool: name of the tool, if the column combines several tools.
     """
 
     falsified: int
@@ -32,7 +32,7 @@ class Score:
 
     @property
     def key(self) -> tuple[float, float]:
-        """Order of ranks: more falsified runs first, then fewer simulations."""
+        """Sort key of ranks: more falsified runs first, then fewer simulations."""
         mean = float("inf") if self.mean is None else round(self.mean, _DECIMALS)
         return -self.falsified / max(self.runs, 1), mean
 
@@ -42,10 +42,10 @@ class Published:
     """Content of published.toml.
 
     Attributes:
-        columns: scores by requirement, by column: ``best``, ``uniform``, ``llm_falsifier``.
-        ablation: the same by prompt variant.
-        llms: the same by language model and effort, e.g. ``gpt-5-mini-high``.
-        sources: where each of them comes from, by column.
+        columns: scores by column (``best``, ``uniform``, ``llm_falsifier``) and requirement.
+        ablation: scores by prompt variant and requirement.
+        llms: scores by language model with effort, e.g. ``gpt-5-mini-high``, and requirement.
+        sources: publication that a column was taken from.
     """
 
     columns: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Published:
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def scores(self, requirement: str) -> dict[str, Score]:
-        """Scores on a requirement by column."""
+        """Scores for one requirement by column."""
         return {name: scores[requirement] for name, scores in self.columns.items() if requirement in scores}
 
 
@@ -62,7 +62,7 @@ COLUMNS = {"best": "best ARCH-COMP tool", "llm_falsifier": "LLM-Falsifier", "uni
 
 
 def rank(score: Score, others: Iterable[Score]) -> int | None:
-    """Place of a score among others: one more than there are better ones; None without a falsified run."""
+    """Rank of a score: one plus the number of better ones; None without a falsified run."""
     if score.falsified == 0:
         return None
     return 1 + sum(other.falsified > 0 and other.key < score.key for other in others)
@@ -70,10 +70,10 @@ def rank(score: Score, others: Iterable[Score]) -> int | None:
 
 @lru_cache(maxsize=4)
 def read_published(path: Path | None = None) -> Published:
-    """Read a table of published numbers; without a path the bundled one.
+    """Read a table of published results; without a path, the bundled one.
 
     Raises:
-        SpecError: when the file is not such a table.
+        SpecError: if the file is not such a table.
     """
     file = path or bundled("specs") / "published.toml"
     try:
@@ -86,7 +86,7 @@ def read_published(path: Path | None = None) -> Published:
             {name: data[name].get("source", "") for name in COLUMNS},
         )
     except (OSError, tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:
-        raise SpecError(f"not a table of published numbers: {error!r}", file=str(file)) from None
+        raise SpecError(f"not a table of published results: {error!r}", file=str(file)) from None
 
 
 def _scores(column: Mapping[str, Any], runs: int) -> dict[str, Score]:

@@ -1,6 +1,6 @@
 """Runs as values, and as tidy columns.
 
-A search for several requirements together is a run for each of them.
+A search shared by several requirements appears as one run per requirement.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,22 +27,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Run:
-    """One run as its directory tells it.
+    """One run, read from its directory.
 
     Attributes:
-        directory: where it lies.
-        manifest: how it came to be, with this requirement alone.
+        directory: run directory.
+        manifest: its manifest, reduced to this requirement.
         shared: whether several requirements shared this search.
         method: how it searched.
         status: how it ended, or ``running``.
         reason: why it ended.
-        robustness: of each evaluation in order, shape (n,); NaN where the simulation gave none.
-        best: index of the smallest robustness, or None.
-        verdict: of the counterexample; without one, of the best evaluation; or None.
+        robustness: robustness of each evaluation in order, shape (n,); NaN without a verdict.
+        best: index of the evaluation with the smallest robustness, or None.
+        verdict: verdict of the counterexample, otherwise of the best evaluation, or None.
         counterexample: index of the confirmed violation, or None.
-        unconfirmed: violations that were not confirmed, by index, with what was said of them.
-        trajectories: names of kept trajectory files by evaluation.
-        spent: what it used.
+        unconfirmed: outcome and reason of violations that were not confirmed, by index.
+        trajectories: names of kept trajectory files, by index.
+        spent: what it has spent.
     """
 
     directory: Path
@@ -66,7 +66,7 @@ class Run:
 
     @property
     def counterexample_file(self) -> Path:
-        """File of the counterexample, for ``falsifier replay``; it is written when it is first asked for."""
+        """Path of the counterexample, for ``falsifier replay``, which creates the file if it is missing."""
         return self.directory / file_name(self.requirement if self.shared else "")
 
     @property
@@ -76,12 +76,12 @@ class Run:
 
     @property
     def falsified(self) -> bool:
-        """Whether it found a confirmed counterexample."""
+        """Whether a confirmed counterexample was found."""
         return self.status == "falsified"
 
     @property
     def finished(self) -> bool:
-        """Whether it ended with a result: falsified, or its budget used up."""
+        """Whether it ended with a result: falsified, or budget used up."""
         return self.status in ("falsified", "not falsified")
 
     @property
@@ -99,7 +99,7 @@ def load(directory: Path) -> list[Run]:
     """Load all runs of a campaign, of a run directory, or of a folder of run directories.
 
     Raises:
-        JournalError: when the directory is none of these, or a file in it cannot be understood.
+        JournalError: if the directory is none of these, or a file in it is invalid.
     """
     described = ((path, manifests.read(path)) for path in run_directories(directory))
     return [
@@ -110,19 +110,19 @@ def load(directory: Path) -> list[Run]:
 
 
 def load_run(directory: Path, requirement: str | None = None) -> Run:
-    """Load one run directory; trajectories are left on disk.
+    """Load one run directory; trajectories stay on disk.
 
     Args:
-        directory: of the run.
-        requirement: which one, where several were falsified together.
+        directory: run directory.
+        requirement: name of the requirement, if several share the search.
 
     Raises:
-        JournalError: when a file in it cannot be understood, or a requirement must be named.
+        JournalError: if a file is invalid, or several requirements share the search and none is named.
     """
     manifest = manifests.read(directory)
     if requirement is None and manifest.shared:
         names = ", ".join(manifest.names)
-        raise JournalError(f"{directory}: several requirements were falsified together, name one of {names}")
+        raise JournalError(f"{directory}: several requirements share this run; choose one of {names}")
     return _run(directory, manifest.of(requirement or manifest.names[0]), shared=manifest.shared)
 
 
@@ -147,12 +147,12 @@ def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
 
 
 def columns(runs: Iterable[Run]) -> dict[str, list[Any]]:
-    """One row a run, as plain columns of equal length."""
+    """One row per run, as plain columns of equal length."""
     return _columns([_row(run) for run in runs])
 
 
 def histories(runs: Iterable[Run]) -> dict[str, list[Any]]:
-    """One row an evaluation: which run, its number from 1, its robustness and the smallest so far."""
+    """One row per evaluation: its run, its number from 1, its robustness and the smallest so far."""
     rows = []
     for run in runs:
         for i, (value, best) in enumerate(zip(run.robustness, run.best_so_far, strict=True), start=1):
@@ -170,10 +170,10 @@ def histories(runs: Iterable[Run]) -> dict[str, list[Any]]:
 
 
 def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
-    """One row a run, as a pandas table.
+    """One row per run, as a pandas data frame.
 
     Raises:
-        ImportError: when pandas is not installed; columns() needs nothing.
+        ImportError: if pandas is not installed; columns() does not need it.
     """
     import pandas
 

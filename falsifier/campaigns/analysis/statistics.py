@@ -1,4 +1,4 @@
-"""Statistics of the competition's protocol: over the falsified runs of one method on one requirement."""
+"""Statistics of the competition's protocol, for the runs of one method on one requirement."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,22 +19,24 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """What a table says of several runs.
+    """Statistics of several runs.
+
+    Except for ``unfinished`` and ``best``, all numbers cover finished runs only.
 
     Attributes:
-        runs: finished runs; failed and unfinished ones are in no other number here but unfinished.
-        falsified: of them, those with a confirmed counterexample.
-        unfinished: runs that failed, were interrupted or still go on.
-        mean: mean number of simulations over the falsified runs, None where there is none.
+        runs: number of finished runs.
+        falsified: number of runs with a confirmed counterexample.
+        unfinished: number of runs that failed, were interrupted or are still running.
+        mean: mean number of simulations over the falsified runs; None if there is none.
         median: median of the same.
-        deviation: sample standard deviation of the same, None below two.
-        rate_interval: 95 % Wilson interval of the share of falsified runs, None without finished runs.
-        mean_interval: 95 % percentile bootstrap interval of the mean, None below two falsified runs.
+        deviation: sample standard deviation of the same; None below two falsified runs.
+        rate_interval: 95 % Wilson interval of the share of falsified runs; None without finished runs.
+        mean_interval: 95 % percentile bootstrap interval of the mean; None below two falsified runs.
         best: smallest robustness of any run.
-        simulation_seconds: mean time in the simulator a run.
-        seconds: mean wall-clock time a run.
-        tokens: mean tokens a run.
-        cost: mean US dollars a run; None where unknown.
+        simulation_seconds: mean time in the simulator per run.
+        seconds: mean wall-clock time per run.
+        tokens: mean number of tokens per run.
+        cost: mean cost per run in US dollars; None if unknown.
     """
 
     runs: int
@@ -53,7 +55,7 @@ class Statistics:
 
 
 def statistics(runs: Iterable[Run]) -> Statistics:
-    """Statistics of runs of one method on one requirement."""
+    """Compute the statistics of runs of one method on one requirement."""
     runs = list(runs)
     finished = [run for run in runs if run.finished]
     counts = np.array([run.simulations for run in finished if run.falsified], dtype=np.float64)
@@ -85,7 +87,7 @@ def group(runs: Iterable[Run]) -> dict[tuple[str, Method], list[Run]]:
 
 
 def wilson(successes: int, trials: int, confidence: float = _CONFIDENCE) -> Interval:
-    """Score interval of a share (E. B. Wilson, 1927); it stays within [0, 1] and is not empty at 0 or 1.
+    """Score interval of a share (E. B. Wilson, 1927): within [0, 1], and not empty for shares of 0 and 1.
 
     >>> low, high = wilson(10, 10)
     >>> round(low, 4), high
@@ -100,7 +102,7 @@ def wilson(successes: int, trials: int, confidence: float = _CONFIDENCE) -> Inte
 
 
 def bootstrap(values: NDArray[np.float64], confidence: float = _CONFIDENCE) -> Interval:
-    """Percentile bootstrap interval of the mean; the same values give the same interval."""
+    """Percentile bootstrap interval of the mean; seeded, so the same values give the same interval."""
     draws = np.random.default_rng(0).choice(values, size=(_RESAMPLES, len(values)))
     tail = 50 * (1 - confidence)
     low, high = np.percentile(draws.mean(axis=1), [tail, 100 - tail])

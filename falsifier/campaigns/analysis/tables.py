@@ -1,4 +1,4 @@
-"""The protocol's tables, as values that any face can print."""
+"""The protocol's tables as values, printed as text, Markdown or CSV."""
 
 import csv
 import json
@@ -20,10 +20,10 @@ class Table:
     """A table of texts.
 
     Attributes:
-        title: what it shows.
+        title: what the table shows.
         header: names of the columns.
         rows: cells.
-        notes: what a reader must know to read it right.
+        notes: explanations that belong below the table.
     """
 
     title: str
@@ -32,16 +32,16 @@ class Table:
     notes: tuple[str, ...] = ()
 
     def only(self, *names: str) -> "Table":
-        """Return the same table with these columns alone, in this order.
+        """Return the table with only these columns, in this order.
 
         Raises:
-            ValueError: for a name that is no column.
+            ValueError: for an unknown column.
         """
         picked = [self.header.index(name) for name in names]
         return replace(self, header=names, rows=tuple(tuple(row[i] for i in picked) for row in self.rows))
 
     def markdown(self) -> str:
-        """As a Markdown table with its title and notes."""
+        """Format as a Markdown table with its title and notes."""
         lines = [self.header, tuple("---" for _ in self.header), *self.rows]
         body = "\n".join(
             f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines
@@ -53,7 +53,7 @@ class Table:
         return self.markdown()
 
     def csv(self) -> str:
-        """As comma-separated values."""
+        """Format as comma-separated values."""
         buffer = StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow(self.header)
@@ -61,7 +61,7 @@ class Table:
         return buffer.getvalue()
 
     def text(self) -> str:
-        """As plain text with aligned columns."""
+        """Format as plain text with aligned columns."""
         rows = [self.header, *self.rows]
         widths = [max(len(row[i]) for row in rows) for i in range(len(self.header))]
         lines = [
@@ -72,10 +72,10 @@ class Table:
 
 
 def main_table(runs: Iterable[Run], published: Published) -> Table:
-    """One row for each requirement and method, beside the published numbers.
+    """Make a table with one row per requirement and method, and the published results.
 
-    Published numbers hold for the specs' own (fixed) parameterization of instance 1 and stand beside no
-    other.
+    The published results apply to the specs' own (fixed) parameterization of instance 1, so only rows of that
+    parameterization show them.
     """
     rows, notes = [], set[str]()
     names = dict(COLUMNS)
@@ -100,14 +100,14 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
 
 
 def ablation_table(runs: Iterable[Run], published: Published) -> Table:
-    """Prompt variants side by side, each with the published column of its name."""
+    """Make a table of prompt variants side by side, with the published results for each."""
     ours = _by_column(runs, lambda m: f"{m.variant} ({_without(m, variant='')})" if m.variant else "")
     theirs = {f"{name} published": scores for name, scores in published.ablation.items()}
     return _side_by_side("Prompt variants: FR / S", ours, theirs)
 
 
 def llms_table(runs: Iterable[Run], published: Published) -> Table:
-    """Language models side by side, with the published columns."""
+    """Make a table of language models side by side, with the published results."""
     ours = _by_column(runs, lambda m: m.label if m.llm else "")
     theirs = {f"{name} published": scores for name, scores in published.llms.items()}
     return _side_by_side("Language models: FR / S", ours, theirs)
@@ -121,17 +121,17 @@ TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
 
 
 def statistics_json(runs: Iterable[Run]) -> str:
-    """All statistics for machines: a list of objects, one for each requirement and method."""
+    """All statistics as JSON: a list of objects, one per requirement and method."""
     return json.dumps([_json_row(key, members) for key, members in group(runs).items()], indent=2) + "\n"
 
 
 def comparable(method: Method) -> bool:
-    """Whether published numbers may stand beside this method's."""
+    """Whether a method's results may be compared with the published ones."""
     return method.parameterization == "fixed" and not method.profile and not method.together
 
 
 def score(found: Statistics) -> Score:
-    """FR and S of statistics."""
+    """Reduce statistics to the values that published tables contain: FR and mean S."""
     return Score(found.falsified, found.runs, found.mean)
 
 
@@ -148,15 +148,15 @@ _NUMBERS = (
     "cost $",
 )
 _LEGEND = (
-    "FR: falsified of finished runs. S: simulations over the falsified runs; std is the sample standard "
+    "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
     "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
-    "means a run. Rank: place among the published columns here, more falsified runs first, then the lower "
-    "mean S; equal ones share a rank. Published cells: FR / S."
+    "means per run. Rank: position among the published columns shown, by FR, then by mean S; ties share a "
+    "rank. Published cells: falsified runs / mean S."
 )
 
 
 def _unfinished_note() -> str:
-    return "+n: further runs that failed or have not ended; they are in no other number."
+    return "+n: n more runs failed or have not ended; no other number includes them."
 
 
 def _numbers(s: Statistics) -> tuple[str, ...]:
@@ -198,11 +198,13 @@ def _cell(cell: Score | None) -> str:
 
 
 def _sources(published: Published) -> tuple[str, ...]:
-    return tuple(f"{COLUMNS[name]}: {source}." for name, source in published.sources.items() if source)
+    return tuple(
+        f"Source of {COLUMNS[name]}: {source}." for name, source in published.sources.items() if source
+    )
 
 
 def _by_column(runs: Iterable[Run], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
-    """Scores by requirement, by column; methods without a name are left out."""
+    """Scores by column and requirement; methods whose name is empty are omitted."""
     found: dict[str, dict[str, Score]] = {}
     for (requirement, method), members in group(runs).items():
         if name(method):
@@ -226,7 +228,7 @@ def _side_by_side(
     return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))
 
 
-_LEGEND_SIDE = "FR / S: falsified of finished runs / mean simulations over the falsified runs."
+_LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
 
 
 def _share_cell(cell: Score | None) -> str:

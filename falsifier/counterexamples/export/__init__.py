@@ -1,14 +1,14 @@
-"""Counterexamples as files that people and other tools read.
+"""Counterexamples as files for people and other tools.
 
 ::
 
     counterexample.json         for falsifier itself
-    input.csv                   input signals: FMPy, fmusim, OpenModelica
-    start_values.json, .ssv     parameters and start values: scripts; tools that read SSP parameter sets
-    replay.py                   simulates both with FMPy alone, into outputs.csv, and prints what decided
+    input.csv                   input signals, for FMPy, fmusim and OpenModelica
+    start_values.json, .ssv     parameters and start values, for scripts and for SSP tools
+    replay.py                   simulates both with FMPy only; writes outputs.csv, prints the critical time
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
-    test_NAME.py                a pytest that fails while the counterexample violates
+    test_NAME.py                a pytest test that fails as long as the counterexample violates
 """
 
 from pathlib import Path
@@ -28,14 +28,14 @@ def export_counterexample(
 ) -> list[Path]:
     """Write a counterexample for other tools; return the files.
 
-    What does not apply is left out: input.csv of a model without inputs, the scripts that simulate an FMU
-    where the model is none, the pytest file where the problem cannot be loaded from a file.
+    Files that do not apply are omitted: input.csv if the model has no inputs, the simulation scripts if the
+    model is not an FMU, the test if the problem cannot be loaded from a file.
 
     Args:
-        problem: what it violates.
+        problem: the problem whose requirement is violated.
         stored: the counterexample.
-        evaluation: today's simulation of it.
-        directory: where to write; it is made.
+        evaluation: a current simulation of it.
+        directory: where to write; created if missing.
     """
     directory.mkdir(parents=True, exist_ok=True)
     table, start = input_table(problem, evaluation.candidate), start_values(problem, evaluation.candidate)

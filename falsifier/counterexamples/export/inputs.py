@@ -1,4 +1,4 @@
-"""Input signals as a table, exactly as the simulation saw them."""
+"""Input signals as a table, exactly as they were applied in the simulation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from falsifier.problem.problem import Problem
 
 @dataclass(frozen=True, slots=True)
 class InputTable:
-    """Input signals over time; between two rows they run in straight lines.
+    """Input signals over time, linear between two rows.
 
     Attributes:
-        times: in s, shape (n,), from 0 to the stop time; a time that stands twice is a step.
-        columns: one array of shape (n,) an input, by name.
+        times: in s, shape (n,), from 0 to the stop time; a repeated time is a step.
+        columns: one array of shape (n,) per input, by name.
     """
 
     times: NDArray[np.float64]
@@ -26,10 +26,10 @@ class InputTable:
 
 
 def input_table(problem: Problem, candidate: Candidate) -> InputTable:
-    """Table of all numeric inputs of the model, the constant ones too.
+    """Make a table of all numeric inputs of the model, including constant ones.
 
-    The rows are the communication points, where inputs are set. Held and piecewise constant signals step
-    there: one row with the value before and one with the value after. Rows that say nothing new are left out.
+    The rows are the communication points, at which inputs are set. Held and piecewise constant signals step
+    there: one row with the value before and one with the value after. Redundant rows are omitted.
     """
     experiment = problem.experiment
     steps = round(experiment.stop_time / (experiment.step_size or experiment.output_interval))
@@ -48,7 +48,7 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
         for pair in ((k, False), (k, True))
         if pair[1] or any(before[n][k] != after[n][k] for n in after)
     ]
-    # A step at the very end is never simulated: the last inputs are set one communication step earlier.
+    # A step at the stop time has no effect: the last inputs are set one communication step earlier.
     rows = rows[:-1] if len(rows) > 1 and rows[-2] == (steps, False) else rows
     columns = {n: np.array([(after if late else before)[n][k] for k, late in rows]) for n in after}
     return _without_repetition(InputTable(times[[k for k, _ in rows]], columns))
@@ -76,7 +76,7 @@ def _steps(variable: Variable, signal: Signal) -> bool:
 
 
 def _without_repetition(table: InputTable) -> InputTable:
-    """Return the table without rows between two equal ones, save where a time stands twice."""
+    """Return the table without rows that lie between two equal ones; steps stay."""
     values = np.stack(list(table.columns.values())) if table.columns else np.zeros((1, len(table.times)))
     inner = (values[:, 1:-1] == values[:, :-2]).all(axis=0) & (values[:, 1:-1] == values[:, 2:]).all(axis=0)
     kept = np.concatenate(([True], ~inner, [True])) if len(table.times) > 1 else np.array([True])

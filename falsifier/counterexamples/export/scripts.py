@@ -1,4 +1,4 @@
-"""Scripts that run a counterexample in other tools, as text."""
+"""The text of scripts that simulate a counterexample in other tools."""
 
 import json
 from collections.abc import Mapping
@@ -10,18 +10,18 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
 
-# Rows that a replay prints before and behind the critical time.
+# Rows that replay.py prints before and after the critical time.
 _SHOWN_ROWS = 3
 _FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
 _REPLAY = '''\
-"""Simulates a counterexample with FMPy alone; writes outputs.csv and prints what decided the verdict.
+"""Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows at the critical time.
 
     pip install fmpy
     python replay.py [MODEL.fmu]
 
 {requirement}: {formula}
-Found robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {predicate}
+Recorded robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {predicate}
 """
 
 import json
@@ -58,13 +58,13 @@ print("".join(f"{{name:>14}}" for name in shown))
 for k in range(max(critical - {around}, 0), min(critical + {around} + 1, len(result))):
     values = "".join(f"{{float(result[name][k]):14.6g}}" for name in shown)
     print(values + ("  <- critical time" if k == critical else ""))
-print(f"all {{len(result)}} rows are in outputs.csv beside this script")
+print(f"all {{len(result)}} rows are in outputs.csv next to this script")
 '''
 
 _OPENMODELICA = """\
-// Simulates a counterexample in OpenModelica, from the Modelica model that the FMU was made of:
+// Simulates a counterexample in OpenModelica, from the Modelica model that the FMU was exported from:
 //     omc replay.mos
-// Say first where the model is, and its full name where it is not the FMU's.
+// First set the path of the model in loadFile, and in simulate its full name if it differs from the FMU's.
 //
 // {requirement}: {formula}
 loadFile("{file}");
@@ -74,7 +74,7 @@ getErrorString();
 """
 
 _PYTEST = '''\
-"""Fails while the counterexample beside this file violates {requirement}."""
+"""Fails as long as the counterexample in this folder violates {requirement}."""
 
 from pathlib import Path
 
@@ -83,7 +83,7 @@ from falsifier.counterexamples.store import load, problem_of, replay
 FILE = Path(__file__).with_name("counterexample.json")
 
 
-def test_{name}_holds_where_it_was_violated() -> None:
+def test_{name}_is_no_longer_violated() -> None:
     stored = load(FILE)
     replayed = replay(stored, problem_of(stored))
     assert replayed.status != "violates", replayed.text
@@ -91,12 +91,13 @@ def test_{name}_holds_where_it_was_violated() -> None:
 
 
 def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> str | None:
-    """Python script that needs FMPy only; None where the model is no FMU."""
+    """Python script that needs only FMPy; None if the model is not an FMU."""
     model, verdict, experiment = problem.model, evaluation.verdict, problem.experiment
     if not isinstance(model, FmuModel) or verdict is None:
         return None
     is_co_simulation = model.interface == "co-simulation"
-    # FMPy's co-simulation exchanges values at every output interval, so a smaller step is recorded too.
+    # FMPy uses the output interval as communication step. If the problem's step is smaller, the script
+    # records at that step and keeps every n-th row.
     step = (is_co_simulation and experiment.step_size) or experiment.output_interval
     return _REPLAY.format(
         requirement=problem.name,
@@ -120,7 +121,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> 
 
 
 def openmodelica_script(problem: Problem, start: Mapping[str, float]) -> str | None:
-    """OpenModelica script; None where the model is no FMU."""
+    """OpenModelica script; None if the model is not an FMU."""
     if not isinstance(problem.model, FmuModel):
         return None
     overrides = ",".join(f"{name}={value!r}" for name, value in start.items())
@@ -139,7 +140,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float]) -> str | N
 
 
 def pytest_file(stored: StoredCounterexample) -> str | None:
-    """Test of the counterexample file beside it; None where its problem cannot be loaded from a file."""
+    """Test of the counterexample file next to it; None if its problem cannot be loaded from a file."""
     if stored.problem is None:
         return None
     name = "".join(c if c.isalnum() else "_" for c in stored.requirement)

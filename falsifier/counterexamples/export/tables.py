@@ -15,7 +15,7 @@ _MATLAB_NAME_LENGTH = 63
 
 
 def write_csv(table: InputTable, path: Path) -> Path:
-    """Write the inputs with a header of quoted names; numbers read back exactly."""
+    """Write the inputs with a header of quoted names; numbers are written with full precision."""
     columns = {"time": table.times, **table.columns}
     lines = [",".join(f'"{name}"' for name in columns)]
     lines += [",".join(map(repr, row)) for row in np.stack(list(columns.values()), axis=1).tolist()]
@@ -43,10 +43,11 @@ def write_ssv(start: Mapping[str, float], name: str, path: Path) -> Path:
 
 
 def write_mat(table: InputTable, start: Mapping[str, float], path: Path) -> Path:
-    """Write inputs and start values for MATLAB, named as MATLAB can name them.
+    """Write inputs and start values for MATLAB, under valid MATLAB names.
 
-    Each input is a matrix with the columns time and value, as From Workspace and root inports read it; a time
-    that stands twice is a step. ``start_values`` is a structure; ``names`` lists the model's own names.
+    Each input is a matrix with the columns time and value, the format of From Workspace blocks and root
+    inports; a repeated time is a step. ``start_values`` is a structure; ``names`` maps the MATLAB names to
+    the model's own names.
     """
     from scipy.io import savemat
 
@@ -60,7 +61,7 @@ def write_mat(table: InputTable, start: Mapping[str, float], path: Path) -> Path
 
 
 def matlab_name(name: str) -> str:
-    """Nearest name that MATLAB accepts.
+    """Closest valid MATLAB name.
 
     >>> matlab_name("car.x[1]")
     'car_x_1_'

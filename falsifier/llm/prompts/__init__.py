@@ -1,4 +1,4 @@
-"""Prompts: what is told to an LLM, as typed blocks, and how it reads."""
+"""Prompts: what an LLM is sent, first as typed blocks, then as text."""
 
 from falsifier.llm.prompts.blocks import Prompt
 from falsifier.llm.prompts.build import build_prompt

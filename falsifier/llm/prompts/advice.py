@@ -1,4 +1,4 @@
-"""How to make use of what a prompt tells."""
+"""The part of a prompt that advises how to use the rest."""
 
 from falsifier.llm.prompts.blocks import AdviceBlock
 from falsifier.llm.prompts.variants import Variant
@@ -7,39 +7,42 @@ from falsifier.stl.formula import Implies
 
 
 def advice(view: View, variant: Variant) -> AdviceBlock:
-    """Advice that fits what the variant tells and what the requirement asks."""
-    lines = ["Use the output values of the earlier samples to work out how each input moves the outputs."]
+    """Advice that fits what the variant shows and how the requirement is built."""
+    lines = ["Use the output values of the earlier samples to work out how each input affects the outputs."]
     if variant.has("critical"):
         lines.append(
             "Look at the time that decided each robustness value, and change the inputs so that the signals "
-            "there move towards the wrong side."
+            "at that time move towards violating the requirement."
         )
     if variant.has("observations"):
         lines += _on_observations(view)
     if variant.has("freedom") and any(r.free for r in view.space.inputs):
         lines.append(
-            "Choose the shape that the violation needs: steps and short pulses by constant pieces with times "
-            "of your own, slow changes by few points, a resonance by pieces of half its period."
+            "Choose the signal shape that a violation needs: constant interpolation with your own times for "
+            "steps and short pulses, few control points for slow changes, pieces of half a period to excite "
+            "a resonance."
         )
     return AdviceBlock(lines=tuple(lines))
 
 
 def _on_observations(view: View) -> list[str]:
-    lines = ["Extremes of the ranges are cheap first samples; for signals also one switch between them."]
+    lines = [
+        "The limits of the ranges are good first samples; for signals, so is a single switch between them."
+    ]
     formula = view.requirement.formula
     units = {view.unit(name) for name in formula.signals}
     if len(formula.predicates) > 1 and len(units) > 1:
         lines.append(
-            "Robustness values of different parts are in the units of their signals: a small number in one "
-            "unit may be harder to move than a large one in another."
+            "Robustness values of different parts are in the units of their signals: a small value in one "
+            "unit may be harder to change than a large value in another."
         )
     if any(isinstance(part, Implies) for part in formula.walk()):
         lines.append(
-            "An implication is violated only where its condition holds and its consequence fails: bring "
-            "about the condition first."
+            "An implication is violated only if its condition is true and its consequence fails: make the "
+            "condition true first."
         )
     lines.append(
-        "Do not only repeat the best sample with small changes: when samples stop improving, try another "
+        "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
         "strategy."
     )
     return lines

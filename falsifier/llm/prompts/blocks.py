@@ -1,4 +1,4 @@
-"""A prompt as a value: typed blocks, each of them on or off (None) as the variant says."""
+"""A prompt as a value: typed blocks, each present or absent (None) according to the variant."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -10,26 +10,28 @@ class _Block(BaseModel):
 
 
 class TaskBlock(_Block):
-    """What the search is for."""
+    """The task."""
 
     knows_requirement: bool
-    count: int = Field(description="Candidates wanted.")
+    count: int = Field(description="Number of candidates wanted.")
 
 
 class SystemBlock(_Block):
-    """What the model is."""
+    """The simulated system."""
 
     name: str
     description: str
 
 
 class RequirementBlock(_Block):
-    """What must hold, and is to be violated."""
+    """The requirement to violate."""
 
     formula: str
     reading: str = Field(default="", description="The formula in plain words.")
     description: str = ""
-    terms: tuple[str, ...] = Field(default=(), description="Compared expressions beyond single signals.")
+    terms: tuple[str, ...] = Field(
+        default=(), description="Compared expressions that are more than a single signal."
+    )
 
 
 class SignalLine(_Block):
@@ -42,22 +44,22 @@ class SignalLine(_Block):
 
 
 class OutputsBlock(_Block):
-    """Signals that can be seen."""
+    """Signals that are recorded."""
 
     signals: tuple[SignalLine, ...]
 
 
 class DimensionLine(_Block):
-    """One number that may be chosen."""
+    """One number to choose."""
 
     number: int
-    meaning: str = Field(default="", description="Such as 'throttle [%] at t = 8.33 s'; empty: not told.")
+    meaning: str = Field(default="", description="Such as 'throttle [%] at t = 8.33 s'; empty: not revealed.")
     low: str
     high: str
 
 
 class InputLine(_Block):
-    """One input signal that may be chosen."""
+    """One input signal to choose."""
 
     name: str
     unit: str = ""
@@ -75,7 +77,7 @@ class InputLine(_Block):
 
 
 class ParameterLine(_Block):
-    """One parameter or initial state that may be chosen."""
+    """One parameter or initial state to choose."""
 
     name: str
     unit: str = ""
@@ -88,7 +90,7 @@ class ParameterLine(_Block):
 
 
 class InputsBlock(_Block):
-    """What may be chosen."""
+    """Everything to choose."""
 
     stop_time: str
     dimensions: tuple[DimensionLine, ...] = ()
@@ -100,13 +102,13 @@ class SampleLines(_Block):
     """One earlier sample."""
 
     number: int
-    mark: str = Field(default="", description="Why it is shown although it is old: 'best so far', ...")
+    mark: str = Field(default="", description="Why an old sample is shown: 'best so far', ...")
     inputs: tuple[str, ...]
-    robustness: str = Field(default="", description="Empty: there is no verdict.")
+    robustness: str = Field(default="", description="Empty if there is no verdict.")
     failure: str = ""
-    facts: tuple[str, ...] = Field(default=(), description="What was seen, one line each.")
+    facts: tuple[str, ...] = Field(default=(), description="Observations, one line each.")
     details: tuple[str, ...] = Field(
-        default=(), description="More of it, the first to go when room is short."
+        default=(), description="Further observations; removed first if the prompt is too long."
     )
 
 
@@ -115,25 +117,25 @@ class HistoryBlock(_Block):
 
     samples: tuple[SampleLines, ...]
     omitted: int = 0
-    pending: tuple[str, ...] = Field(default=(), description="Proposed, result not known yet.")
+    pending: tuple[str, ...] = Field(default=(), description="Candidates without a result yet.")
     notes: tuple[str, ...] = ()
 
 
 class AdviceBlock(_Block):
-    """How to make use of what is told."""
+    """How to use the rest of the prompt."""
 
     lines: tuple[str, ...]
 
 
 class ReplyBlock(_Block):
-    """The form of the reply."""
+    """The required form of the reply."""
 
     example: str
     notes: tuple[str, ...] = ()
 
 
 class Prompt(_Block):
-    """Everything that one request tells an LLM."""
+    """The complete content of one request."""
 
     variant: str
     task: TaskBlock

@@ -1,4 +1,4 @@
-"""From a problem and its evaluations to a prompt: what is told, and how it is put into blocks."""
+"""From a problem and its evaluations to a prompt: selects what is shown and arranges it in blocks."""
 
 import json
 from collections.abc import Sequence
@@ -26,11 +26,11 @@ from falsifier.llm.prompts.blocks import (
 from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
 from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View, told_unit
+from falsifier.llm.prompts.view import View, shown_unit
 from falsifier.stl import in_words
 
-# Control-point times that are told one by one; of more only the distance.
-_MOST_TIMES = 25
+# Control-point times listed individually; of longer lists the first ones and the last.
+_MAX_TIMES = 25
 
 
 def build_prompt(
@@ -42,15 +42,15 @@ def build_prompt(
     notes: Sequence[str] = (),
     count: int = 1,
 ) -> Prompt:
-    """Prompt for the next candidates.
+    """Build the prompt for the next candidates.
 
     Args:
         view: the problem.
-        variant: what is told.
+        variant: which parts the prompt contains.
         evaluations: what was simulated so far, in order.
-        pending: candidates whose evaluations are not known yet.
-        notes: lines about the search as a whole, from whoever leads it.
-        count: how many candidates are wanted.
+        pending: candidates without an evaluation yet.
+        notes: lines about the search as a whole, from the engine that leads it.
+        count: number of candidates wanted.
     """
     return Prompt(
         variant=variant.name,
@@ -99,7 +99,7 @@ def _outputs(view: View, variant: Variant) -> OutputsBlock:
 
 
 def _dimensions(view: View, variant: Variant) -> InputsBlock:
-    """Numbers to choose, with their meanings or without."""
+    """The numbers to choose, with or without their meanings."""
     clock = decimals_for(view.space.stop_time, 4)
     dimensions = []
     for i, dimension in enumerate(view.space.dimensions, start=1):
@@ -111,7 +111,7 @@ def _dimensions(view: View, variant: Variant) -> InputsBlock:
 
 
 def _named_inputs(view: View, variant: Variant) -> InputsBlock:
-    """Signals and parameters to choose, with everything that is known of them."""
+    """The signals and parameters to choose, with everything known about them."""
     free = variant.has("freedom")
     return InputsBlock(
         stop_time=number(view.space.stop_time),
@@ -122,20 +122,20 @@ def _named_inputs(view: View, variant: Variant) -> InputsBlock:
 
 def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     low, high = bounds(r.low, r.high)
-    told = tuple(number(round(t, 6)) for t in view.space.fixed_times(r))
-    if len(told) > _MOST_TIMES:
-        told = (*told[:3], "...", told[-1])
+    times = tuple(number(round(t, 6)) for t in view.space.fixed_times(r))
+    if len(times) > _MAX_TIMES:
+        times = (*times[:3], "...", times[-1])
     freedom = r.free if free else None
     return InputLine(
         name=r.name,
-        unit=told_unit(r.unit),
+        unit=shown_unit(r.unit),
         description=r.description,
         kind=r.kind,
         items=_items(r),
         low=low,
         high=high,
         control_points=r.control_points,
-        times=told,
+        times=times,
         interpolation=r.interpolation,
         hold=r.hold,
         max_control_points=freedom and freedom.max_control_points,
@@ -148,7 +148,7 @@ def _parameter(p: ParameterRange) -> ParameterLine:
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
         name=p.name,
-        unit=told_unit(p.unit),
+        unit=shown_unit(p.unit),
         description=p.description,
         kind=p.kind,
         items=_items(p),
@@ -203,7 +203,8 @@ def _sample(view: View, variant: Variant, index: int, mark: str, evaluation: Eva
 
 
 def _failure(evaluation: Evaluation) -> str:
-    return f"no verdict, the simulation {evaluation.status}: {evaluation.reason}".rstrip(": ")
+    how = "timed out" if evaluation.status == "timeout" else evaluation.status
+    return f"no verdict, the simulation {how}: {evaluation.reason}".rstrip(": ")
 
 
 def _chosen(view: View, variant: Variant, candidate: Candidate) -> tuple[str, ...]:
@@ -213,15 +214,15 @@ def _chosen(view: View, variant: Variant, candidate: Candidate) -> tuple[str, ..
 
 
 def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:
-    """What the samples show together."""
+    """Observations about all samples together."""
     values = [e.robustness for e in evaluations if e.robustness is not None]
     distinct = {f"{v:.9g}" for v in values}
     if len(values) < 2 or len(distinct) > 1:
         return []
     return [
-        f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its size shows "
-        "no direction. Go by what it hides: how near a condition came to being true, how short a stay was, "
-        "how far a signal was from where it switches."
+        f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its value "
+        "gives no direction. Look instead at how close a condition came to being true, how briefly a "
+        "discrete value was held, and how far a signal was from its switching point."
     ]
 
 
@@ -241,16 +242,17 @@ def _reply(view: View, variant: Variant, count: int) -> ReplyBlock:
 
 
 _FREE_NOTES = (
-    'An empty "times" means that the values are evenly spaced control points from 0 to the end, however '
-    "many there are; with constant interpolation they are equally long pieces.",
-    'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is kept.',
+    'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
+    "there are; with constant interpolation they are pieces of equal length.",
+    'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
+    "stop time.",
     'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
 )
 
 
 def _example(r: InputRange, *, free: bool) -> dict[str, object]:
     middle = nearest_value(r, _middle(r.low, r.high))
-    values = [middle] * min(r.control_points, _MOST_TIMES)
+    values = [middle] * min(r.control_points, _MAX_TIMES)
     if not free:
         return {"name": r.name, "values": [middle] * r.control_points}
     return {"name": r.name, "interpolation": r.interpolation, "times": [], "values": values}

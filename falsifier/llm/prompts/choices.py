@@ -1,4 +1,4 @@
-"""What was chosen in a sample, as an LLM would write it itself."""
+"""The inputs and parameters of a sample, written the way an LLM would write them in a reply."""
 
 from collections.abc import Iterator
 
@@ -52,8 +52,8 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
     points = list(zip(signal.times, signal.values, strict=True))
     if signal.interpolation == "constant":
         points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
-    told = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
-    return f"{manner} from [time, value] points [{told}]"
+    shown = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
+    return f"{manner} from [time, value] points [{shown}]"
 
 
 def _fixed_values(view: View, r: InputRange, signal: Signal) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""Courses of signals in words: change lists, extrema, stretches, oscillations, dense bursts.
+"""Signals over time in words: lists of changes, extrema, intervals, oscillations, sampled values.
 
 Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 """
@@ -13,19 +13,19 @@ from falsifier.llm.prompts.numbers import decimals_for, plain
 
 Array = NDArray[np.float64]
 
-# A real column with at most so many distinct values, all whole, is told by its changes.
-_MOST_LEVELS = 12
-# Changes that are told one by one; of longer lists the beginning and the end.
+# A real column with at most this many distinct values, all integers, is described by its changes.
+_MAX_LEVELS = 12
+# Changes listed individually; of longer lists the beginning and the end.
 _SHOWN_CHANGES = 16
 # Turning points closer to their neighbours than this share of the signal's span are ripple.
 _RIPPLE_SHARE = 0.02
 # Fewer turning points are a transient, not an oscillation.
-_FEWEST_TURNS = 6
+_MIN_TURNS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A stretch of constant value, from start until end in s."""
+    """An interval of constant value, from start to end in s."""
 
     value: float
     start: float
@@ -34,11 +34,11 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Oscillation:
-    """Fast turning of a signal.
+    """Fast oscillation of a signal.
 
     Attributes:
-        start: begin in s.
-        end: end in s.
+        start: in s.
+        end: in s.
         period: median period in s.
         swing: median distance from one turning point to the next.
     """
@@ -50,16 +50,16 @@ class Oscillation:
 
 
 def is_discrete(column: Array, *, kind: str) -> bool:
-    """Whether a signal is better told by its changes: by its type, or a real one with few whole values."""
+    """Whether to describe a signal by its changes: a discrete type, or a real one with few integer values."""
     if kind != "real":
         return True
     if np.ptp(column) == 0 or not np.all(column == np.round(column)):
         return False
-    return len(np.unique(column)) <= _MOST_LEVELS
+    return len(np.unique(column)) <= _MAX_LEVELS
 
 
 def pieces(times: Array, column: Array) -> list[Piece]:
-    """Stretches of constant value in order."""
+    """Intervals of constant value in order."""
     starts = [0, *(np.flatnonzero(np.diff(column)) + 1).tolist()]
     ends = [*starts[1:], len(times) - 1]
     return [
@@ -68,7 +68,7 @@ def pieces(times: Array, column: Array) -> list[Piece]:
 
 
 def change_list(times: Array, column: Array, *, clock: int) -> str:
-    """Values with the times from which they hold.
+    """Values with the times at which they begin.
 
     Args:
         times: time grid in s.
@@ -90,7 +90,10 @@ def change_list(times: Array, column: Array, *, clock: int) -> str:
 
 
 def dwell_list(times: Array, column: Array, *, clock: int) -> str:
-    """How often and how shortly each value was held, the first stretch and the cut-off last one apart."""
+    """How often each value was entered, and its shortest stay.
+
+    The first interval does not count as entered, and the last one is cut off by the end of the simulation.
+    """
     found = pieces(times, column)
     if len(found) < 2:
         return ""
@@ -112,7 +115,7 @@ def dwell_list(times: Array, column: Array, *, clock: int) -> str:
 
 
 def extrema(times: Array, column: Array, *, decimals: int, clock: int) -> str:
-    """Smallest and largest value with their times; a constant signal is called so."""
+    """Smallest and largest value with their times, or that the signal is constant."""
     low, high = int(column.argmin()), int(column.argmax())
     if column[low] == column[high]:
         return f"constant {plain(float(column[low]), decimals)}"
@@ -123,7 +126,7 @@ def extrema(times: Array, column: Array, *, decimals: int, clock: int) -> str:
 
 
 def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, float] | None:
-    """Begin and end in s of the longest time without a break for which this is true; None if it never is."""
+    """Start and end in s of the longest uninterrupted interval in which this is true; None if it never is."""
     edges = np.diff(np.concatenate(([0], wrong.astype(np.int8), [0])))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     if not starts.size:
@@ -133,16 +136,16 @@ def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, floa
 
 
 def oscillation(times: Array, column: Array, *, slower_than: float) -> Oscillation | None:
-    """Fastest part of a signal that turns more often than samples ``slower_than`` s apart can show."""
+    """The oscillating part of a signal that samples ``slower_than`` s apart cannot resolve, if any."""
     turns = _turning_points(column)
-    if len(turns) < _FEWEST_TURNS:
+    if len(turns) < _MIN_TURNS:
         return None
     gaps = np.diff(times[turns])
     fast = longest_stretch(times[turns][:-1], gaps < slower_than)
     if fast is None:
         return None
     inside = [k for k in turns if fast[0] <= times[k] <= fast[1]]
-    if len(inside) < _FEWEST_TURNS:
+    if len(inside) < _MIN_TURNS:
         return None
     return Oscillation(
         start=fast[0],
@@ -153,22 +156,22 @@ def oscillation(times: Array, column: Array, *, slower_than: float) -> Oscillati
 
 
 def samples_at(times: Array, column: Array, moments: Sequence[float], *, decimals: int) -> str:
-    """Values nearest to these moments, separated by commas."""
+    """Values at the samples nearest to these times in s, separated by commas."""
     indices = np.interp(moments, times, np.arange(len(times))).round().astype(int)
     return ", ".join(plain(float(column[k]), decimals) for k in indices)
 
 
 def column_decimals(column: Array, *, margin: float | None = None) -> int:
-    """Decimals that show a column's values, and a margin of this size between two of them."""
+    """Decimals needed to show a column's values, and a margin of this size between two of them."""
     usual = decimals_for(float(np.abs(column).max()))
     if margin is None or margin == 0:
         return usual
-    most = decimals_for(float(np.abs(column).max()), 9)
-    return min(max(usual, decimals_for(margin, 3)), most)
+    limit = decimals_for(float(np.abs(column).max()), 9)
+    return min(max(usual, decimals_for(margin, 3)), limit)
 
 
 def _turning_points(column: Array) -> list[int]:
-    """Indices of extrema that stand out from their neighbours by more than ripple."""
+    """Indices of extrema that differ from their neighbours by more than ripple."""
     least = _RIPPLE_SHARE * float(np.ptp(column))
     slopes = np.sign(np.diff(column))
     moving = np.flatnonzero(slopes)

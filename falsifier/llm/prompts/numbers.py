@@ -1,17 +1,17 @@
-"""Numbers as prompts write them: enough digits, no more, and bounds that can be typed back."""
+"""Numbers as prompts write them: no more digits than needed, and bounds that are valid if typed back."""
 
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from math import floor, isfinite, log10
 
-# Digits of the largest magnitude that a column of numbers shows.
+# Significant digits of the largest value in a column of numbers.
 _COLUMN_DIGITS = 4
 _BOUND_DIGITS = 10
 _CHOSEN_DIGITS = 7
 
 
 def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
-    """Decimals that show a number of this magnitude with so many digits.
+    """Decimals that show a number of this magnitude with that many significant digits.
 
     >>> decimals_for(119.6), decimals_for(0.05)
     (1, 5)
@@ -22,7 +22,7 @@ def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
 
 
 def plain(value: float, decimals: int) -> str:
-    """Number with at most so many decimals, without trailing zeros.
+    """Number with at most that many decimals, without trailing zeros.
 
     >>> plain(8.3333, 2), plain(50.0, 2), plain(-0.0001, 2)
     ('8.33', '50', '0')
@@ -43,7 +43,7 @@ def signed(value: float, digits: int = 3) -> str:
 
 
 def bounds(low: float, high: float) -> tuple[str, str]:
-    """Bounds as text, rounded inward where they are rounded, so that a printed bound lies in the range.
+    """Bounds as text; rounded inward if rounded at all, so that a printed bound lies in the range.
 
     >>> bounds(0.0, 100.0), bounds(-1.25663706143591, 1 / 3)
     (('0', '100'), ('-1.256637061', '0.3333333333'))
@@ -57,7 +57,7 @@ def _bound(value: float, rounding: str) -> str:
 
 
 def number(value: float, digits: int = _BOUND_DIGITS) -> str:
-    """Shortest text of a number with at most so many digits.
+    """Shortest text of a number with at most that many significant digits.
 
     >>> number(100.0), number(0.1 + 0.2)
     ('100', '0.3')
@@ -66,7 +66,7 @@ def number(value: float, digits: int = _BOUND_DIGITS) -> str:
 
 
 def runs(values: Sequence[float]) -> str:
-    """Numbers in order, long repetitions as run lengths.
+    """Numbers in order, long repetitions as runs.
 
     >>> runs([100.0, 100.0, 0.0]), runs([0.0] * 187 + [1.0])
     ('[100, 100, 0]', '["0 x 187", 1]')

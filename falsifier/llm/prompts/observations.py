@@ -1,4 +1,4 @@
-"""Everything that was seen of one sample: what decided it, its parts, and the course of all signals."""
+"""Everything observed in one sample: what decided it, the parts of the formula, all signals over time."""
 
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
@@ -26,21 +26,22 @@ from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
 
 Array = NDArray[np.float64]
 
-# Digits of robustness values: small differences between samples are what the search lives on.
+# Digits of robustness values: the search depends on small differences between samples.
 ROBUSTNESS_DIGITS = 5
-# Values of each signal that are told over the whole time, at most.
+# Maximum number of values of each signal over the whole simulation.
 _GRID_VALUES = 21
-# Share of the stop time, around the critical time, that is told densely, and in how many steps.
+# A burst is a densely sampled interval around the critical time: its share of the stop time, its usual number
+# of steps, its maximum number of values, and the values per period if the signal oscillates.
 _BURST_SHARE = 1 / 25
 _BURST_STEPS = 20
 _BURST_VALUES = 40
 _VALUES_PER_PERIOD = 8
-# Signals whose course is told, those of the formula first.
-_MOST_SIGNALS = 16
+# Maximum number of signals shown over time; those of the formula come first.
+_MAX_SIGNALS = 16
 
 
 def facts(view: View, evaluation: Evaluation) -> Iterator[str]:
-    """Lines that matter most: what decided, all values there, robustness of the parts, stays."""
+    """The most important lines: what decided, all values at that time, robustness of the parts, stays."""
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
     if trajectory is None:
@@ -66,13 +67,13 @@ def facts(view: View, evaluation: Evaluation) -> Iterator[str]:
 
 
 def details(view: View, evaluation: Evaluation) -> Iterator[str]:
-    """Lines on the course of all signals and of the terms of the formula, also densely where it matters."""
+    """Lines on all signals and terms of the formula over time, densely sampled around the critical time."""
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     if verdict is None or trajectory is None:
         return
     step = grid_step(view.space.stop_time)
     grid = np.arange(0.0, view.space.stop_time * (1 + 1e-9), step)
-    columns = _told_columns(view, trajectory)
+    columns = _shown_columns(view, trajectory)
     yield f"values every {number(step)} s from t = 0:"
     for name, column in columns.items():
         yield from _course(view, name, column, trajectory.times, grid, verdict.robustness)
@@ -80,7 +81,7 @@ def details(view: View, evaluation: Evaluation) -> Iterator[str]:
 
 
 def monitor_for(view: View) -> Monitor:
-    """Compiled monitor of the requirement on its output grid."""
+    """Monitor of the requirement on its output grid; compiled once per requirement."""
     return _monitor(view.requirement.formula, view.experiment.output_interval, view.experiment.samples)
 
 
@@ -90,7 +91,7 @@ def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
 
 
 def grid_step(stop_time: float) -> float:
-    """Round step in s that divides the time into at most twenty parts.
+    """Round step in s that divides the simulated time into at most twenty parts.
 
     >>> grid_step(50.0), grid_step(40.0), grid_step(0.3)
     (2.5, 2.0, 0.02)
@@ -102,11 +103,11 @@ def grid_step(stop_time: float) -> float:
 
 
 def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
-    """Robustness of both sides of every connective on the way to what decided."""
+    """Robustness of both sides of every connective on the path to the deciding predicate."""
     above: type[Formula] | None = None
     for step in diagnosis.path:
         kind = type(step.formula)
-        is_link = kind is above and kind in (And, Or)  # of a chain that was told at its head
+        is_link = kind is above and kind in (And, Or)  # its chain was shown already, at the first link
         above = kind
         if is_link or not isinstance(step.formula, And | Or | Implies | Iff):
             continue
@@ -122,7 +123,7 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
 
 
 def _sides(formula: Formula) -> list[Formula]:
-    """Operands of a connective, chains of the same connective in one list."""
+    """Operands of a connective; a chain of the same connective is flattened."""
     if not isinstance(formula, And | Or):
         return list(formula.children)
     return [
@@ -133,7 +134,7 @@ def _sides(formula: Formula) -> list[Formula]:
 
 
 def _scale(view: View, part: Formula) -> str:
-    """Unit in which a part's robustness is measured, where there is one."""
+    """Unit of a part's robustness; empty unless all its signals have the same unit."""
     units = {view.unit(name) for name in part.signals}
     return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
 
@@ -146,17 +147,17 @@ def _predicate(predicate: Predicate, margin: Array, trajectory: Trajectory, cloc
     if stretch is None:
         near = int(margin.argmin())
         return (
-            f"{predicate}: always true, least margin {_short(margin[near])} "
+            f"{predicate}: always true, smallest margin {_short(margin[near])} "
             f"at {plain(float(times[near]), clock)} s"
         )
     if wrong.all():
         return (
-            f"{predicate}: never true, nearest at {plain(float(times[nearest]), clock)} s, "
-            f"missing by {_short(-margin[nearest])}"
+            f"{predicate}: never true, closest at {plain(float(times[nearest]), clock)} s, "
+            f"off by {_short(-margin[nearest])}"
         )
     step = trajectory.step
     return (
-        f"{predicate}: false for {number(round(float(wrong.sum()) * step, 6))} s in all, longest from "
+        f"{predicate}: false for {number(round(float(wrong.sum()) * step, 6))} s in total, longest from "
         f"{plain(stretch[0], clock)} to {plain(stretch[1], clock)} s"
     )
 
@@ -165,15 +166,15 @@ def _short(margin: float) -> str:
     return f"{margin:.5g}"
 
 
-def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
-    """Signals of the formula, its terms, then other recorded signals; searched inputs are known anyway."""
+def _shown_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
+    """Signals of the formula, its terms, then other recorded signals; the LLM knows the searched inputs."""
     formula = view.requirement.formula
     terms = {str(e): e.evaluate(trajectory.columns) for e in formula.expressions}
     others = [n for n in view.experiment.outputs if n in trajectory.columns and n not in formula.signals]
     columns = {n: trajectory[n] for n in view.formula_outputs} | {
         text: np.broadcast_to(column, trajectory.times.shape) for text, column in terms.items()
     }
-    columns |= {n: trajectory[n] for n in others[: max(0, _MOST_SIGNALS - len(columns))]}
+    columns |= {n: trajectory[n] for n in others[: max(0, _MAX_SIGNALS - len(columns))]}
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
 
 
@@ -182,7 +183,7 @@ def _course(
 ) -> Iterator[str]:
     clock = _clock(view)
     if is_discrete(column, kind=view.kind(name)):
-        if name not in view.formula_outputs:  # those are told before
+        if name not in view.formula_outputs:  # facts() shows those
             yield f"{name}: {change_list(times, column, clock=clock)}"
         return
     decimals = _decimals(view, column, name, robustness)
@@ -196,35 +197,35 @@ def _course(
     if fast is not None:
         span = f"from {plain(fast.start, clock)} to {plain(fast.end, clock)} s"
         yield (
-            f"{name} oscillates {span} with a period of about {fast.period:.2g} s, swinging by about "
-            f"{fast.swing:.2g}: the values above are too far apart to show it"
+            f"{name} oscillates {span} with a period of about {fast.period:.2g} s and a peak-to-peak "
+            f"amplitude of about {fast.swing:.2g}; the values above are too far apart to show it"
         )
 
 
 def _burst(view: View, columns: Mapping[str, Array], times: Array, verdict: Verdict) -> Iterator[str]:
-    """Signals and terms of the deciding predicate, densely around the critical time."""
-    told = {
+    """Signals and terms of the deciding predicate, densely sampled around the critical time."""
+    shown = {
         name: column
         for name, column in columns.items()
         if name in _deciding(view, verdict) and not is_discrete(column, kind=view.kind(name))
     }
-    if not told or all(np.ptp(column) == 0 for column in told.values()):
+    if not shown or all(np.ptp(column) == 0 for column in shown.values()):
         return
     interval = view.experiment.output_interval
-    step = max(1, round(_burst_step(view, told, times) / interval)) * interval
+    step = max(1, round(_burst_step(view, shown, times) / interval)) * interval
     usual_reach = max(view.space.stop_time * _BURST_SHARE, _BURST_STEPS * step) / 2
     reach = min(usual_reach, _BURST_VALUES // 2 * step)
     first = max(0, ceil((verdict.critical_time - reach) / step - 1e-9))
     last = floor(min(view.space.stop_time, verdict.critical_time + reach) / step + 1e-9)
     moments = [k * step for k in range(first, last + 1)]
     yield f"values every {number(step, 6)} s from t = {number(moments[0], 6)} s:"
-    for name, column in told.items():
+    for name, column in shown.items():
         decimals = _decimals(view, column, name, verdict.robustness)
         yield f"{name}: {samples_at(times, column, moments, decimals=decimals)}"
 
 
 def _burst_step(view: View, columns: Mapping[str, Array], times: Array) -> float:
-    """Distance in s that shows the fastest oscillation, or divides the burst evenly."""
+    """Step in s: small enough for the fastest oscillation, otherwise the usual share of the burst."""
     usual = view.space.stop_time * _BURST_SHARE / _BURST_STEPS
     found = [oscillation(times, column, slower_than=4 * usual) for column in columns.values()]
     return min([usual, *(fast.period / _VALUES_PER_PERIOD for fast in found if fast is not None)])
@@ -239,13 +240,13 @@ def _deciding(view: View, verdict: Verdict) -> set[str]:
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
-    """Decimals of a signal: more for those of the formula, whose margin must be visible."""
+    """Decimals of a signal: more for signals of the formula, whose margin must be visible."""
     in_formula = name in view.requirement.formula.signals or name not in view.info
     return column_decimals(column, margin=abs(robustness) if in_formula else None)
 
 
 def _clock(view: View) -> int:
-    """Decimals of times: those of the output grid, for times are where signals were sampled."""
+    """Decimals of times: enough for the output grid, because all times shown are sample times."""
     return min(
         6, max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))
     )

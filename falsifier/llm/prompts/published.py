@@ -1,4 +1,4 @@
-"""What the published prompts tell of a sample: values at the control-point times, and what decided."""
+"""What the published prompts show of a sample: values at the control-point times, and what decided."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,8 @@
-"""From a prompt to messages: pure text, block by block."""
+"""From a prompt to messages: plain text, block by block."""
 
 from collections.abc import Iterator
 
+from falsifier.core.words import counted
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.blocks import (
     AdviceBlock,
@@ -21,7 +22,7 @@ from falsifier.llm.prompts.blocks import (
 
 
 def render(prompt: Prompt) -> tuple[Message, ...]:
-    """Messages of a prompt: the task and what stays the same first, what changes last."""
+    """Messages of a prompt: the constant part first, what changes last, so that providers can cache it."""
     return (
         Message(role="system", content="\n\n".join(_standing(prompt))),
         Message(role="user", content="\n\n".join(_changing(prompt.history, prompt.task.count))),
@@ -43,7 +44,7 @@ def _standing(prompt: Prompt) -> Iterator[str]:
 
 
 def _task(task: TaskBlock) -> str:
-    sign = "Robustness below 0 is a violation; exactly 0 is not. Smaller is closer to a violation."
+    sign = "A robustness below 0 is a violation; exactly 0 is not. Smaller values are closer to a violation."
     if not task.knows_requirement:
         return (
             "You minimise an unknown function, the robustness of a simulated system. Find a point at which "
@@ -51,7 +52,7 @@ def _task(task: TaskBlock) -> str:
         )
     return (
         "You search for a counterexample: a system is simulated with inputs that you choose, and a monitor "
-        "returns the robustness, which says by how much its requirement holds. Find inputs for which the "
+        "returns the robustness, the margin by which the requirement is met. Find inputs for which the "
         f"requirement below is violated, in as few simulations as possible. {sign}"
     )
 
@@ -65,15 +66,15 @@ def _requirement(block: RequirementBlock) -> str:
     if block.reading:
         lines.append(f"In words: {block.reading}")
     if block.description:
-        lines.append(f"Its author says: {block.description}")
+        lines.append(f"Author's description: {block.description}")
     if block.terms:
-        lines.append(f"Terms that are told like signals of their own: {'; '.join(block.terms)}")
+        lines.append(f"Derived signals, reported below: {'; '.join(block.terms)}")
     return "\n".join(lines)
 
 
 def _outputs(block: OutputsBlock) -> str:
     if not block.signals:
-        return "Output signals: none; the requirement speaks of inputs only."
+        return "Output signals: none; the requirement refers to inputs only."
     if not any(s.unit or s.description or s.kind != "real" for s in block.signals):
         return f"Output signals: {', '.join(s.name for s in block.signals)}"
     return "\n".join(("Recorded signals:", *(_signal(s) for s in block.signals)))
@@ -87,12 +88,12 @@ def _signal(line: SignalLine) -> str:
 def _inputs(block: InputsBlock) -> str:
     length = f"The simulation runs from 0 to {block.stop_time} s."
     if block.dimensions:
-        lines = [f"You choose {len(block.dimensions)} numbers. {length}"]
+        lines = [f"You choose {counted(len(block.dimensions), 'number')}. {length}"]
         for d in block.dimensions:
             meaning = f": {d.meaning}" if d.meaning else ""
             lines.append(f"{d.number}{meaning}, from {d.low} to {d.high}")
         return "\n".join(lines)
-    lines = [f"What you choose. {length}"]
+    lines = [f"You choose the following. {length}"]
     lines += [_input(line) for line in block.inputs]
     lines += [_parameter(line) for line in block.parameters]
     return "\n".join(lines)
@@ -116,8 +117,8 @@ def _input(line: InputLine) -> str:
         return text
     what = "number, times and interpolation (pchip, linear or constant)"
     return (
-        f"{text}. Instead you may choose {what if line.kind == 'real' else 'number and times'} of the "
-        f"control points yourself: at most {line.max_control_points}, at least {line.min_interval:g} s apart"
+        f"{text}. Alternatively, choose {what if line.kind == 'real' else 'number and times'} of the control "
+        f"points yourself: at most {line.max_control_points}, at least {line.min_interval:g} s apart"
     )
 
 
@@ -126,7 +127,7 @@ def _values(line: InputLine | ParameterLine) -> str:
         return f"one of the numbers {', '.join(line.items)}"
     if line.kind == "boolean":
         return "Boolean, 0 (false) or 1 (true)"
-    return f"{'' if line.kind == 'real' else 'whole numbers '}from {line.low} to {line.high}"
+    return f"{'' if line.kind == 'real' else 'integers '}from {line.low} to {line.high}"
 
 
 _INTERPOLATION = {
@@ -137,7 +138,7 @@ _INTERPOLATION = {
 
 
 def _parameter(line: ParameterLine) -> str:
-    nominal = f", usually {line.nominal}" if line.nominal else ""
+    nominal = f", nominally {line.nominal}" if line.nominal else ""
     described = _described(line.description)
     return (
         f"- number {line.name}{_bracketed(line.unit)}{described}; {_values(line)}{nominal}; "
@@ -153,8 +154,8 @@ def _reply(block: ReplyBlock, count: int) -> str:
     many = f" with {count} different candidates" if count > 1 else ""
     return "\n".join(
         (
-            f"Reply with one JSON object{many} in this form, with values of your own and one or two "
-            "sentences of rationale:",
+            f"Reply with one JSON object{many} in this form, with your own values and one or two sentences "
+            "of rationale:",
             block.example,
             *block.notes,
         )
@@ -172,7 +173,7 @@ def _changing(block: HistoryBlock | None, count: int) -> Iterator[str]:
         yield from (_sample(s) for s in block.samples)
     yield from block.notes
     if block.pending:
-        yield "\n".join(("Already proposed, results not known yet:", *block.pending))
+        yield "\n".join(("Already proposed, no result yet:", *block.pending))
     yield f"Propose the next {wanted}. Do not repeat an earlier one."
 
 

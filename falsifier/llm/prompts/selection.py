@@ -1,4 +1,4 @@
-"""Which earlier samples a prompt tells: the most recent, and beside them the best and the most different."""
+"""Which earlier samples a prompt shows: the most recent ones, plus the best and the most different."""
 
 from collections.abc import Sequence
 
@@ -11,18 +11,18 @@ from falsifier.llm.prompts.view import View
 RECENT = 10
 _BEST = 2
 _DIFFERENT = 2
-# Points at which input signals are compared; enough to tell a pulse of a twentieth of the time.
+# Times at which input signals are compared; enough to notice a pulse of a twentieth of the stop time.
 _COMPARED_POINTS = 41
 
 
 def recent(evaluations: Sequence[Evaluation]) -> dict[int, str]:
-    """Indices of the most recent samples with a verdict, in order, each without a mark."""
+    """Indices of the most recent samples with a verdict, in order, mapped to empty marks."""
     judged = [i for i, e in enumerate(evaluations) if e.verdict is not None]
     return dict.fromkeys(judged[-RECENT:], "")
 
 
 def recent_best_and_different(view: View, evaluations: Sequence[Evaluation]) -> dict[int, str]:
-    """Indices of the samples to tell, in order, with why an old one is among them."""
+    """Indices of the samples to show, in order, mapped to a mark that says why an old one is shown."""
     chosen = dict.fromkeys(range(max(0, len(evaluations) - RECENT), len(evaluations)), "")
     judged = [(e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None]
     for rank, (_, i) in enumerate(sorted(judged)[:_BEST]):
@@ -33,7 +33,7 @@ def recent_best_and_different(view: View, evaluations: Sequence[Evaluation]) -> 
         farthest = max(
             others, key=lambda i: min(float(np.linalg.norm(points[i] - points[j])) for j in chosen)
         )
-        chosen[farthest] = "kept because it differs most from the others"
+        chosen[farthest] = "shown because it differs most from the others"
         others.remove(farthest)
     return dict(sorted(chosen.items()))
 

@@ -1,4 +1,4 @@
-"""Making a prompt fit: the history gives way first, its oldest samples before its newest."""
+"""Shortens a prompt to a token limit by removing history, the oldest samples first."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ from falsifier.llm.prompts.blocks import HistoryBlock, Prompt, SampleLines
 from falsifier.llm.prompts.render import render
 from falsifier.llm.usage import estimate_tokens
 
-# Fits LLMs with a context of 32k tokens and leaves them room to think.
+# Fits LLMs with a context of 32k tokens and leaves room for reasoning.
 DEFAULT_PROMPT_TOKENS = 16_000
 
 _Change = Callable[[SampleLines], SampleLines | None]
@@ -16,15 +16,15 @@ _Change = Callable[[SampleLines], SampleLines | None]
 def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS) -> Prompt:
     """Return the prompt with as much of its history as fits.
 
-    The courses of old samples go first, then what was seen of them, then the samples; of marked ones (the
-    best, the most different) the inputs and the robustness stay to the last.
+    The details of old samples are removed first, then their facts, then the samples. The inputs and
+    robustness of marked samples (the best, the most different) are removed last.
 
     Args:
-        prompt: what would be told.
-        tokens: most tokens, by estimate.
+        prompt: the full prompt.
+        tokens: maximum number of tokens, by estimate.
 
     Raises:
-        ChatError: when it does not fit without any history.
+        ChatError: if it does not fit even without history.
     """
     for change, marked_too in _STAGES:
         position = 0
@@ -34,8 +34,8 @@ def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS) -> Prompt:
             prompt, position = _changed(prompt, prompt.history, position, change, marked_too=marked_too)
     if size(prompt) > tokens:
         raise ChatError(
-            f"the prompt needs about {size(prompt)} tokens without any history, the limit is {tokens}: raise "
-            "the limit, or choose a plainer prompt variant"
+            f"the prompt needs about {size(prompt)} tokens without any history, but the limit is {tokens}: "
+            "raise the limit (prompt_tokens), or choose a plainer prompt variant (--variant)"
         )
     return prompt
 
@@ -65,7 +65,7 @@ _STAGES: tuple[tuple[_Change, bool], ...] = (
 def _changed(
     prompt: Prompt, history: HistoryBlock, position: int, change: _Change, *, marked_too: bool
 ) -> tuple[Prompt, int]:
-    """Change the sample at this position; return where the next one stands."""
+    """Change the sample at this position; return the prompt and the position of the next sample."""
     sample = history.samples[position]
     if sample.mark and not marked_too:
         return prompt, position + 1

@@ -1,4 +1,4 @@
-"""Prompt variants: which parts of what is known a prompt tells. Nothing else differs between them."""
+"""Prompt variants: which parts a prompt contains. Nothing else differs between variants."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,17 +8,17 @@ from typing import Literal
 from falsifier.errors import SpecError, did_you_mean
 
 Part = Literal[
-    "names",  # inputs and parameters by name and meaning; else numbered dimensions
+    "names",  # inputs and parameters by name and meaning; otherwise numbered dimensions
     "requirement",  # the formula
     "outputs",  # the signals of the formula
-    "values",  # of each sample: outputs at the control-point times
-    "critical",  # of each sample: critical time and signal values there
-    "advice",  # how to use all this
+    "values",  # per sample: outputs at the control-point times
+    "critical",  # per sample: critical time and signal values at that time
+    "advice",  # how to use the other parts
     "system",  # the model's description, all recorded signals with units and descriptions
-    "reading",  # the formula in plain words, its terms as signals of their own
-    "freedom",  # control points and interpolation may be chosen where the problem allows it
-    "observations",  # of each sample: course of all signals, what decided, robustness of the parts
-    "selection",  # best and most different samples beside the most recent ones
+    "reading",  # the formula in plain words, its terms as derived signals
+    "freedom",  # control points and interpolation may be chosen if the problem allows it
+    "observations",  # per sample: all signals over time, what decided, robustness of the parts
+    "selection",  # the best and most different samples in addition to the most recent ones
     "failures",  # samples that could not be simulated, with the reason
 ]
 
@@ -28,19 +28,20 @@ class Variant:
     """A named set of parts.
 
     Attributes:
-        name: as the user names it.
-        parts: what the prompt tells.
+        name: name on the command line and in spec files.
+        parts: what the prompt contains.
     """
 
     name: str
     parts: frozenset[Part]
 
     def has(self, part: Part) -> bool:
-        """Whether the prompt tells this part."""
+        """Whether the prompt contains this part."""
         return part in self.parts
 
 
 def _variants() -> Mapping[str, Variant]:
+    # MP1 to MP4 follow the published prompts, each adding to the one before; MP5 is this project's own.
     mp1: frozenset[Part] = frozenset()
     mp2: frozenset[Part] = mp1 | {"names", "requirement", "outputs"}
     mp3: frozenset[Part] = mp2 | {"values", "advice"}
@@ -58,7 +59,7 @@ DEFAULT_VARIANT = "MP5"
 
 
 def variant_named(name: str | None) -> Variant:
-    """Variant of this name; None: the default one.
+    """Variant of this name, in any case; None: the default one.
 
     Raises:
         SpecError: for an unknown name.

@@ -1,4 +1,4 @@
-"""What an LLM may know of a problem: everything but the model itself."""
+"""What an LLM may know about a problem: everything except the model itself."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from falsifier.problem.requirement import Requirement
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A problem without what simulates it.
+    """A problem without its model.
 
     Attributes:
-        info: names, units and descriptions.
-        requirement: what must hold.
-        space: what may be varied.
+        info: the model's names, units and descriptions.
+        requirement: the requirement to violate.
+        space: search space.
         experiment: stop time and output grid.
     """
 
@@ -26,19 +26,19 @@ class View:
 
     @classmethod
     def of(cls, problem: Problem) -> "View":
-        """View of a problem."""
+        """Make the view of a problem."""
         return cls(problem.info, problem.requirement, problem.space, problem.experiment)
 
     def unit(self, name: str) -> str:
-        """Unit of a signal, empty where unknown or without dimension."""
-        return told_unit(self.info[name].unit) if name in self.info else ""
+        """Unit of a signal; empty if unknown or dimensionless."""
+        return shown_unit(self.info[name].unit) if name in self.info else ""
 
     def description(self, name: str) -> str:
-        """Description of a signal, empty where there is none."""
+        """Description of a signal; empty if it has none."""
         return self.info[name].description if name in self.info else ""
 
     def kind(self, name: str) -> str:
-        """Type of a signal's values; real where unknown."""
+        """Type of a signal's values; real if unknown."""
         return self.info[name].kind if name in self.info else "real"
 
     @property
@@ -47,6 +47,6 @@ class View:
         return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)
 
 
-def told_unit(unit: str) -> str:
-    """Unit as prompts tell it: FMUs give dimensionless variables the unit 1."""
+def shown_unit(unit: str) -> str:
+    """Unit as prompts show it: empty for 1, which FMUs use for dimensionless variables."""
     return "" if unit == "1" else unit

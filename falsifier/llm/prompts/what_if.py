@@ -1,8 +1,9 @@
-"""The tool by which an LLM asks what a candidate would give: what it is told of it, and the answers."""
+"""The tool with which an LLM requests predictions for candidates: its description and its answers."""
 
 from collections.abc import Sequence
 from typing import Any
 
+from falsifier.core.words import counted
 from falsifier.llm.messages import Tool
 from falsifier.llm.prompts.numbers import number, signed
 from falsifier.llm.prompts.variants import Variant
@@ -12,27 +13,27 @@ NAME = "predict"
 
 
 def what_if_tool(parameters: dict[str, Any], *, calls: int) -> Tool:
-    """Tool as it is offered.
+    """Describe the tool to the LLM.
 
     Args:
         parameters: JSON Schema of the arguments: a reply's candidates, without rationale.
-        calls: how many calls are answered.
+        calls: maximum number of calls that are answered.
     """
     return Tool(
         name=NAME,
         description=(
-            "Predicts what candidates would give, by a numerical model of the dynamics that was fitted to "
-            "the samples so far. Nothing is simulated, so asking is free where a sample is not; but "
-            "predictions err, and the answer says by how much they did of late. Ask before you reply: "
-            "compare different structures first, then change the most promising one. Candidates have the "
-            f"form of the reply, without rationale. At most {calls} calls are answered in a turn."
+            "Predicts the robustness of candidates, using dynamics fitted to the samples so far. Nothing is "
+            "simulated, so a prediction is free and a sample is not; but predictions can be wrong, and the "
+            "answer states the size of the recent errors. Use it before you reply: compare different "
+            "structures first, then refine the most promising one. Candidates have the form of the reply, "
+            f"without rationale. At most {counted(calls, 'call')} per turn can be answered."
         ),
         parameters=parameters,
     )
 
 
 def predicted(variant: Variant, verdict: Verdict) -> str:
-    """What is predicted of one candidate, as far as the variant tells such things of samples."""
+    """The prediction for one candidate, limited to what the variant shows of samples."""
     parts = [f"predicted robustness {signed(verdict.robustness)}"]
     if variant.has("critical"):
         by = f" by {verdict.predicate}" if variant.has("requirement") and verdict.predicate else ""
@@ -41,19 +42,19 @@ def predicted(variant: Variant, verdict: Verdict) -> str:
 
 
 def answer(lines: Sequence[str], *, error: float, left: int) -> str:
-    """Answer to one call.
+    """Answer one call.
 
     Args:
-        lines: what is said of each candidate.
-        error: of recent predictions, as a share of the spread of what was predicted.
-        left: how many more calls are answered.
+        lines: one line per candidate.
+        error: error of recent predictions as a share of the spread of the predicted signals.
+        left: number of calls that remain.
     """
-    more = f"{left} more call{'s are' if left != 1 else ' is'} answered" if left else "This was the last call"
+    more = f"{counted(left, 'more call')} can be answered" if left else "This was the last call"
     return "\n".join(
         (
             *(f"Candidate {i}: {line}" for i, line in enumerate(lines, start=1)),
-            f"Recent predictions of the signals were off by {100 * error:.2g} % of their usual "
-            "spread (root mean square).",
+            f"Root mean square error of recent predictions: {100 * error:.2g} % of the signals' usual "
+            "spread.",
             f"{more}; then reply with your candidates.",
         )
     )

@@ -1,4 +1,4 @@
-"""Compiles the C sources for every platform and packs the FMU, byte for byte the same each time."""
+"""Compiles the C sources for every platform and packs the FMU; the same sources give the same bytes."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ _COMMON = ("events.c", "lines.c", "integrate.c", "cosimulation.c", "instance.c")
 _WARNINGS = ("-Wall", "-Wextra", "-Werror", "-Wno-parentheses-equality", "-Wno-unused", "-Wno-type-limits")
 
 
+# No fused multiply-adds (-ffp-contract=off): they round differently, so results would depend on the platform.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-shared", "-s")
 
 
 @dataclass(frozen=True, slots=True)
 class Platform:
-    """Where a binary goes and how it is compiled."""
+    """Folder, file suffix and compiler target of one platform's binary."""
 
     folder2: str
     folder3: str
@@ -64,13 +65,13 @@ class Contents:
         return c_files(self.version, implicit=self.implicit)
 
     def sources(self) -> dict[str, str]:
-        """All C files by name."""
+        """Return all C files by name."""
         names = (*_HEADERS, *(name for name in self.c_files if name != "model.c"))
         files = {name: (RUNTIME / name).read_text(encoding="utf-8") for name in names}
         return files | {"model.c": self.model_c, "sizes.h": self.sizes_h}
 
     def guid(self) -> str:
-        """An identifier that depends on nothing but the contents."""
+        """Return an identifier that depends only on the contents."""
         digest = hashlib.sha256(self.description.encode())
         for name, text in sorted(self.sources().items()):
             digest.update(f"\0{name}\0{text}".encode())
@@ -79,7 +80,7 @@ class Contents:
 
 
 def c_files(version: int, *, implicit: bool) -> list[str]:
-    """The files to compile for a version of FMI and a method of integration."""
+    """Return the names of the files to compile for a version of FMI and an integration method."""
     return sorted(["model.c", *_COMMON, "implicit.c" if implicit else "explicit.c", f"fmi{version}.c"])
 
 
@@ -143,6 +144,7 @@ def _build_description(contents: Contents) -> str:
 def _pack(entries: dict[str, bytes], target: Path) -> None:
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name in sorted(entries, key=lambda n: (n != "modelDescription.xml", n)):
+            # A fixed date and fixed attributes: the archive depends only on its contents.
             info = zipfile.ZipInfo(name, (2000, 1, 1, 0, 0, 0))
             info.compress_type = zipfile.ZIP_DEFLATED
             info.external_attr = 0o644 << 16

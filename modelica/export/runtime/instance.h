@@ -1,4 +1,4 @@
-/* What both versions of FMI share: an instance, its phases, checked access to variables. */
+/* Common to both FMI versions: an instance, its phases, checked access to variables. */
 #ifndef INSTANCE_H
 #define INSTANCE_H
 
@@ -19,7 +19,7 @@ typedef struct {
     Phase phase;
     int cosimulation;
     double start_time;
-} State; /* all that get/set FMU state saves */
+} State; /* everything that get/set FMU state saves */
 
 typedef struct {
     State state;
@@ -27,8 +27,8 @@ typedef struct {
     void (*log)(void *environment, const char *name, int status, const char *message);
     const void *callbacks; /* FMI 2: the callback functions of the environment */
     const char *name;
-    int told;       /* that a step was longer than a delay */
-    Model *preview; /* during initialization: a copy on which the initial system has been solved */
+    int told;       /* the message about a step longer than a delay has been logged */
+    Model *preview; /* during initialization: a copy with the initial system solved */
 } Instance;
 
 Instance *instance_new(const char *name, const char *guid, int cosimulation);

@@ -48,5 +48,5 @@ def test_the_published_ranks_follow_from_the_published_numbers() -> None:
 def test_another_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
     path.write_text("runs = 10\n")
-    with pytest.raises(SpecError, match="not a table of published numbers"):
+    with pytest.raises(SpecError, match="not a table of published results"):
         read_published(path)

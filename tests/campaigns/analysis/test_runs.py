@@ -46,7 +46,7 @@ def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:
 
 
 def test_a_folder_that_is_neither_is_named(tmp_path: Path) -> None:
-    with pytest.raises(JournalError, match="neither a campaign nor a run"):
+    with pytest.raises(JournalError, match="not a run or campaign directory"):
         load(tmp_path)
 
 

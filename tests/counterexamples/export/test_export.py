@@ -179,7 +179,7 @@ def test_the_pytest_file_fails_while_the_counterexample_violates(tmp_path: Path)
         check=False,
     )
     assert done.returncode == 1
-    assert "AT1 violates: robustness -0.21" in done.stdout
+    assert "AT1: still violated, robustness -0.21" in done.stdout
     assert load(tmp_path / FILE_NAME).robustness == evaluation.robustness
 
 

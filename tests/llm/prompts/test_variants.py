@@ -88,7 +88,7 @@ def test_mp3_adds_values_at_the_control_points() -> None:
     assert "82.5 at 8.3 s" in changing
     assert "81.5 at 50.0 s" in changing
     assert "25.0 s" in changing
-    assert "work out how each input moves the outputs" in standing
+    assert "work out how each input affects the outputs" in standing
     assert "decided" not in changing
 
 
@@ -139,14 +139,14 @@ class TestMP5:
             space=replace(problem.space, inputs=tuple(replace(r, free=None) for r in problem.space.inputs)),
         )
         standing, _ = told(fixed, "MP5")
-        assert "Instead you may choose" not in standing
+        assert "Alternatively, choose" not in standing
         assert '"times"' not in standing
 
     def test_what_decided_and_everything_there(self) -> None:
         problem, evaluation = transmission()
         _, changing = told(problem, "MP5", [evaluation])
         assert "robustness +0.418" in changing
-        assert "was worst at 20 s, where speed = 119.581 <= 120" in changing
+        assert "was lowest at 20 s: speed = 119.581 is below 120" in changing
         assert "all signals at t = 20 s: speed = 119.581 mph, rpm = " in changing
         assert "gear: 1, then 2 from 2.56 s, 3 from 6.16 s, 4 from 12.32 s" in changing
         assert "values every 2.5 s from t = 0:" in changing
@@ -175,15 +175,15 @@ class TestMP5:
         standing, changing = told(problem, "MP5", [first, second])
         assert "gear stays: 1: never entered again" in changing
         assert "The robustness is flat: it was +0.5 in all 2 samples" in changing
-        assert "bring about the condition first" in standing
+        assert "make the condition true first" in standing
 
     def test_terms_are_signals_of_their_own(self) -> None:
         problem = lag_problem("G[0,10] (abs(x - u) <= 0.9)")
         evaluation = evaluate(problem, problem.space.decode([0, 1, 0, 1]))
         standing, changing = told(problem, "MP5", [evaluation])
-        assert "Terms that are told like signals of their own: abs(x - u)" in standing
+        assert "Derived signals, reported below: abs(x - u)" in standing
         assert "\n  abs(x - u): 0, " in changing
-        assert "abs(x - u) <= 0.9: always true, least margin" in changing
+        assert "abs(x - u) <= 0.9: always true, smallest margin" in changing
 
     def test_failed_samples_with_their_reason(self) -> None:
         problem = lag_problem()
@@ -197,7 +197,7 @@ class TestMP5:
         evaluations = [evaluate(problem, problem.space.decode(p)) for p in points]
         _, changing = told(problem, "MP5", evaluations)
         assert "Sample 2 (best so far)" in changing
-        assert "Sample 1 (kept because it differs most from the others)" in changing
+        assert "Sample 1 (shown because it differs most from the others)" in changing
         shown = [line for line in changing.splitlines() if line.startswith("Sample ")]
         assert len(shown) == 13
         assert "13 of 17" in changing
@@ -209,7 +209,7 @@ class TestMP5:
         standing, changing = told(
             problem, "MP5", [evaluate(problem, problem.space.decode([0, 0, 0, 0, 0.25]))]
         )
-        assert "- number x0 [m]: start; from -0.5 to 0.3333333333, usually 0; one value" in standing
+        assert "- number x0 [m]: start; from -0.5 to 0.3333333333, nominally 0; one value" in standing
         assert "x0 = 0.25" in changing
 
     def test_aliasing_is_said_and_shown_densely(self) -> None:
@@ -222,7 +222,7 @@ class TestMP5:
         evaluation = Evaluation(candidate, "ok", verdict, "", trajectory)
         _, changing = told(problem, "MP5", [evaluation])
         assert "x oscillates from" in changing
-        assert "period of about 0.8 s, swinging by about 1" in changing
+        assert "period of about 0.8 s and a peak-to-peak amplitude of about 1" in changing
         assert "values every 0.1 s from t = " in changing
 
     def test_only_parameters(self) -> None:
@@ -251,7 +251,7 @@ class TestMP5:
             view = View.of(replace(problem, space=space))
             return render(build_prompt(view, variant_named("MP5"), []))[0].content
 
-        assert "; whole numbers from -1 to 1; " in asked(kind="integer")
+        assert "; integers from -1 to 1; " in asked(kind="integer")
         assert "; Boolean, 0 (false) or 1 (true); " in asked(kind="boolean", low=0.0, high=1.0)
         gears = asked(kind="enumeration", low=1.0, high=2.0, items=(("low", 1), ("top", 2), ("rear", 3)))
         assert "; one of the numbers 1 = low, 2 = top; " in gears
@@ -264,7 +264,7 @@ class TestMP5:
         standing, changing = (m.content for m in render(prompt))
         assert "3 different candidates" in standing
         assert '{"candidates": [{' in standing
-        assert "Already proposed, results not known yet:\nu: constant 0.5" in changing
+        assert "Already proposed, no result yet:\nu: constant 0.5" in changing
         assert "Propose the next 3 different samples" in changing
 
 

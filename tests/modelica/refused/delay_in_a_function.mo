@@ -3,7 +3,7 @@ model M
     input Real u;
     output Real y;
   algorithm
-    y := delay(u, 1);  // error: 'delay' is not supported inside of functions
+    y := delay(u, 1);  // error: 'delay' is not supported in functions
   end f;
   Real x = f(time);
 equation
