@@ -32,7 +32,7 @@ def simulated(
 
 
 def delayed_decay(delay: float) -> Floats:
-    """Solution of x'(t) = -x(t - delay), with x = 1 until t = 0, by the method of steps."""
+    """Solve x'(t) = -x(t - delay), with x = 1 until t = 0, by the method of steps."""
     ages = TIMES[:, np.newaxis] - delay * np.arange(-1, 40)
     terms = [(-1) ** k * np.maximum(ages[:, k], 0) ** k / factorial(k) for k in range(1, 41)]
     return np.asarray(1 + np.sum(terms, axis=0))
@@ -43,7 +43,7 @@ def delayed_decay(delay: float) -> Floats:
 @pytest.mark.parametrize("delay", [0.3, 0.1])
 def test_delays(build: Build, interface: Interface, fmi: int, delay: float) -> None:
     found = simulated(build, "Delays", NAMES, interface, fmi, T=delay)
-    # Between two points of the line values are interpolated linearly: the error is that of the solver's step.
+    # Values between points of the line are interpolated linearly; the error depends on the solver's step.
     tolerance = 2e-6 if interface == "co-simulation" else 1e-4
     assert found["x"] == pytest.approx(delayed_decay(delay), abs=tolerance)
     assert found["ramp"] == pytest.approx(np.maximum(TIMES - delay, 0), abs=1e-12)
@@ -82,7 +82,7 @@ def test_transport_at_a_varying_speed(build: Build, interface: Interface, fmi: i
     flowing = found["way"] >= 3
     assert found["smooth"][flowing] == pytest.approx(np.cos(entered[flowing]), abs=1e-4)
     assert np.all(found["smooth"][found["way"] < 3] == 0)
-    # The profile at the start leaves the pipe from its end on: 7, then down to 5 and to 1.
+    # The initial profile leaves the pipe from its end: 7, then down to 5 and 1.
     place = 3 - found["way"][~flowing]
     assert found["outlet"][~flowing] == pytest.approx(np.interp(place, [0, 0.5, 1], [1, 5, 7]), abs=1e-9)
     clear = flowing & (np.abs(entered - 0.5) > 1e-3) & (np.abs(entered - 1.2) > 1e-3) & (entered > 1e-3)
@@ -90,7 +90,7 @@ def test_transport_at_a_varying_speed(build: Build, interface: Interface, fmi: i
 
 
 def rows_from(fmu: Instance, start: float, stop: float) -> Floats:
-    """Rows of a running instance from one time to another, with an input that varies."""
+    """Return rows of a running instance between two times, with a varying input."""
     fmu.time = start
     return fmu.run(NAMES, stop, STEP, lambda t: {"u": round(100 * t) % 7})
 
@@ -114,7 +114,7 @@ def test_a_saved_state_has_what_is_in_the_delays(build: Build, serialized: bool)
 
 
 def test_a_saved_state_of_a_model_exchange_fmu_has_what_is_in_the_delays(build: Build) -> None:
-    """Forward Euler with a completed step after each: the same from the saved state as without."""
+    """With forward Euler steps, continuing from the saved state gives the same rows as without it."""
     with opened(build("Delays"), exchange=True) as [instance]:
         import ctypes
 
@@ -185,7 +185,7 @@ def test_instances_have_delays_of_their_own(build: Build) -> None:
 
 
 def test_a_host_that_tries_steps_and_goes_back_gets_the_same(build: Build) -> None:
-    """This host looks for events by completing trial steps, and goes on from an earlier time."""
+    """This host finds events by completing trial steps, and continues from an earlier time."""
     names = ["x", "late", "ramp", "steps", "crossings"]
     with opened(build("Delays")) as [fmu]:
         expected = fmu.start().run(names, 1.0, STEP)
@@ -200,13 +200,13 @@ def test_a_host_that_tries_steps_and_goes_back_gets_the_same(build: Build) -> No
 @pytest.mark.parametrize(
     ("model", "values", "reason"),
     [
-        ("Delays", {"T": 0.0}, "the delay needs to be longer than 0"),
-        ("Delays", {"T": -1.0}, "the delay needs to be longer than 0"),
-        ("Delays", {"longest": -0.1}, "the delay needs to be longer than 0"),
+        ("Delays", {"T": 0.0}, "the delay must be longer than 0"),
+        ("Delays", {"T": -1.0}, "the delay must be longer than 0"),
+        ("Delays", {"longest": -0.1}, "the delay must be longer than 0"),
         ("Delays", {"stretch": 3.0}, "the delay is longer than 'delayMax'"),
         ("Delays", {"stretch": -1.0}, "a delay time is negative"),
-        ("Pipe", {"speed": -2.0}, "'x' of spatialDistribution falls"),
-        ("Pipe", {"speed": 0.3}, "the delay needs more points than __falsifier_solver(delayPoints) allows"),
+        ("Pipe", {"speed": -2.0}, "'x' of spatialDistribution decreases"),
+        ("Pipe", {"speed": 0.3}, "the delay needs more points than __falsifier_solver(delayPoints) provides"),
     ],
 )
 def test_impossible_delays_stop_the_simulation(

@@ -26,7 +26,7 @@ def simulated(
 
 
 def echo() -> Floats:
-    """What follows 1 until 0.5 s and cos(t - 0.5) from then on, with the rate 50 / s."""
+    """Return what follows 1 until 0.5 s, then cos(t - 0.5), with a rate of 50 / s."""
     late = np.maximum(TIMES - 0.5, 0)
     start = 1 - np.exp(-50 * np.minimum(TIMES, 0.5))
     # e' = 50 (cos(s) - e), e(0) = start: the stationary part is a sine and a cosine.
@@ -44,7 +44,7 @@ def test_stiff_equations(build: Build, tolerance: float, rate: float) -> None:
     assert np.array_equal(found["turns"], np.minimum(np.floor(TIMES / np.log(2)), 3))
     assert found["echo"] == pytest.approx(echo(), abs=100 * tolerance)
     if rate == 1e6:
-        # The level stays where inflow and outflow are equal, but for what the slow part falls meanwhile.
+        # The level is where inflow and outflow balance, apart from the slow decay of the inflow.
         assert found["level"][1:30] == pytest.approx((0.1 * np.exp(-TIMES[1:30])) ** 2, rel=1e-3)
 
 

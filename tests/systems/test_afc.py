@@ -13,7 +13,7 @@ PIECE = 5.0
 
 
 def pieces(values: Sequence[float], stop: float = STOP) -> Array:
-    """Equal pieces over some time, at the controller's samples; the last value holds at the end."""
+    """Return a signal of equal pieces at the controller's samples; the last value also holds at the end."""
     counts = round(stop / 0.01 / len(values))
     return np.append(np.repeat(np.asarray(values, float), counts), values[-1])
 
@@ -62,7 +62,7 @@ def test_independent_ratios(fmu: Driver) -> None:
         mu, mode, pressure = afc.ratios(pedal, np.full(len(pedal), engine))
         assert np.array_equal(found["mode"], mode)
         assert np.abs(found["pressure"] - pressure).max() < 5e-5
-        # The other integration smears the jump of the ratio at 10 s over one of its steps.
+        # The independent integration spreads the jump of the ratio at 10 s over one of its steps.
         difference = np.abs(found["mu"] - mu)
         assert difference.max() < 3e-4
         assert difference[1100:].max() < 5e-5

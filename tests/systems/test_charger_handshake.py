@@ -11,7 +11,7 @@ READY = 4
 
 
 def commands(pieces: list[int]) -> Array:
-    """The command at every tick of a run, held over pieces of 1 s."""
+    """Return the command at every tick of a run, held over pieces of 1 s."""
     return np.append(np.repeat(np.asarray(pieces, float), 10), float(pieces[-1]))
 
 
@@ -48,9 +48,8 @@ def test_independent_phases(fmu: Driver) -> None:
         pieces[rng.integers(0, 16)] = rng.integers(1, 8)
         command = commands(pieces.tolist())
         found, expected = drive(fmu, command), charger(command)
-        same = (
-            np.diff(command, prepend=command[0]) == 0
-        )  # at a step, outputs are read before the input is set
+        # When the command changes, outputs are read before the input is set.
+        same = np.diff(command, prepend=command[0]) == 0
         for k, output in enumerate(OUTPUTS):
             assert found[output][same] == pytest.approx(expected[same, k], abs=0.1), output
         wrong += bool(np.any((expected[:, 2] > 0) & (expected[:, 1] == 0)))

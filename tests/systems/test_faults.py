@@ -1,4 +1,4 @@
-"""The known answer to each system with a fault: a violation that every way of simulating it confirms."""
+"""The known violation of each system with a fault, confirmed by every way of simulating it."""
 
 from typing import Literal
 

@@ -10,7 +10,7 @@ OUTPUTS = ("temperature", "limp", "trips")
 
 
 def held(pieces: list[float]) -> Array:
-    """The disagreement at every tick of a run, held over pieces of 2 s."""
+    """Return the disagreement at every tick of a run, held over pieces of 2 s."""
     return np.append(np.repeat(np.asarray(pieces, float), 20), pieces[-1])
 
 
@@ -26,7 +26,7 @@ def test_golden_limp_homes(fmu: Driver, name: str) -> None:
     found = drive(fmu, held(run["disagreement"]))
     changes = np.diff(found["limp"])
     begins, ends = (PERIOD * (np.flatnonzero(changes == sign) + 1) for sign in (1, -1))
-    # Outputs are read before the input is set: what a step of the input begins shows one row later.
+    # Outputs are read before the input is set, so a jump of the input has its effect one row later.
     assert begins == pytest.approx(np.array(run["limp_from"]) + PERIOD)
     assert ends == pytest.approx(run["limp_until"], abs=PERIOD * 1.01)
     if "cooled" in run:
@@ -59,8 +59,7 @@ def test_only_the_fault_makes_the_bath_too_hot(fmu: Driver) -> None:
     for _ in range(100):
         pieces = rng.choice([5.0, 9.8, 0.1], 20)
         inputs = {"disagreement": held(pieces.tolist())}
-        rows = fmu.run(
-            inputs, OUTPUTS, stop_time=STOP, samples=401, parameters={"valid": 100.0}
-        )  # what was kept stays valid
+        always_frozen = {"valid": 100.0}
+        rows = fmu.run(inputs, OUTPUTS, stop_time=STOP, samples=401, parameters=always_frozen)
         assert rows[:, 0].max() < 62
         assert rows[-1, 2] == 0

@@ -10,7 +10,7 @@ OUTPUTS = ("counted", "missed", "asleep")
 
 
 def contacts(pieces: list[int]) -> Array:
-    """The contact at every tick of a run, held over equal pieces."""
+    """Return the contact at every tick of a run, held over equal pieces."""
     per_piece = round(STOP / PERIOD / len(pieces))
     return np.append(np.repeat(np.asarray(pieces, float), per_piece), float(pieces[-1]))
 

@@ -13,7 +13,7 @@ from .expressions import Printer, c_string
 from .functions import functions_text
 
 DELAY_POINTS = 4096
-"""What a delay line remembers, unless the model says otherwise."""
+"""Number of points that a delay line can hold, unless the model specifies it."""
 
 REPEAT_TICKS = {"never": 0, "unseen": 1, "always": 2}
 
@@ -70,7 +70,7 @@ def _lively(system: System) -> list[Block]:
 
 
 def slope_blocks(system: System) -> list[Block]:
-    """What has to be computed for the derivatives."""
+    """Return the blocks that compute the derivatives."""
     return needed_for({f"der({name})" for name in system.states}, _lively(system))
 
 
@@ -166,7 +166,7 @@ def _line_functions(system: System, inputs: list[str]) -> list[str]:
 
 
 def _implicit(system: System) -> list[str]:
-    """What the implicit method wants to know."""
+    """Return the tables that the implicit method needs."""
     rows = dependences(system)
     depends = [str(int(j in row)) for row in rows for j in range(len(rows))]
     return [

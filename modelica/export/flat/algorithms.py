@@ -38,7 +38,7 @@ def statements(body: Body, here: Evaluator, model: FlatModel, guard: Scalar) -> 
 
     def keep(part: Outputs | Equation | DelayLine) -> None:
         if not isinstance(part, Outputs):
-            raise ExportError(part.place, "'delay' in an algorithm is not supported: give it an equation")
+            raise ExportError(part.place, "'delay' in an algorithm is not supported; use an equation")
         made.append(part)
 
     local = here.at(here.scope, events=here.events, sink=keep)

@@ -157,7 +157,7 @@ def _rounding(evaluator: Evaluator, node: Call) -> Tensor:
     def make(args: tuple[Scalar, ...]) -> Scalar:
         arg, place = args[0], node.place
         if arg.type not in NUMBERS:
-            raise ExportError(place, f"'{node.name}' needs a number, not {arg.type}")
+            raise ExportError(place, f"'{node.name}' expects a number, not {arg.type}")
         if arg.type == "Integer":
             return arg
         if node.name == "ceil":
@@ -233,12 +233,12 @@ def _change(evaluator: Evaluator, node: Call) -> Tensor:
 
 
 def _ordinal(evaluator: Evaluator, node: Call) -> Tensor:
-    """The place of an item in its enumeration, from 1."""
+    """The position of an item in its enumeration, starting at 1."""
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
         arg = args[0]
         if arg.type not in evaluator.model.enumerations:
-            raise ExportError(node.place, f"'Integer' needs an enumeration, not {arg.type}")
+            raise ExportError(node.place, f"'Integer' expects an enumeration, not {arg.type}")
         return Lit(arg.value, "Integer") if isinstance(arg, Lit) else Op("ordinal", (arg,), "Integer")
 
     return _map(evaluator, node, make)
@@ -351,7 +351,7 @@ _CALLS: dict[str, Known] = {
 _REFUSED = {
     "terminate": "'terminate' is not supported",
     "terminal": "'terminal' is not supported",
-    "spatialDistribution": "'spatialDistribution' can only stand in '(a, b) = spatialDistribution(...)'",
+    "spatialDistribution": "'spatialDistribution' is only allowed in '(a, b) = spatialDistribution(...)'",
     "homotopy": "'homotopy' is not supported",
     "semiLinear": "'semiLinear' is not supported",
     "cardinality": "'cardinality' is not supported",

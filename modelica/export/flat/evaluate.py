@@ -193,14 +193,14 @@ class Evaluator:
         return self.subscript(self.package_constant(component, owner), ref.parts[-1].subscripts, ref.place)
 
     def enumeration_item(self, ref: Ref) -> Tensor | None:
-        """`Colour.red`, None where the name before the last dot is no enumeration."""
+        """Return `Colour.red`, or None if the name before the last dot is not an enumeration."""
         names = [part.name for part in ref.parts]
         cls = enumeration(lookup(".".join(names[:-1]), self.scope.cls)) if len(names) > 1 else None
         if cls is None:
             return None
         items = [name for name, _ in cls.literals]
         if names[-1] not in items or any(part.subscripts for part in ref.parts):
-            raise ExportError(ref.place, f"'{cls.name}' has no item '{names[-1]}', only {', '.join(items)}")
+            raise ExportError(ref.place, f"'{cls.name}' has no item '{names[-1]}'; it has {', '.join(items)}")
         self.model.enumerations[cls.full_name] = cls
         return scalar_tensor(Lit(items.index(names[-1]) + 1, cls.full_name))
 
@@ -348,7 +348,7 @@ class Evaluator:
         raise ExportError(place, "this value must be known before simulation")
 
     def parametric(self, value: Scalar) -> bool:
-        """Whether a value is known when the simulation starts: made of parameters and literals."""
+        """Whether a value is known when the simulation starts, being made of parameters and literals."""
         match value:
             case Lit():
                 return True

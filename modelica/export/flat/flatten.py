@@ -76,7 +76,7 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
             place, f"the parameter '{leaf.name}' needs a value: 'fixed = false' is not supported"
         )
     if leaf.causality == "input" and not leaf.public:
-        raise ExportError(place, f"the input '{leaf.name}' is protected: nobody could set it")
+        raise ExportError(place, f"the input '{leaf.name}' is protected and could never be set")
     for k, name in enumerate(leaf.scalars()):
         known = {
             key: evaluator.static(value.items[k], place).value if value else None
@@ -175,7 +175,7 @@ def _experiment(cls: Class, model: FlatModel) -> None:
     settings = {name: mod for name, mod in cls.annotation.inner}
     experiment = dict(settings.get("experiment", Modifier()).inner)
     if _number(experiment, "StartTime"):
-        raise ExportError(experiment["StartTime"].place, "'StartTime' needs to be 0")
+        raise ExportError(experiment["StartTime"].place, "'StartTime' must be 0")
     model.stop_time = _number(experiment, "StopTime")
     model.interval = _number(experiment, "Interval")
     model.tolerance = _number(experiment, "Tolerance")

@@ -44,7 +44,7 @@ def real(value: float) -> Lit:
 def _joined(args: tuple[Scalar, ...], place: Place, name: str) -> Type:
     types = {arg.type for arg in args}
     if others := sorted(types - NUMBERS):
-        raise ExportError(place, f"'{name}' needs numbers, not {others[0]}")
+        raise ExportError(place, f"'{name}' expects numbers, not {others[0]}")
     return "Integer" if types == {"Integer"} else "Real"
 
 

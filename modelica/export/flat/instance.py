@@ -154,7 +154,7 @@ class Node:
     def _collect(self, cls: Class, mods: Mods) -> None:
         if cls.alias_of:
             raise ExportError(
-                cls.place, f"the short definition of '{cls.name}' can only be that of components"
+                cls.place, f"the short definition of '{cls.name}' is only supported as the type of components"
             )
         if cls.kind not in ("model", "block", "class", "record", "package", "function"):
             raise ExportError(cls.place, f"'{cls.kind} {cls.name}' cannot be instantiated")

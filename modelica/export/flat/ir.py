@@ -15,7 +15,7 @@ NUMBERS = frozenset(["Real", "Integer"])
 
 
 def alike(one: Type, other: Type) -> bool:
-    """Whether two values can be compared, chosen between or be equal: both numbers, or of one type."""
+    """Whether two types can be compared, equated or be branches of one `if`: numbers, or the same type."""
     return one == other or {one, other} == NUMBERS
 
 
@@ -235,12 +235,12 @@ class Assert:
 
 @dataclass(frozen=True, slots=True)
 class DelayLine:
-    """`out` is what `value` was where `key` stood at `position`.
+    """`out` is the value that `value` had when `key` was at `position`.
 
     Attributes:
-        span: how far behind `key` positions reach.
-        seeds: distances behind the first key and values: what is in the line at the start, beginning with
-            what comes out first. Without seeds, that is the first value.
+        span: maximum distance of `position` behind `key`.
+        seeds: initial content of the line as pairs of distance behind the first key and value, beginning
+            with what comes out first. Without seeds, the first value comes out.
     """
 
     key: Var
@@ -253,12 +253,12 @@ class DelayLine:
 
     @property
     def first(self) -> Scalar:
-        """What comes out at the start."""
+        """The value that comes out at the start."""
         return self.seeds[0][1] if self.seeds else self.value
 
 
 def is_delayed(name: str) -> bool:
-    """Whether a name is that of a variable of a delay line."""
+    """Whether a variable belongs to a delay line."""
     return name.startswith("$delay")
 
 

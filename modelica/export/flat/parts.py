@@ -101,7 +101,7 @@ def assertion(call: Call, here: Evaluator, guard: Scalar) -> Assert:
 
 
 def assertion_message(call: Call) -> str:
-    """The message of an assert."""
+    """Return the message of an assert."""
     if len(call.arguments) != 2 or call.named or not isinstance(call.arguments[1], Text):
-        raise ExportError(call.place, "'assert' takes a condition and a literal message, and no level")
+        raise ExportError(call.place, "'assert' expects a condition and a literal message, and no level")
     return call.arguments[1].value

@@ -29,7 +29,7 @@ from .sort import Block
 
 
 def c_type(kind: Type) -> str:
-    """The C type of a value."""
+    """Return the C type of a value."""
     return "double" if kind == "Real" else "int"
 
 
@@ -122,7 +122,7 @@ def lay_out(model: FlatModel, states: list[str], blocks: list[Block], initial_bl
     for name, variable in model.variables.items():
         wanted = variable.variability == "discrete" and variable.causality != "input"
         if variable.type == "Real" and wanted and name not in discrete:
-            raise ExportError(variable.place, f"the discrete '{name}' is not set in a when clause")
+            raise ExportError(variable.place, f"the discrete variable '{name}' is not set in a when clause")
     _check_pre(system)
     extra = [n for n in system.reals if n in needed and n not in set(system.discrete_reals)]
     system.before = system.discrete_reals + extra

@@ -40,7 +40,7 @@ def calculated_starts(model: FlatModel) -> list[Variable]:
         ):
             if variable.causality == "input":
                 raise ExportError(
-                    variable.place, f"the start value of the input '{variable.name}' needs to be a literal"
+                    variable.place, f"the start value of the input '{variable.name}' must be a literal"
                 )
             _known_names(variable.start, variable, model)
             found.append(variable)

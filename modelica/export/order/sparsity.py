@@ -1,4 +1,4 @@
-"""Which slopes depend on which states, for the implicit method."""
+"""Which derivatives depend on which states, for the implicit method."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .sort import Block
 
 
 def dependences(system: System) -> list[set[int]]:
-    """For each slope the numbers of the states that it depends on between events."""
+    """Return, per derivative, the indices of the states that it depends on between events."""
     known = {name: {k} for k, name in enumerate(system.states)}
     for block in system.blocks:
         found = set() if block.discrete else {k for name in block.uses for k in known.get(name, ())}
@@ -18,7 +18,7 @@ def dependences(system: System) -> list[set[int]]:
 
 
 def groups(rows: list[set[int]]) -> list[int]:
-    """A group for each state, so that no slope depends on two states of one group."""
+    """Return a group per state, so that no derivative depends on two states of one group."""
     conflicts = [set().union(*(row for row in rows if k in row)) for k in range(len(rows))]
     chosen: list[int] = []
     for k in range(len(rows)):
@@ -28,5 +28,5 @@ def groups(rows: list[set[int]]) -> list[int]:
 
 
 def depend_on_time(blocks: list[Block]) -> bool:
-    """Whether some of the blocks need the time."""
+    """Whether any of the blocks depends on time."""
     return any(isinstance(part, Time) for b in blocks for value in values(b.item) for part in walk(value))

@@ -111,7 +111,7 @@ def _typed(variable: Variable | None, kind: str) -> dict[str, str]:
 
 
 def _enumerations(parent: Element, system: System, shown: list[Entry], *, version: int) -> None:
-    """Definitions of the enumerations that variables have as their types."""
+    """Write the definitions of the enumerations that are types of variables."""
     used = [name for name in system.model.enumerations if any(entry.type == name for entry in shown)]
     if not used:
         return

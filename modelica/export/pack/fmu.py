@@ -61,7 +61,7 @@ class Contents:
 
     @property
     def c_files(self) -> list[str]:
-        """The files to compile."""
+        """The names of the files to compile."""
         return c_files(self.version, implicit=self.implicit)
 
     def sources(self) -> dict[str, str]:

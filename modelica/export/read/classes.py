@@ -74,10 +74,10 @@ class ClassReader(BodyReader):
         return result
 
     def literals(self, ctx: Any, name: str) -> tuple[tuple[str, str], ...]:
-        """Names and descriptions of the items of an enumeration."""
+        """Return names and descriptions of the items of an enumeration."""
         items = ctx.enum_list().enumeration_literal() if ctx.enum_list() else ()
         if not items:
-            raise ExportError(self.place(ctx), f"the enumeration '{name}' needs a list of its items")
+            raise ExportError(self.place(ctx), f"the enumeration '{name}' must list its items")
         found = tuple((item.IDENT().getText(), self.comment(item.comment())) for item in items)
         for k, (item, _) in enumerate(found):
             if item in (other for other, _ in found[:k]):

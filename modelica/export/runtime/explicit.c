@@ -1,5 +1,5 @@
 /* The Dormand-Prince pair 5(4). Coefficients: Dormand, Prince (1980) and Hairer, Norsett, Wanner, Solving Ordinary
- * Differential Equations I, section II.5 and II.6.
+ * Differential Equations I, sections II.5 and II.6.
  */
 #include "step.h"
 

@@ -1,20 +1,20 @@
 /* RODAS, a stiffly accurate Rosenbrock method of order 4(3) for stiff systems. Coefficients: Hairer, Wanner, Solving
  * Ordinary Differential Equations II, section IV.7. The continuous extension is that of their program.
  *
- * Derivatives of the slopes are taken by differences: states of one group (MODEL_GROUPS of them) never occur in the
- * same slope, so that they are moved together.
+ * The Jacobian is computed by finite differences. No slope depends on two states of one group (of MODEL_GROUPS), so
+ * that all states of a group are perturbed together.
  */
 #include "step.h"
 
 #define GAMMA 0.25
-#define SMALL_SHARE 1.5e-8 /* square root of the machine precision */
+#define PERTURBATION 1.5e-8 /* relative; square root of the machine precision */
 
 const double step_order = 4;
 
 static void find_jacobian(Model *m, const Step *s, double jacobian[N + 1][N + 1], double *by_time) {
     double y[N + 1], moved[N + 1], delta[N + 1];
     for (int j = 0; j < N; j++) {
-        delta[j] = SMALL_SHARE * max_real(fabs(s->y0[j]), model_nominal[j]);
+        delta[j] = PERTURBATION * max_real(fabs(s->y0[j]), model_nominal[j]);
         delta[j] = (s->y0[j] + delta[j]) - s->y0[j];
     }
     for (int g = 0; g < MODEL_GROUPS; g++) {
@@ -27,14 +27,14 @@ static void find_jacobian(Model *m, const Step *s, double jacobian[N + 1][N + 1]
     }
     memset(by_time, 0, N * sizeof *by_time);
     if (MODEL_SLOPES_OF_TIME) {
-        double dt = SMALL_SHARE * max_real(1, fabs(s->t));
+        double dt = PERTURBATION * max_real(1, fabs(s->t));
         dt = (s->t + dt) - s->t;
         step_evaluate(m, s->t + dt, s->y0, moved);
         for (int i = 0; i < N; i++) by_time[i] = (moved[i] - s->k[0][i]) / dt;
     }
 }
 
-/* Triangular factors of 1 / (GAMMA h) - jacobian, with row exchanges; the diagonal is inverted. */
+/* LU factors of I / (GAMMA h) - jacobian, with row pivoting; the diagonal is stored inverted. */
 static void factorize(double a[N + 1][N + 1], int *pivot, double h) {
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++) a[i][j] = (i == j ? 1 / (GAMMA * h) : 0) - a[i][j];

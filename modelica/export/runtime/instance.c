@@ -56,7 +56,7 @@ Result instance_result(Instance *c) {
     if (!m->ahead) return RESULT_OK;
     m->ahead = 0;
     if (c->log && !c->told)
-        c->log(c->environment, c->name, RESULT_DISCARD, "this step is longer than a delay of the model: a shorter one is needed");
+        c->log(c->environment, c->name, RESULT_DISCARD, "this step is longer than a delay of the model; use a shorter one");
     c->told = 1;
     return RESULT_DISCARD;
 }

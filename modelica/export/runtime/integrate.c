@@ -7,7 +7,7 @@
 
 #include <stdio.h>
 
-#define MOST_HALVINGS 4 /* of a step between two points of a delay line */
+#define MAX_HALVINGS 4 /* of a step, to add points to a delay line */
 
 void step_evaluate(Model *m, double t, const double *y, double *k) {
     m->time = t;
@@ -139,7 +139,7 @@ static double step_size(Model *m, double rest) {
     return size > 0.5 * rest ? 0.5 * rest : size;
 }
 
-/* What goes into the delay lines inside of a step, where straight lines between its ends would not do. */
+/* Record points of the delay lines inside a step, if straight lines between its ends are not accurate enough. */
 static void refine(Model *m, Step *s, double from, double to, const Entries *first, const Entries *last, int depth) {
     double y[N + 1], k[N + 1], middle = 0.5 * (from + to);
     Entries entries;
@@ -159,14 +159,14 @@ static void record(Model *m, Step *s) {
     lines_last(m, &first);
     model_lines(m, &last);
     memcpy(reals, m->r, sizeof reals);
-    refine(m, s, 0, (end - s->t) / s->h, &first, &last, MOST_HALVINGS);
+    refine(m, s, 0, (end - s->t) / s->h, &first, &last, MAX_HALVINGS);
     memcpy(m->r, reals, sizeof reals);
     m->time = end;
     lines_record(m);
 }
 
-/* Back to the beginning of a step that was in vain. */
-static void again(Model *m, const Step *s) {
+/* Return to the beginning of a rejected step. */
+static void reject(Model *m, const Step *s) {
     m->time = s->t;
     memcpy(m->r, s->y0, N * sizeof(double));
     memcpy(m->r + N, s->k[0], N * sizeof(double));
@@ -177,10 +177,10 @@ static int shorter_than_delay(Model *m, const Step *s) {
     m->ahead = 0;
     m->longest = 0.5 * s->h;
     if (m->longest < 1e-9) {
-        model_fail(m, "a delay is shorter than any step");
+        model_fail(m, "a delay is shorter than the smallest step");
         return 0;
     }
-    again(m, s);
+    reject(m, s);
     return 1;
 }
 
@@ -215,7 +215,7 @@ int integrate(Model *m, double stop) {
                     model_fail(m, "the integrator cannot reach its tolerance");
                     return 0;
                 }
-                again(m, &s);
+                reject(m, &s);
                 continue;
             }
             double proposal = s.h * min_real(5, max_real(0.2, factor));

@@ -1,12 +1,12 @@
-/* Delay lines: what `delay` and `spatialDistribution` remember.
+/* Delay lines: the memory of `delay` and `spatialDistribution`.
  *
- * A line is a list of points (key, value) with keys that never fall: times, or the way that a medium has come. Values
- * between two points are interpolated. Where a value jumps, two points have the same key. A point is recorded at the end
- * of every completed step and after every event; a read beyond the last one raises the flag `ahead`: the step was
- * longer than the delay.
+ * A line is a list of points (key, value) with keys that never decrease: times, or the distance that a medium has
+ * travelled. Values between two points are interpolated linearly. At a jump, two points have the same key. A point is
+ * recorded at the end of every completed step and after every event. Reading beyond the last one sets the flag `ahead`:
+ * the step was longer than the delay.
  *
- * The points lie outside of the Model, which remembers how many of them are its own: a copy of a Model that is taken
- * up again forgets what was recorded since.
+ * The points are stored outside the Model, which stores how many of them belong to it: restoring a copy of a Model
+ * discards the points recorded since the copy was made.
  */
 #include "model.h"
 
@@ -22,7 +22,7 @@ static void fail(Model *m, int k, const char *what) {
 
 static void append(Model *m, int k, double key, double value) {
     if (m->line_end[k] - m->line_begin[k] >= LINE_POINTS) {
-        fail(m, k, "the delay needs more points than __falsifier_solver(delayPoints) allows");
+        fail(m, k, "the delay needs more points than __falsifier_solver(delayPoints) provides");
         return;
     }
     Point *point = &m->lines[k].point[m->line_end[k]++ % LINE_POINTS];
@@ -45,7 +45,7 @@ void lines_start(Model *m) {
     model_line_seeds(m);
     model_lines(m, &first);
     for (int k = 0; k < MODEL_LINES; k++) {
-        if (!(first.span[k] > 0)) fail(m, k, "the delay needs to be longer than 0");
+        if (!(first.span[k] > 0)) fail(m, k, "the delay must be longer than 0");
         append(m, k, first.key[k], first.value[k]);
     }
 }
@@ -53,11 +53,11 @@ void lines_start(Model *m) {
 static void record(Model *m, int k, double key, double value, double span) {
     Point *last = at_index(m, k, m->line_end[k] - 1);
     if (!isfinite(key) || !isfinite(value)) {
-        fail(m, k, "what goes into the delay is not a finite number");
+        fail(m, k, "the input of the delay is not a finite number");
         return;
     }
     if (key < last->key) {
-        if (last->key - key > slack(key)) fail(m, k, "'x' of spatialDistribution falls");
+        if (last->key - key > slack(key)) fail(m, k, "'x' of spatialDistribution decreases");
         key = last->key;
     }
     if (key == last->key) {
@@ -85,11 +85,11 @@ void lines_last(const Model *m, Entries *last) {
     }
 }
 
-/* Whether a straight line between two points is as good as the tolerance of the integration. */
+/* Whether straight lines between two points meet the tolerance of the integration. */
 int lines_are_straight(const Model *m, const Entries *from, const Entries *middle, const Entries *to) {
     for (int k = 0; k < MODEL_LINES; k++) {
-        double way = to->key[k] - from->key[k];
-        double share = way > 0 ? (middle->key[k] - from->key[k]) / way : 0.5;
+        double distance = to->key[k] - from->key[k];
+        double share = distance > 0 ? (middle->key[k] - from->key[k]) / distance : 0.5;
         double straight = from->value[k] + share * (to->value[k] - from->value[k]);
         if (!(fabs(middle->value[k] - straight) <= 10 * m->tolerance * max_real(1, fabs(straight)))) return 0;
     }
@@ -100,7 +100,7 @@ void lines_record(Model *m) {
     Entries now;
     events_evaluate(m);
     model_lines(m, &now);
-    if (m->time < m->line_time - slack(m->time)) { /* a host that tries steps goes back to before its last one */
+    if (m->time < m->line_time - slack(m->time)) { /* a host that retries steps has returned to an earlier time */
         for (int k = 0; k < MODEL_LINES; k++)
             while (m->line_end[k] - m->line_begin[k] > 1 && at_index(m, k, m->line_end[k] - 1)->key > now.key[k])
                 m->line_end[k]--;

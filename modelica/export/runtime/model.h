@@ -19,10 +19,10 @@ typedef struct {
 } Point;
 
 typedef struct {
-    Point point[LINE_POINTS]; /* a ring */
+    Point point[LINE_POINTS]; /* a ring buffer */
 } Line;
 
-typedef struct { /* what goes into the delay lines at one time, and how far back each is read */
+typedef struct { /* inputs of the delay lines at one time, and how far back each is read */
     double key[MODEL_LINES + 1], value[MODEL_LINES + 1], span[MODEL_LINES + 1];
 } Entries;
 
@@ -66,7 +66,7 @@ extern const int model_pre_reals[]; /* index in r of the Reals with a value befo
 extern const int model_output_ints[], model_output_reals[]; /* discrete outputs */
 extern const unsigned char model_crossing_op[];
 extern const double model_nominal[];
-extern const int model_group[];             /* implicit method: states of one group are never in the same slope */
+extern const int model_group[];             /* implicit method: no slope depends on two states of one group */
 extern const unsigned char model_depends[]; /* implicit method: whether a slope (row) depends on a state (column) */
 extern const char *const model_line_names[]; /* file and line of each delay */
 void model_defaults(Model *m);           /* literal values of parameters and starts */
@@ -82,7 +82,7 @@ void model_floors(Model *m, double *values);
 void model_thresholds(Model *m, double *at);
 void model_tick_times(Model *m, int k, double *start, double *interval);
 
-void model_line_seeds(Model *m);         /* what is in the delay lines at the start */
+void model_line_seeds(Model *m);         /* initial content of the delay lines */
 void model_lines(Model *m, Entries *now);
 
 /* ---- runtime ---- */

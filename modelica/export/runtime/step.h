@@ -11,13 +11,13 @@ typedef struct {
     double y0[N + 1], y1[N + 1];
     double k[7][N + 1];      /* slopes; the first belongs to y0, the last to y1 */
     double bend[N + 1], twist[N + 1], dense[N + 1]; /* coefficients of the continuous extension */
-    int extended;                                   /* they are known */
+    int extended;                                   /* whether these coefficients are computed */
 } Step;
 
-extern const double step_order; /* the estimated error of a step grows with this power of its size */
-void step_stages(Model *m, Step *s);          /* from y0 to y1; fills k but for the last */
-double step_error(const Step *s, int state);  /* estimated error of y1; all slopes are known */
-void step_extend(Step *s);                    /* makes the coefficients of the continuous extension known */
+extern const double step_order; /* the estimated error grows with this power of the step size */
+void step_stages(Model *m, Step *s);          /* from y0 to y1; fills k except for the last slope */
+double step_error(const Step *s, int state);  /* estimated error of y1; needs all slopes */
+void step_extend(Step *s);                    /* computes the coefficients of the continuous extension */
 void step_evaluate(Model *m, double t, const double *y, double *slopes);
 
 #endif

@@ -1,5 +1,5 @@
 model M
   Real x = time;
 equation
-  annotation(experiment(StartTime = 5, StopTime = 6));  // error: 'StartTime' needs to be 0
+  annotation(experiment(StartTime = 5, StopTime = 6));  // error: 'StartTime' must be 0
 end M;

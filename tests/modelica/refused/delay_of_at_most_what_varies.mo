@@ -1,5 +1,5 @@
 model M
   Real x;
 equation
-  x = delay(time, 1 + time, 2 + time);  // error: 'delayMax' needs to be a parameter
+  x = delay(time, 1 + time, 2 + time);  // error: 'delayMax' must be a parameter
 end M;

@@ -1,4 +1,4 @@
 model M
-  Real x = delay(time);  // error: 'delay' takes 2 or 3 arguments
+  Real x = delay(time);  // error: 'delay' expects 2 or 3 arguments
 equation
 end M;

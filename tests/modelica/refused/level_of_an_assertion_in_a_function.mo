@@ -3,7 +3,7 @@ model M
     input Real u;
     output Real y;
   algorithm
-    assert(u < 1, "late", level = AssertionLevel.warning);  // error: 'assert' takes a condition and a literal
+    assert(u < 1, "late", level = AssertionLevel.warning);  // error: 'assert' expects a condition and a literal
     y := u;
   end f;
   Real x = f(time);

@@ -1,5 +1,5 @@
 model M
   Real out;
 equation
-  (, out) = spatialDistribution(time, 0, time, true, length = 2);  // error: no free argument 'length'
+  (, out) = spatialDistribution(time, 0, time, true, length = 2);  // error: has no argument 'length'
 end M;

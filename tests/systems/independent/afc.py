@@ -1,6 +1,6 @@
 """Abstract fuel control in short equal steps: pressure by backward differences, lags in closed form.
 
-The pressure p is found through w = sqrt(1 - p), in which the flow past the throttle is smooth near p = 1.
+The pressure p is computed as 1 - w^2, because the flow through the throttle is smooth in w near p = 1.
 """
 
 import numpy as np
@@ -14,11 +14,11 @@ SUBSTEPS = 20
 
 
 def ratios(pedal: Array, engine: Array) -> tuple[Array, Array, Array]:
-    """Relative error of the air/fuel ratio, mode and pressure at the controller's samples.
+    """Return relative error of the air/fuel ratio, mode and pressure at the controller's samples.
 
     Args:
-        pedal: held from each sample to the next, shape (samples,).
-        engine: engine speed in rev/min, likewise.
+        pedal: pedal angle in deg, held from each sample to the next, shape (samples,).
+        engine: engine speed in rev/min, shape (samples,).
     """
     data = tables("AFC")
     maps = [data[name] for name in ("delaySpeed", "delayAir", "delayTable")]
@@ -73,7 +73,7 @@ def _rate(lag, w, turning):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _lagged(y, rate, u0, u1, h):  # type: ignore[no-untyped-def]
-    """First-order lag after h seconds of an input that goes straight from u0 to u1."""
+    """Return a first-order lag after h seconds, while its input changes linearly from u0 to u1."""
     slope = (u1 - u0) / h
     return u1 - slope / rate + (y - u0 + slope / rate) * np.exp(-rate * h)
 
@@ -82,7 +82,7 @@ def _lagged(y, rate, u0, u1, h):  # type: ignore[no-untyped-def]
 def _run(pedal, engine, delay_n, delay_c, delay, wall_n, wall_c, direct, drying):  # type: ignore[no-untyped-def]
     samples, h = len(pedal), TICK / SUBSTEPS
     mu, modes, pressures = np.zeros(samples), np.ones(samples), np.empty(samples)
-    # Gas in the exhaust pipe: where it is when it leaves the engine, at both ends of each step.
+    # Gas in the exhaust pipe: distance travelled and ratios at both ends of each step.
     way = np.zeros(samples * SUBSTEPS + 1)
     left, right = np.full(len(way), 14.7), np.full(len(way), 14.7)
     lag, film, mixed, measured, p, p_before = 0.0, 0.0112, 14.7, 14.7, 0.982, 0.982

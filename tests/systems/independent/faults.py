@@ -1,4 +1,4 @@
-"""The faulty controllers once more: by times of events, by a table of transitions, in closed form."""
+"""The faulty controllers, implemented differently: by times of events, a transition table, in closed form."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from tests.systems.independent.stepping import Array
 
 
 def missed_pulses(contact: Array, *, period: float = 0.05) -> int:
-    """How many pulses the sleeping meter loses.
+    """Count the pulses that the meter loses.
 
     Args:
-        contact: at every tick, 0 or 1.
-        period: of the ticks in s.
+        contact: state of the contact at every tick, 0 or 1.
+        period: sample time in s.
     """
     closed = np.flatnonzero(np.concatenate([[False], contact > 0.5]))  # tick 0 is number 1 here
     begins = [int(k) for k in closed if k - 1 not in closed]
@@ -36,11 +36,11 @@ _ABORTS = {
 
 
 def charger(command: Array, *, period: float = 0.1) -> Array:
-    """Phase, lock, contactors and voltage at every tick, shape (ticks, 4).
+    """Return phase, lock, contactors and voltage at every tick, shape (ticks, 4).
 
     Args:
-        command: at every tick.
-        period: of the ticks in s.
+        command: command of the car at every tick.
+        period: sample time in s.
     """
     phase, since, locked, voltage = IDLE, 0, 0, 0.0
     rows = []
@@ -65,10 +65,10 @@ def charger(command: Array, *, period: float = 0.1) -> Array:
 
 
 def heater(disagreement: Array) -> Array:
-    """Temperature, limp-home and trips at every tick of 0.1 s, shape (ticks, 3).
+    """Return temperature, limp-home mode and trips at every tick of 0.1 s, shape (ticks, 3).
 
     Args:
-        disagreement: at every tick in K.
+        disagreement: difference between the sensors at every tick, in K.
     """
     rows = np.empty((len(disagreement), 3))
     bath, part = 60.0, 50.0
