@@ -58,9 +58,9 @@ def export(source: Path, name: str, target: Path, *, version: int, platforms: tu
         ExportError: with the file and line of what is wrong or not supported.
     """
     system, code = translate(source, name)
-    implicit = system.implicit
-    description = fmi2(system, c_files(2, implicit=implicit)) if version == 2 else fmi3(system)
-    contents = Contents(model_identifier(system), version, description, code, sizes_h(system), implicit)
+    description = fmi2(system, c_files(2)) if version == 2 else fmi3(system)
+    identifier = model_identifier(system)
+    contents = Contents(identifier, version, description, code, sizes_h(system), system.implicit)
     build(contents, target, platforms)
 
 

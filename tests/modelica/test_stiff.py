@@ -57,8 +57,8 @@ def test_the_other_interface_has_the_same_solution(build: Build) -> None:
 def test_slopes_are_moved_in_groups(build: Build) -> None:
     with zipfile.ZipFile(build("Stiff")) as archive:
         sizes = archive.read("sources/sizes.h").decode()
-        assert "sources/implicit.c" in archive.namelist()
-        assert "sources/explicit.c" not in archive.namelist()
+        assert "sources/implicit.h" in archive.namelist()
+        assert "sources/explicit.h" not in archive.namelist()
     assert "#define MODEL_STATES 4\n" in sizes
     assert "#define MODEL_GROUPS 2\n" in sizes
     assert "#define MODEL_SLOPES_OF_TIME 1\n" in sizes

@@ -221,6 +221,7 @@ def sizes_h(system: System) -> str:
         "MODEL_TIME_RELATIONS": len(layout.time_relations),
         "MODEL_FLOORS": len(layout.floors),
         "MODEL_TICKS": len(layout.ticks),
+        "SOLVER_METHOD": '"implicit.h"' if system.implicit else '"explicit.h"',
         "SOLVER_STEP": repr(float(solver.get("step", system.model.interval or 0.01))) if fixed else "0.0",
         "SOLVER_TOLERANCE": repr(float(system.model.tolerance or 1e-6)),
         "SOLVER_MAX_STEP": repr(float(solver["maxStep"])) if "maxStep" in solver else "HUGE_VAL",

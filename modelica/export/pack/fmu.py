@@ -62,11 +62,12 @@ class Contents:
     @property
     def c_files(self) -> list[str]:
         """The names of the files to compile."""
-        return c_files(self.version, implicit=self.implicit)
+        return c_files(self.version)
 
     def sources(self) -> dict[str, str]:
         """Return all C files by name."""
-        names = (*_HEADERS, *(name for name in self.c_files if name != "model.c"))
+        method = "implicit.h" if self.implicit else "explicit.h"
+        names = (*_HEADERS, method, *(name for name in self.c_files if name != "model.c"))
         files = {name: (RUNTIME / name).read_text(encoding="utf-8") for name in names}
         return files | {"model.c": self.model_c, "sizes.h": self.sizes_h}
 
@@ -79,9 +80,9 @@ class Contents:
         return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
 
 
-def c_files(version: int, *, implicit: bool) -> list[str]:
-    """Return the names of the files to compile for a version of FMI and an integration method."""
-    return sorted(["model.c", *_COMMON, "implicit.c" if implicit else "explicit.c", f"fmi{version}.c"])
+def c_files(version: int) -> list[str]:
+    """Return the names of the files to compile."""
+    return sorted(["model.c", *_COMMON, f"fmi{version}.c"])
 
 
 def build(contents: Contents, target: Path, platforms: tuple[str, ...]) -> None:

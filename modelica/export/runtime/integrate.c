@@ -1,15 +1,17 @@
-/* Integration with fixed or adaptive steps, by the method of explicit.c or implicit.c.
+/* Integration with fixed or adaptive steps, by the method of explicit.h or implicit.h.
  *
  * State events are detected by comparing relations with their frozen values at several points of a step, and located
  * on the continuous extension of the method.
  */
 #include "step.h"
 
+#include SOLVER_METHOD /* "explicit.h" or "implicit.h" */
+
 #include <stdio.h>
 
 #define MAX_HALVINGS 4 /* of a step, to add points to a delay line */
 
-void step_evaluate(Model *m, double t, const double *y, double *k) {
+static void step_evaluate(Model *m, double t, const double *y, double *k) {
     m->time = t;
     memcpy(m->r, y, N * sizeof(double));
     model_derivatives(m);
@@ -208,7 +210,7 @@ int integrate(Model *m, double stop) {
         }
         if (!(SOLVER_STEP > 0)) {
             double error = error_of(m, &s);
-            double factor = error > 0 ? 0.9 * pow(error, -1 / step_order) : 5;
+            double factor = error > 0 ? 0.9 * pow(error, -1.0 / STEP_ORDER) : 5;
             if (!(error <= 1)) { /* also if the error is NaN */
                 m->step = s.h * (error > 1 && isfinite(error) ? max_real(0.2, factor) : 0.2);
                 if (m->step < 1e-13 * max_real(1, fabs(s.t))) {

@@ -1,4 +1,5 @@
-/* One step of an integration method. The method's source file (explicit.c or implicit.c) provides the functions. */
+/* One step of an integration method. explicit.h and implicit.h define the functions; integrate.c includes one of them,
+ * because the compiler can then inline them. */
 #ifndef STEP_H
 #define STEP_H
 
@@ -14,10 +15,9 @@ typedef struct {
     int extended;                                   /* whether these coefficients are computed */
 } Step;
 
-extern const double step_order; /* the estimated error grows with this power of the step size */
-void step_stages(Model *m, Step *s);          /* from y0 to y1; fills k except for the last slope */
-double step_error(const Step *s, int state);  /* estimated error of y1; needs all slopes */
-void step_extend(Step *s);                    /* computes the coefficients of the continuous extension */
-void step_evaluate(Model *m, double t, const double *y, double *slopes);
+static void step_stages(Model *m, Step *s);          /* from y0 to y1; fills k except for the last slope */
+static double step_error(const Step *s, int state);  /* estimated error of y1; needs all slopes */
+static void step_extend(Step *s);                    /* computes the coefficients of the continuous extension */
+static void step_evaluate(Model *m, double t, const double *y, double *slopes);
 
 #endif

@@ -9,7 +9,7 @@
 #define GAMMA 0.25
 #define PERTURBATION 1.5e-8 /* relative; square root of the machine precision */
 
-const double step_order = 4;
+#define STEP_ORDER 4 /* the estimated error grows with this power of the step size */
 
 static void find_jacobian(Model *m, const Step *s, double jacobian[N + 1][N + 1], double *by_time) {
     double y[N + 1], moved[N + 1], delta[N + 1];
@@ -71,7 +71,7 @@ static void substitute(double a[N + 1][N + 1], const int *pivot, double *b) {
     }
 }
 
-void step_stages(Model *m, Step *s) {
+static void step_stages(Model *m, Step *s) {
     static const double a[6][5] = {
         {0},
         {1.544000000000000},
@@ -122,6 +122,6 @@ void step_stages(Model *m, Step *s) {
     s->extended = 1;
 }
 
-double step_error(const Step *s, int j) { return s->k[1][j]; }
+static double step_error(const Step *s, int j) { return s->k[1][j]; }
 
-void step_extend(Step *s) { (void)s; }
+static void step_extend(Step *s) { (void)s; }

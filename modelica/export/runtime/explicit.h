@@ -3,9 +3,9 @@
  */
 #include "step.h"
 
-const double step_order = 5;
+#define STEP_ORDER 5 /* the estimated error grows with this power of the step size */
 
-void step_stages(Model *m, Step *s) {
+static void step_stages(Model *m, Step *s) {
     static const double a[6][5] = {
         {0},
         {1.0 / 5},
@@ -30,12 +30,12 @@ void step_stages(Model *m, Step *s) {
                                       2187.0 / 6784 * s->k[4][j] + 11.0 / 84 * s->k[5][j]);
 }
 
-double step_error(const Step *s, int j) {
+static double step_error(const Step *s, int j) {
     return s->h * (71.0 / 57600 * s->k[0][j] - 71.0 / 16695 * s->k[2][j] + 71.0 / 1920 * s->k[3][j] -
                    17253.0 / 339200 * s->k[4][j] + 22.0 / 525 * s->k[5][j] - 1.0 / 40 * s->k[6][j]);
 }
 
-void step_extend(Step *s) {
+static void step_extend(Step *s) {
     for (int j = 0; j < N; j++) {
         double rise = s->y1[j] - s->y0[j];
         s->bend[j] = s->h * s->k[0][j] - rise;
