@@ -39,6 +39,7 @@ class Gate:
         Raises:
             ChatError: if that is too short.
         """
+        limit = None if limit is None else min(limit, threading.TIMEOUT_MAX)
         until = None if limit is None else time.monotonic() + limit
         if not self._slots.acquire(timeout=limit):
             raise ChatError("no time is left: other requests to this language model are still waiting")
