@@ -48,11 +48,17 @@ def problem_options(command: F) -> F:
                 "parameters",
                 multiple=True,
                 metavar="NAME=VALUE",
-                help="Set a parameter or start value (or NAME=LOW:HIGH: search it). Repeatable.",
+                help="Set a parameter, start value or string (or NAME=LOW:HIGH: search it). Repeatable.",
             ),
             click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
             click.option(
                 "--output-interval", type=float, metavar="SECONDS", help="Step of the monitored grid."
+            ),
+            click.option(
+                "--time-limit",
+                type=float,
+                metavar="SECONDS",
+                help="Longest time that one simulation may take.",
             ),
         )
     ):
@@ -62,7 +68,7 @@ def problem_options(command: F) -> F:
 
 def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the problem's options out of a command's keyword arguments."""
-    varied = ("inputs", "parameters", "stop_time", "output_interval", "interface")
+    varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
     stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization")}
     return ProblemSource(**stated, changes=changes)

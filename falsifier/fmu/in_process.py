@@ -27,7 +27,9 @@ class LocalFmu:
         self._folder = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
         try:
             archive.extract(order.path, self._folder)
-            self._session = Session(order.description, self._folder, order.interface, self._log.append)
+            self._session = Session(
+                order.description, self._folder, order.interface, self._log.append, logging=order.logging
+            )
         except BaseException:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise
@@ -65,25 +67,25 @@ class LocalFmu:
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
-_FMUS: dict[tuple[str, str], LocalFmu] = {}
+_FMUS: dict[tuple[str, str, bool], LocalFmu] = {}
 
 
 def fmu(order: Order) -> LocalFmu:
     """Return the FMU as loaded in this process; load it if necessary."""
-    key = (order.sha256, order.interface)
+    key = (order.sha256, order.interface, order.logging)
     if key not in _FMUS:
         _FMUS[key] = LocalFmu(order)
     return _FMUS[key]
 
 
-def drop(sha256: str, interface: str) -> None:
+def drop(sha256: str, interface: str, *, logging: bool = False) -> None:
     """Unload an FMU, if it is loaded."""
-    found = _FMUS.pop((sha256, interface), None)
+    found = _FMUS.pop((sha256, interface, logging), None)
     if found is not None:
         found.close()
 
 
 @atexit.register
 def _close_all() -> None:
-    for key in list(_FMUS):
-        drop(*key)
+    for sha256, interface, logging in list(_FMUS):
+        drop(sha256, interface, logging=logging)

@@ -41,7 +41,9 @@ from falsifier.fmu.channel import (
     watch,
 )
 from falsifier.fmu.environment import worker_environment
+from falsifier.fmu.failure_text import how_it_ended, last_lines, simulation_error
 from falsifier.fmu.plan import Plan
+from falsifier.fmu.trust import Trust
 from falsifier.fmu.worker import PREPARE, RUN
 from falsifier.fmu.worker_order import Order, Reuse
 
@@ -144,6 +146,9 @@ class _Worker:
         self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
         self.awaits_test = False
         self.is_quick = False
+        self.logging = order.logging
+        self.simulations = 0
+        self.started = time.perf_counter()
 
     def prepare(self, plan: Plan) -> Reply:
         """Share memory for a plan with the worker, which then looks up the plan's variables."""
@@ -199,13 +204,17 @@ class IsolatedFmu:
     def __init__(self, owner: Callable[[], Nursery], order: Order) -> None:
         self._owner, self._order = owner, order
         self._worker: _Worker | None = None
-        self._reuse: Reuse | None = None
+        self._trust = Trust()
         self._lock = threading.Lock()
 
     def simulate(
         self, plan: Plan, fill: Callable[[Room], None]
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         """Simulate once.
+
+        A simulation that fails in a process that has simulated before is repeated in a new one before it
+        counts as failed: the reuse may be to blame. If it is, the FMU's instances are not reused any more.
+        The repetition asks the FMU for messages, which most FMUs give only on request.
 
         Args:
             plan: what the simulations have in common.
@@ -220,34 +229,74 @@ class IsolatedFmu:
         """
         with self._lock:
             worker = self._worker_for(plan)
+            is_reused, reuse = worker.simulations > 0, self._trust.reuse
             try:
-                fill(worker.room)
-                worker = self._started(worker, plan, fill)
-                reply = worker.wait(plan.time_limit + _GRACE_SECONDS)
-            except TimeoutError:
-                raise self._end(
-                    f"did not finish within the time limit of {plan.time_limit:g} s and was stopped",
-                    "timeout",
-                ) from None
-            except Closed:
-                raise self._end("", "crashed") from None
-            except BaseException:
-                # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
-                self._drop()
-                raise
-            if reply.status == "unusable":
-                self._drop()
-                raise ModelError(reply.text)
-            if reply.status != "ok":
-                log = worker.take_log()
-                self._drop()
-                raise _error(reply, log)
-            outputs = worker.room.outputs.copy()
+                return self._simulate(worker, plan, fill)
+            except SimulationError as error:
+                if not self._should_repeat(error, is_reused=is_reused):
+                    raise
+            repeated = self._simulate(self._speaking_worker(plan), plan, fill)
+            if is_reused and reuse is not None:
+                self._trust.distrust(reuse)
+            return repeated
+
+    def load(self, plan: Plan) -> None:
+        """Load the library and make an instance, without a simulation.
+
+        Raises:
+            ModelError: if that fails.
+        """
+        with self._lock:
+            self._worker_for(plan)
+
+    def _should_repeat(self, error: SimulationError, *, is_reused: bool) -> bool:
+        if error.status == "timeout" or (self._order.logging and not is_reused):
+            return False
+        return (is_reused and error.status == "crashed") or self._trust.is_worth_repeating()
+
+    def _speaking_worker(self, plan: Plan) -> _Worker:
+        """Return a new worker that asks the FMU for messages; it serves one simulation."""
+        self._drop()
+        order = replace(self._order, logging=True, reuse="process")
+        worker = self._worker = _Worker(self._owner(), order)
+        self._prepare(worker, plan)
+        return worker
+
+    def _simulate(
+        self, worker: _Worker, plan: Plan, fill: Callable[[Room], None]
+    ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        try:
+            fill(worker.room)
+            worker = self._started(worker, plan, fill)
+            reply = worker.wait(plan.time_limit + _GRACE_SECONDS)
+        except TimeoutError:
+            raise self._end(
+                f"did not finish within the time limit of {plan.time_limit:g} s and was stopped; "
+                "slow models need a larger time_limit",
+                "timeout",
+            ) from None
+        except Closed:
+            raise self._end("", "crashed") from None
+        except BaseException:
+            # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
+            self._drop()
+            raise
+        if reply.status == "unusable":
+            self._drop()
+            raise ModelError(reply.text)
+        if reply.status != "ok":
             log = worker.take_log()
-            worker.awaits_test = reply.more
-            if reply.leaving:
-                self._drop()
-            return outputs, log
+            self._drop()
+            raise simulation_error(reply, log)
+        outputs = worker.room.outputs.copy()
+        log = worker.take_log()
+        if not worker.simulations:
+            self._trust.took(time.perf_counter() - worker.started)
+        worker.simulations += 1
+        worker.awaits_test = reply.more
+        if reply.leaving:
+            self._drop()
+        return outputs, log
 
     def close(self) -> None:
         """End the worker."""
@@ -273,13 +322,21 @@ class IsolatedFmu:
 
     def _worker_for(self, plan: Plan) -> _Worker:
         if self._worker is not None and self._worker.awaits_test:
-            self._await_test(self._worker, plan)
+            self._await_test(self._worker)
         worker = self._worker
         if worker is None:
-            order = replace(self._order, reuse=self._reuse)
+            trust = self._trust
+            order = replace(self._order, reuse=trust.reuse, untrusted=trust.untrusted)
             worker = self._worker = _Worker(self._owner(), order)
-        if worker.plan is not plan:
+        if worker.plan is plan:
+            return worker
+        try:
             self._prepare(worker, plan)
+        except ModelError:
+            if worker.logging or not self._trust.is_worth_repeating():
+                raise
+            # Once more, to hear why.
+            return self._speaking_worker(plan)
         return worker
 
     def _prepare(self, worker: _Worker, plan: Plan) -> None:
@@ -290,30 +347,35 @@ class IsolatedFmu:
             log = worker.take_log()
             code = self._drop()
             raise ModelError(
-                f"{self._order.path}: the FMU {how} while it was loaded ({_how_it_ended(code)})"
-                + "".join(f"\n  {line}" for line in log[-5:])
+                f"{self._order.path}: the FMU {how} while it was loaded ({how_it_ended(code)})"
+                + last_lines(log)
             ) from None
         except BaseException:
             self._drop()
             raise
         if reply.status != "ok":
+            log = worker.take_log()
             self._drop()
-            raise ModelError(f"{self._order.path}: {reply.text}")
+            raise ModelError(f"{self._order.path}: {reply.text}{last_lines(log)}")
 
-    def _await_test(self, worker: _Worker, plan: Plan) -> None:
-        """Receive the result of the worker's reuse test; if it crashed or hung, never reuse a process."""
+    def _await_test(self, worker: _Worker) -> None:
+        """Receive the result of the worker's reuse test; what crashed or hung is not tried again."""
         worker.awaits_test = False
+        trust = self._trust
         try:
-            reply = receive_reply(worker.sock, 5 * plan.time_limit + _GRACE_SECONDS)
+            reply = receive_reply(worker.sock, trust.patience)
+            while reply.more:
+                trust.trying = cast(Reuse, reply.text)
+                reply = receive_reply(worker.sock, trust.patience)
         except (Closed, TimeoutError):
-            self._reuse = "process"
+            trust.distrust(trust.trying)
             self._drop()
             return
         except BaseException:
             self._drop()
             raise
         worker.take_log()
-        self._reuse = cast(Reuse, reply.text)
+        trust.reuse = cast(Reuse, reply.text)
         if reply.leaving:
             self._drop()
 
@@ -323,31 +385,12 @@ class IsolatedFmu:
         log = worker.take_log()
         code = self._drop()
         name = self._order.description.info.name
-        reason = reason or f"the FMU's process crashed: {_how_it_ended(code)}"
-        return SimulationError(f"{name}: {reason}" + _last_line(log), status=status, log=log)
+        reason = reason or f"the FMU's process crashed: {how_it_ended(code)}"
+        return SimulationError(f"{name}: {reason}" + last_lines(log), status=status, log=log)
 
     def _drop(self) -> int:
         worker, self._worker = self._worker, None
         return 0 if worker is None else worker.kill()
-
-
-def _error(reply: Reply, log: tuple[str, ...]) -> SimulationError:
-    time = None if reply.time < 0 else reply.time
-    status: FailureStatus = "timeout" if reply.status == "timeout" else "failed"
-    return SimulationError(reply.text + _last_line(log), status=status, time=time, log=log)
-
-
-def _last_line(log: tuple[str, ...]) -> str:
-    return f"; its last message: {log[-1]}" if log else ""
-
-
-def _how_it_ended(code: int) -> str:
-    if code >= 0:
-        return f"it exited with code {code}"
-    try:
-        return f"signal {signal.Signals(-code).name}"
-    except ValueError:
-        return f"signal {-code}"
 
 
 def _anonymous_file() -> IO[bytes]:
@@ -367,7 +410,7 @@ class _Registry:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._nursery: Nursery | None = None
-        self._fmus: dict[tuple[str, str], IsolatedFmu] = {}
+        self._fmus: dict[tuple[str, str, bool], IsolatedFmu] = {}
         atexit.register(self.close)
         os.register_at_fork(after_in_child=self.forget)
 
@@ -381,16 +424,16 @@ class _Registry:
             return self._nursery
 
     def fmu(self, order: Order) -> IsolatedFmu:
-        key = (order.sha256, order.interface)
+        key = (order.sha256, order.interface, order.logging)
         found = self._fmus.get(key)
         if found is None:
             with self._lock:
                 found = self._fmus.setdefault(key, IsolatedFmu(self.nursery, order))
         return found
 
-    def drop(self, sha256: str, interface: str) -> None:
+    def drop(self, sha256: str, interface: str, *, logging: bool = False) -> None:
         with self._lock:
-            found = self._fmus.pop((sha256, interface), None)
+            found = self._fmus.pop((sha256, interface, logging), None)
         if found is not None:
             found.close()
 

@@ -130,7 +130,7 @@ def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoR
         _flush_lines()
         with socket.socket(fileno=os.dup(connection)) as sock:
             os.close(connection)
-            worker.serve(sock, order.description, folder, order.interface, order.reuse)
+            worker.serve(sock, order, folder)
         code = 0
     except BaseException:
         traceback.print_exc()

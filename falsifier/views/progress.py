@@ -42,6 +42,8 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
+                    for line in _notes(event):
+                        progress.console.print(line, highlight=False, markup=False)
                     progress.update(task, description=_title(event), total=total)
                 case Evaluated():
                     progress.update(task, completed=event.spent.simulations, note=note(event))
@@ -83,6 +85,8 @@ class PlainDisplay:
                 for problem in event.problems:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
+                for line in _notes(event):
+                    self._line(line)
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
             case Evaluated(evaluation=evaluation, best=best) if (
@@ -147,6 +151,11 @@ class NotebookLine:
             self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
         else:
             self._handle.update(line)
+
+
+def _notes(event: RunStarted) -> list[str]:
+    """Return what was chosen or ignored when the problems were loaded; what several share, once."""
+    return list(dict.fromkeys(note for problem in event.problems for note in problem.notes))
 
 
 def _title(event: RunStarted) -> str:

@@ -8,8 +8,9 @@ from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import stepper
-from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.description import Description
 from falsifier.fmu.ports import make_ports
+from falsifier.fmu.slot import Slot
 from tests.fmu import plain
 from tests.fmu.fixtures import local, ramp, run
 

@@ -119,7 +119,7 @@ def test_a_nursery_that_dies_is_replaced(misdeeds: FmuModel) -> None:
         ("SavedState_3", "state"),
         ("LyingState_2", "instance"),
         ("SpentState_3", "instance"),
-        ("KeepsStatic_2", "process"),
+        ("KeepsStatic_2", "library"),
     ],
 )
 def test_repeated_runs_are_equal_whatever_the_reset_does(name: str, reuse: str) -> None:
@@ -127,7 +127,7 @@ def test_repeated_runs_are_equal_whatever_the_reset_does(name: str, reuse: str) 
     runs = [run(model, ("y",))["y"].tolist() for _ in range(4)]
     assert runs == [runs[0]] * 4
     (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.sha256]
-    assert fmu._reuse == reuse
+    assert fmu._trust.reuse == reuse
     model.close()
 
 

@@ -183,9 +183,9 @@ def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) 
     assert ranges["in_Enumeration"] == (1, 3, "enumeration")
     assert ranges["in_Boolean"] == (0, 1, "boolean")
     assert ranges["in_Int8"] == (0, 1, "integer")
-    assert "# 1 = first, 2 = second, 3 = third\n[inputs.in_Enumeration]\nrange = [1, 3]\n" in text
+    assert "[inputs.in_Enumeration]\n# 1 = first, 2 = second, 3 = third\nrange = [1, 3]\n" in text
     assert "[inputs.in_Boolean]\nrange = [0, 1]\n" in text
-    assert "[inputs.in_Int8]\nrange = [0, 1]  # the FMU specifies no min and max: replace" in text
+    assert "[inputs.in_Int8]\nrange = [0, 1]  # unbounded: the FMU specifies no min and max; replace" in text
 
 
 ECHO = """
