@@ -1,4 +1,4 @@
-"""Files that commands leave behind: a counterexample as JSON with its picture beside it."""
+"""Files written by several commands: a counterexample as JSON, and its picture."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ from falsifier.evaluation.confirm import Confirmation
 
 
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
-    """Write a counterexample as JSON, as ``falsifier replay`` reads it, and as a picture; return the files.
+    """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
 
     Args:
         confirmation: the violation.
         directory: where to write.
-        name: of the JSON file; the picture is named like it.
+        name: name of the JSON file; the picture has the same name, with the extension .png.
     """
     from falsifier.views.plotting import plot_evaluation, save_figure
 

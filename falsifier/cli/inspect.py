@@ -1,6 +1,7 @@
-"""``falsifier info``, ``init``, ``build``, ``check`` and ``schema``: everything that does not search."""
+"""``falsifier info``, ``init``, ``build``, ``check`` and ``schema``: commands that do not search."""
 
 import json
+import shlex
 import sys
 from os.path import relpath
 from pathlib import Path
@@ -8,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import json_option
+from falsifier.cli.options import json_option, out_option, profile_option
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
+from falsifier.core.words import counted
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
@@ -19,7 +21,7 @@ from falsifier.problem.loading import load_problems
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
-from falsifier.views.model_text import info_json, info_text
+from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -30,16 +32,19 @@ _CHECKED_VARIABLES = 50
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("--all", "everything", is_flag=True, help="Show all variables, internal ones too.")
+@click.option("--all", "everything", is_flag=True, help="Show all variables, including internal ones.")
 @click.option(
     "--check",
     "checked",
     is_flag=True,
-    help="Simulate with the step and with half of it: how far outputs move.",
+    help="Simulate with the step and with half of it, and show the largest differences of the outputs.",
 )
 @json_option
 def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
-    """Show what an FMU, or that of a spec file, says of itself: interfaces, variables, units and ranges."""
+    """Show an FMU's interfaces, variables, units and ranges.
+
+    FMU is an FMU, the name of a bundled one (AT), or a spec file, which stands for its FMU.
+    """
     from falsifier.fmu import read_info
 
     source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
@@ -54,11 +59,9 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), help="FMU to write; default: NAME-PLATFORM.fmu."
-)
+@out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
-    """Compile the C sources inside an FMU for this platform and write a copy of it with the library."""
+    """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
     from falsifier.fmu.build import build as compile_sources
 
     written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
@@ -67,30 +70,30 @@ def build(*, fmu: Path, out: Path | None) -> None:
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="Spec file; default: beside the FMU.")
+@out_option("Spec file to write; default: NAME.toml in the FMU's directory.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(*, fmu: Path, out: Path | None, force: bool) -> None:
-    """Write a starter spec for an FMU; it loads as it is."""
+    """Write a starter spec for an FMU: valid, and to be completed with ranges and requirements."""
     from falsifier.fmu import FmuModel, read_info
 
     source = _existing_fmu(fmu)
     path = out or fmu.with_suffix(".toml")
     if path.exists() and not force:
-        raise SpecError(f"{path} exists already: give another --out, or --force to replace it")
+        raise SpecError(f"{path} already exists: choose another --out, or add --force to replace it")
     found = read_info(source)
-    FmuModel(
-        source, interface=default_interface(found) or "co-simulation"
-    )  # refuses what cannot be simulated
+    # Raises an error if the FMU cannot be simulated, before a useless spec is written.
+    FmuModel(source, interface=default_interface(found) or "co-simulation")
     path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
     load_problems(str(path))
-    click.echo(f"{path} written. Put in the real ranges and the requirement, then: falsifier run '{path}'")
+    command = f"falsifier run {shlex.quote(str(path))}"
+    click.echo(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 
 
 @click.command()
 @click.argument("target")
-@click.option("--profile", help="Another parameterization that the spec offers.")
+@profile_option
 def check(*, target: str, profile: str | None) -> None:
-    """Check a spec file: its keys, its signals, its ranges and its formulas; nothing is simulated."""
+    """Check the keys, signals, ranges and formulas of a spec file without simulating."""
     problems = load_problems(target, profile=profile)
     for problem in problems:
         click.echo(_problem_line(problem))
@@ -105,7 +108,7 @@ def check(*, target: str, profile: str | None) -> None:
     type=click.Choice(["spec", "manifest", "journal", "campaign"]),
     default="spec",
     show_default=True,
-    help="Spec files, or a file of run directories; journal: one line of it.",
+    help="What to describe: spec files, or a file in run directories (journal: one line of it).",
 )
 def schema(*, what: str) -> None:
     """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
@@ -123,13 +126,13 @@ def _schema(what: str) -> dict[str, Any]:
 
 
 def _print_convergence(fmu: Path, found: ModelInfo) -> None:
-    """Say how far halving the step moves the outputs, with every bounded input going up and down once."""
+    """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.fmu import FmuModel
     from falsifier.fmu.step_check import step_convergence
 
     interface = default_interface(found)
     if interface is None:
-        raise SpecError(f"{fmu}: the FMU offers no interface that can be simulated")
+        raise SpecError(f"{fmu}: {NO_INTERFACE}; export the model for co-simulation or model exchange")
     stop_time = found.stop_time or DEFAULT_STOP_TIME
     outputs = tuple(v.name for v in found.observables if v.kind != "string")[:_CHECKED_VARIABLES]
     if not outputs:
@@ -147,7 +150,7 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
     finally:
         model.close()
     click.echo(
-        f"\n{interface}, step {experiment.output_interval:g} s against half of it, over {stop_time:g} s "
+        f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s "
         f"({grid.reason}):"
     )
     if not found.outputs:
@@ -155,8 +158,8 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
     for name, moved in movements.items():
         unit = f" {found[name].unit}" if found[name].unit else ""
         click.echo(
-            f"  {name} moves by at most {moved.largest:.3g}{unit} at {moved.time:.4g} s "
-            f"({moved.relative:.2%} of its range)"
+            f"  {name} changes by at most {moved.largest:.3g}{unit}, at {moved.time:.4g} s "
+            f"({100 * moved.relative:.2f} % of its range)"
         )
 
 
@@ -166,18 +169,19 @@ def _existing_fmu(fmu: Path) -> Path:
     inside = bundled("fmus") / f"{fmu.name.removesuffix('.fmu')}.fmu"
     if fmu.parent == Path() and inside.is_file():
         return inside
-    raise SpecError(f"there is no file {fmu}")
+    raise SpecError(f"{fmu}: no such file; expected the path of an FMU, or the name of a bundled one")
 
 
 def _relative(fmu: Path, spec: Path) -> Path:
-    """Path of the FMU as seen from the spec's folder (Path.relative_to cannot walk up before Python 3.12)."""
+    """Path of the FMU relative to the spec's directory (Path.relative_to has walk_up only in Python 3.12)."""
     return Path(relpath(fmu.resolve(), spec.resolve().parent))
 
 
 def _problem_line(problem: Problem) -> str:
     space = problem.space
     searched = [
-        f"{r.name} [{r.low:g}, {r.high:g}] {r.control_points} {r.interpolation} points" for r in space.inputs
+        f"{r.name} [{r.low:g}, {r.high:g}] ({counted(r.control_points, 'control point')}, {r.interpolation})"
+        for r in space.inputs
     ]
     searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"

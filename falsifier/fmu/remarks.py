@@ -67,7 +67,7 @@ def remarks(
     if needs_tool:
         said.append(needed_tool_text(tool, needs_tool))
     if clocks := tuple(input_clocks(root).values()):
-        said.append(f"the input clocks {_listed(clocks)} are ignored: they never tick")
+        said.append(f"input clocks are ignored, so they never tick: {_listed(clocks)}")
     if ignored := [v.name for v in variables if v.is_clocked]:
         said.append(f"variables of input clocks are ignored: {_listed(ignored)}")
     if binary := [element.attrib["name"] for element in root.findall("ModelVariables/Binary")]:

@@ -1,7 +1,7 @@
 """FMUs as models: the implementation of the Model protocol."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import get_args
@@ -84,6 +84,19 @@ class FmuModel:
             check_finite(self.info.name, task.times, columns)
         return Trajectory(task.times, columns, task.units, log)
 
+    def load(self) -> None:
+        """Load the library and make an instance in a worker process, without simulating.
+
+        Raises:
+            ModelError: if that fails.
+        """
+        order = replace(_order(self), logging=True)
+        fmu = IsolatedFmu(REGISTRY.nursery, order)
+        try:
+            fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
+        finally:
+            fmu.close()
+
     def close(self) -> None:
         """End the worker process or unload the library; the next simulation starts again."""
         if self.isolate:
@@ -156,9 +169,13 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
 
 
 def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
-    description = describe(model.path, model.sha256)
-    order = Order(model.path, model.sha256, description, model.interface, None, logging=model.logging)
+    order = _order(model)
     return REGISTRY.fmu(order) if model.isolate else in_process.fmu(order)
+
+
+def _order(model: FmuModel) -> Order:
+    description = describe(model.path, model.sha256)
+    return Order(model.path, model.sha256, description, model.interface, None, logging=model.logging)
 
 
 def _check_interface(model: FmuModel) -> None:

@@ -70,7 +70,12 @@ def join(
             f"no such FMU: {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
         )
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-    model = FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), file))
+    logging = [layer.logging for layer in layers if layer.logging is not None]
+    model = FmuModel(
+        fmu,
+        interface=_interface(spec, layers, read_info(fmu), file),
+        logging=logging[-1] if logging else spec.model.logging,
+    )
     formulas = [r.formula for r in spec.requirements.values()] if stl is None else [stl]
     experiment, grid = _experiment(spec, layers, model.info, formulas, file)
     inputs, parameters = _merged(spec, layers)
@@ -109,7 +114,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
         ModelError: if the FMU cannot be read.
     """
     if not fmu.is_file():
-        raise SpecError(f"no such FMU: {fmu}; give the path of an .fmu file")
+        raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
     info = read_info(fmu)
     stop_time = changes.stop_time or info.stop_time
     if stop_time is None:

@@ -105,6 +105,7 @@ class ModelSection(_Strict):
     time_limit: Seconds | None = Field(
         None, description="Maximum wall-clock time of one simulation in s; default: 60."
     )
+    logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
 
 
@@ -117,6 +118,7 @@ class ModelChanges(_Strict):
     step_size: Seconds | None = None
     tolerance: Seconds | None = None
     time_limit: Seconds | None = None
+    logging: bool | None = None
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
 

@@ -1,4 +1,4 @@
-"""Axes of one's own, and the figure that axes are on."""
+"""New axes, and the figure that axes belong to; without pyplot, which keeps global state."""
 
 from typing import TYPE_CHECKING
 
@@ -8,14 +8,14 @@ if TYPE_CHECKING:
 
 
 def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":
-    """Axes that fill a new figure of this size in inches."""
+    """Make axes that fill a new figure of this size in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained").subplots()
 
 
 def figure_of(ax: "Axes") -> "Figure":
-    """Figure that axes are on."""
+    """The figure that axes belong to."""
     from matplotlib.figure import Figure
 
     figure = ax.get_figure(root=True)

@@ -1,21 +1,22 @@
-"""The report as JUnit XML: a test case for each run; a falsified requirement is a failure."""
+"""The report as JUnit XML: one test case per run; a falsified requirement is a failure."""
 
 from itertools import groupby
 from pathlib import Path
 from xml.etree import ElementTree
 
 from falsifier.campaigns.analysis import Run, load
+from falsifier.core.words import counted
 from falsifier.views.report.content import replay_command, run_command, searches
 
-# What XML 1.0 cannot hold; names and reasons may carry anything that a model printed.
+# Characters that XML 1.0 does not allow; reasons may contain anything that a model printed.
 _NO_CONTROLS = {code: "�" for code in range(32) if chr(code) not in "\t\n\r"}
 
 
 def junit_report(directory: Path) -> str:
-    """Results of a run or a campaign, one test suite for each method.
+    """Report on a run or a campaign, one test suite per method.
 
     Raises:
-        JournalError: when the directory is neither, or is damaged.
+        JournalError: if the directory is neither, or is damaged.
     """
     runs = sorted(load(directory), key=lambda run: run.method)
     root = ElementTree.Element("testsuites", name="falsifier")
@@ -49,7 +50,8 @@ def _case(label: str, run: Run) -> ElementTree.Element:
         time=f"{run.spent.seconds:.3f}",
     )
     if run.falsified and run.verdict is not None:
-        message = f"robustness {run.verdict.robustness:+.6g} after {run.simulations} simulations"
+        count = counted(run.simulations, "simulation")
+        message = f"robustness {run.verdict.robustness:+.6g} after {count}"
         failure = ElementTree.SubElement(case, "failure", message=message, type="falsified")
         failure.text = "\n".join(
             line.translate(_NO_CONTROLS)
