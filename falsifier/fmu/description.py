@@ -335,7 +335,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
                         description=description,
                         start=starts[offset] if starts else None,
                     ),
-                    Slot(reference, code, offset, count, refusal=refusal),
+                    Slot(reference, code, offset, count, refusal=refusal, declared=variable.name),
                 )
 
 

@@ -84,6 +84,18 @@ class FmuModel:
             check_finite(self.info.name, task.times, columns)
         return Trajectory(task.times, columns, task.units, log)
 
+    def place(self, name: str) -> tuple[str, int]:
+        """Return where a scalar stands: the name that the FMU declares, and the position in that array."""
+        slot = self._description.slot(name)
+        return slot.declared or name, slot.offset
+
+    def elements(self, declared: str) -> tuple[str, ...]:
+        """Return the names of the elements of an array in order; of a scalar, its own."""
+        slots = self._description.slots
+        # Reversed, so that the first names win: aliases come after the variable that they stand for.
+        names = {s.offset: n for n, s in reversed(slots.items()) if (s.declared or n) == declared}
+        return tuple(names[offset] for offset in sorted(names))
+
     def load(self) -> None:
         """Load the library and make an instance in a worker process, without simulating.
 

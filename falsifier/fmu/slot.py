@@ -14,6 +14,8 @@ class Slot:
         size: number of elements of the array, 1 for scalars.
         negated: whether it is an FMI 1 alias with the opposite sign.
         refusal: why it cannot be set; empty if it can.
+        declared: name in modelDescription.xml, if another: an array's for its elements, the variable's for
+            aliases (FMI 3).
     """
 
     reference: int
@@ -22,3 +24,4 @@ class Slot:
     size: int = 1
     negated: bool = False
     refusal: str = ""
+    declared: str = ""

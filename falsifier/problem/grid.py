@@ -18,6 +18,8 @@ _MAX_INTERVALS = 100_000
 # Largest denominator of times like 1/30 s, which are written with many digits.
 _MAX_DENOMINATOR = 100_000
 _ROUNDING = 1e-12
+# Intervals with this many digits or more are no rounder than others.
+_MANY_DIGITS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +116,18 @@ def _common(*times: Fraction) -> Fraction:
 
 
 def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
-    """Return the number of intervals in the common time: as few as are no longer than wanted."""
+    """Return the number of intervals in the common time: few that are no longer than wanted, and round."""
     count = max(1, ceil(common / wanted))
     if step_size is None or common % step_size:
-        return count
+        # Thirds of a second have no end in decimals, however many digits are looked at.
+        return min(range(count, 2 * count + 1), key=lambda n: (min(_digits(common / n), _MANY_DIGITS), n))
     steps = int(common / step_size)
     return next(n for n in range(min(count, steps), steps + 1) if not steps % n)
+
+
+def _digits(seconds: Fraction) -> int:
+    """Return the number of significant digits with which a time is written."""
+    return len(f"{float(seconds):.15g}".partition("e")[0].replace(".", "").strip("0"))
 
 
 def _reason(interval: Fraction, stop: Fraction, named: list[Fraction], fmu_step: float | None) -> str:
