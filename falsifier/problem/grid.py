@@ -118,6 +118,8 @@ def _common(*times: Fraction) -> Fraction:
 def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
     """Return the number of intervals in the common time: few that are no longer than wanted, and round."""
     count = max(1, ceil(common / wanted))
+    if common == count * wanted:
+        return count
     if step_size is None or common % step_size:
         # Thirds of a second have no end in decimals, however many digits are looked at.
         return min(range(count, 2 * count + 1), key=lambda n: (min(_digits(common / n), _MANY_DIGITS), n))

@@ -15,6 +15,7 @@ from tests.fmu.fixtures import path as fmu_path
         (3.0, [1.0], None, 0.002),  # not 0.003 s, of which 1 s is no multiple
         (50.0, [20.0], 0.01, 0.01),
         (10.0, [0.25], 0.1, 0.05),
+        (10.0, [2.0], 0.0125, 0.0125),
         (1.0, [1 / 3], None, 1 / 1002),
         (0.7, [], 0.2, 0.1),
         (100.0, [200.0], None, 0.1),  # a time after the end is an error of the formula, not of the grid
