@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -256,3 +257,51 @@ def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) 
     assert done.code == 3
     assert "scheduled execution is not supported" in done.err
     assert not (tmp_path / "Scheduled_3.toml").exists()
+
+
+def fixture(name: str) -> str:
+    return str(ROOT / "tests" / "fixtures" / "fmus" / f"{name}.fmu")
+
+
+def test_an_input_of_the_formula_need_not_be_searched(tmp_path: Path) -> None:
+    arguments = (
+        "--stl",
+        "G[0,20] (brake > 10 or speed <= 120)",
+        "--input",
+        "throttle=0:100:7",
+        "--budget",
+        "9",
+    )
+    done = falsifier("run", str(bundled("fmus") / "AT.fmu"), *arguments, "--quiet", cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert "falsified after" in done.out
+
+
+def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:
+    arguments = (
+        "--stl",
+        "G[0,10] (y <= 100)",
+        "--input",
+        "u=4.9:10:1",
+        "--budget",
+        "8",
+        "--engine",
+        "uniform",
+    )
+    done = falsifier("run", fixture("Silent_2"), *arguments, "--fmu-log", "logs/fmu.txt", cwd=tmp_path)
+    assert done.code == 3, done.out
+    assert re.search(r"stl: failed after 8 simulations, \d of them failed", done.out)
+    assert re.search(r"warning: \d of \d simulations have failed", done.err)
+    log = (tmp_path / "logs" / "fmu.txt").read_text()
+    assert log.count("simulation ") == 8
+    assert "  error: the solver did not converge: the valve is open too far" in log
+
+
+def test_an_fmu_without_outputs_can_be_checked_and_searched(tmp_path: Path) -> None:
+    checked = falsifier("info", fixture("NoOutputs_2dymola"), "--check", cwd=tmp_path)
+    assert checked.code == 0, checked.err
+    assert "the FMU declares no outputs; these are its states or other computed variables" in checked.out
+    assert "x changes by at most" in checked.out
+    assert falsifier("init", fixture("NoOutputs_2dymola"), "--out", "my.toml", cwd=tmp_path).code == 0
+    done = falsifier("run", "my.toml", "--stl", "G[0,10] (y <= 5)", "--budget", "5", "--quiet", cwd=tmp_path)
+    assert done.code == 1, done.err
