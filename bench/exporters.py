@@ -60,8 +60,6 @@ EXPORTERS = (
     Habit("StrictEnd_3", "20-sim", "the same in FMI 3", "G[0,1] (y <= 2)"),
     Habit("Corrupts_2", "Dymola 2022x", "the third reset corrupts its memory"),
     Habit("Hangs_2", "in-house tools", "a reset does not return"),
-    Habit("KeepsStatic_2", "in-house tools", "static data survive instances", "G[0,1] (y <= 5)",
-          {"stop_time": 1.0, "output_interval": 0.1}),
     Habit("Silent_2", "Dymola, Simulink", "silent unless logging is on; the solver fails for u > 5",
           "G[0,10] (y <= 2)"),
     Habit("NeedsTool_2", "tool couplings", "needs the exporting tool"),

@@ -93,7 +93,7 @@ class FmuModel:
         """Return the names of the elements of an array in order; of a scalar, its own."""
         slots = self._description.slots
         # Reversed, so that the first names win: aliases come after the variable that they stand for.
-        names = {s.offset: n for n, s in reversed(slots.items()) if (s.declared or n) == declared}
+        names = {s.offset: n for n, s in reversed(list(slots.items())) if (s.declared or n) == declared}
         return tuple(names[offset] for offset in sorted(names))
 
     def load(self) -> None:

@@ -56,6 +56,8 @@ def choose_grid(
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
     common = _common(stop, *named)
+    if fmu_step and fmu_step > stop_time:
+        fmu_step = None
     wanted = exact(fmu_step) if fmu_step else stop / _DEFAULT_INTERVALS
     count = _count(common, wanted, exact(step_size) if step_size else None)
     interval = common / count

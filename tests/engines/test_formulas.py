@@ -11,23 +11,23 @@ from falsifier.engines.registry import ENGINES
 from falsifier.engines.surrogate import Settings
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
-from falsifier.testing import lag_problem
-from tests.engines.test_contract import HASTY
+from falsifier.testing import FREE, lag_problem
+from tests.engines.support import HASTY
 
 FORMULAS = (
-    "G[0,10] (y <= 3 or u1 >= 1)",
-    "F[0,10] (brake > 10 or y <= 100)",
-    "G[0,10] (u0 + brake <= 30)",
-    "G[0,10] (u0 <= 30)",
+    "G[0,10] (x <= 3 or v >= 1)",
+    "F[0,10] (brake > 10 or x <= 100)",
+    "G[0,10] (u + brake <= 30)",
+    "G[0,10] (u <= 30)",
     "G[0,10] (brake <= 30)",
-    "G[0,10] ((u1 <= 1) -> F[0,0] (locked or mode >= 0))",
-    "(locked) U[0,5] (y >= 1)",
+    "G[0,10] ((v <= 1) -> F[0,0] (locked or w >= 0))",
+    "(locked) U[0,5] (x >= 1)",
 )
 
 
 def partly_searched(formula: str) -> Problem:
-    """u0 is searched; u1 is kept at 2, brake and locked at their start values."""
-    problem = lag_problem(formula, inputs=2, parameters=0, free=True)
+    """u is searched; v and w are kept constant, brake and locked at their start values."""
+    problem = lag_problem(formula, inputs=3, free=FREE)
     assert isinstance(problem.model, FunctionModel)
     held = (
         Variable("brake", causality="input", start=20.0),
@@ -38,7 +38,7 @@ def partly_searched(formula: str) -> Problem:
         problem,
         model=replace(problem.model, info=info),
         space=replace(problem.space, inputs=problem.space.inputs[:1]),
-        parameters={"u1": 2.0},
+        parameters={"v": 2.0, "w": 0.5},
     )
 
 
@@ -60,7 +60,7 @@ NAMES = [name for name in ENGINES if name not in ("hybrid", "botorch")]
 def test_signals_that_are_not_searched_are_no_obstacle(name: str, formula: str) -> None:
     problem = partly_searched(formula)
     problems = [problem]
-    if not {"y", "mode"} & set(problem.requirement.formula.signals):
+    if not {"x"} & set(problem.requirement.formula.signals):
         problems.append(without_outputs(problem))
     for each in problems:
         engine = make(name, each)

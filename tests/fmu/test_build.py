@@ -69,7 +69,7 @@ def simulates_like_the_fixture(built: Path, fixture: str) -> bool:
     signals = {"u": ramp(1.0)}
     runs = [run(m, ("y",), signals=signals)["y"].tolist() for m in (model, known)]
     model.close()
-    return runs[0] == runs[1]
+    return bool(runs[0] == runs[1])
 
 
 @needs_compiler

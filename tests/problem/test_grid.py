@@ -18,6 +18,9 @@ from tests.fmu.fixtures import path as fmu_path
         (10.0, [2.0], 0.0125, 0.0125),
         (1.0, [1 / 3], None, 1 / 1002),
         (0.7, [], 0.2, 0.1),
+        (15.0, [], 1 / 30, 1 / 30),  # divides it but for rounding
+        (10.0, [], 20.0, 0.01),  # longer than the simulation
+        (50.0, [], 0.0, 0.05),
         (100.0, [200.0], None, 0.1),  # a time after the end is an error of the formula, not of the grid
     ],
 )

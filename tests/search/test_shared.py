@@ -13,8 +13,9 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
+from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, junit_report, markdown_report
-from tests.problems import hard, impossible, lag_problem
+from tests.problems import hard, impossible
 
 PROBLEMS = (impossible(), hard(), lag_problem("G[0,10] (x <= 0.8)", name="HARDER"))
 BUDGET = 24

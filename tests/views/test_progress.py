@@ -4,9 +4,10 @@ from typing import Any
 import pytest
 
 from falsifier import falsify
+from falsifier.testing import lag_problem
 from falsifier.views.progress import make_display, progress
 from falsifier.views.text import result_json, result_text
-from tests.problems import broken, hard, impossible, lag_problem, mostly_broken
+from tests.problems import broken, hard, impossible, mostly_broken
 
 
 class Shown:
@@ -51,7 +52,7 @@ def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) 
 
 
 def test_a_warning_comes_once_when_most_simulations_have_failed(capsys: pytest.CaptureFixture[str]) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)", function=mostly_broken)
+    problem = lag_problem("G[0,10] (x <= 2)", response=mostly_broken)
     with make_display() as display:
         result = falsify(problem, "uniform", budget=20, seed=1, listeners=[display])
     warnings = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
@@ -64,6 +65,6 @@ def test_a_warning_comes_once_when_most_simulations_have_failed(capsys: pytest.C
 def test_a_few_failures_bring_no_warning(capsys: pytest.CaptureFixture[str]) -> None:
     with make_display() as display:
         falsify(
-            lag_problem("G[0,10] (x <= 2)", function=broken), "uniform", budget=2, seed=1, listeners=[display]
+            lag_problem("G[0,10] (x <= 2)", response=broken), "uniform", budget=2, seed=1, listeners=[display]
         )
     assert "warning" not in capsys.readouterr().err

@@ -57,7 +57,8 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
 def start_values(problem: Problem, candidate: Candidate) -> dict[str, float | str]:
     """Parameters, strings and start values that differ from the model's own, by name."""
     inputs = {v.name for v in problem.info.inputs}
-    settings = {**problem.parameters, **candidate.parameters, **dict(problem.experiment.strings)}
+    settings: dict[str, float | str] = {**problem.parameters, **candidate.parameters}
+    settings |= dict(problem.experiment.strings)
     return {name: value for name, value in settings.items() if name not in inputs}
 
 

@@ -50,10 +50,10 @@ class TrustRegion:
         risk = risk or _no_risk
         self._asked += 1
         if self._asked <= self._settings.region_start or len(self._points) < 2:
-            points = [self._first(rng)]
-            while risk(points[-1][None])[0] > 0.5 and len(points) <= self._settings.retries:
-                points.append(self._first(rng))
-            return points[int(np.argmin(risk(np.array(points))))]
+            drawn = [self._first(rng)]
+            while risk(drawn[-1][None])[0] > 0.5 and len(drawn) <= self._settings.retries:
+                drawn.append(self._first(rng))
+            return drawn[int(np.argmin(risk(np.array(drawn))))]
         points, costs = self._recent()
         process = fit_lengths(points, standardised(costs), self._lengths, rng, noise=_NOISE)
         self._lengths = process.lengths

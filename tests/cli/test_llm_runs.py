@@ -7,23 +7,9 @@ import pytest
 
 from falsifier.search.journal import read_journal
 from falsifier.search.records import ExchangeRecord
+from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
 from tests.llm.server import Step, serving
-
-BRAKE_LATE = [100.0, 100.0, 100.0, 0.0, 0.0, 0.0, 0.0]
-FULL = [100.0] * 7
-ENV = {"OPENAI_API_KEY": "sk-test-not-a-key", "XDG_CACHE_HOME": "cache"}
-
-
-def reply(
-    throttle: list[float], brake: tuple[float, ...] = (0.0, 0.0, 0.0), rationale: str = "because"
-) -> Step:
-    signals = [{"name": "throttle", "values": throttle}, {"name": "brake", "values": list(brake)}]
-    return Step(json.dumps({"rationale": rationale, "signals": signals}))
-
-
-def at1(server: str, *more: str) -> list[str]:
-    return ["run", "AT1", "--llm", "openai/gpt-5-mini", "--variant", "MP4", "--api-base", server, *more]
 
 
 def test_two_replies_falsify_at1(tmp_path: Path) -> None:
@@ -105,38 +91,3 @@ def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> No
     assert done.code == 2
     assert "set OPENAI_API_KEY" in done.err
     assert not (tmp_path / "runs").exists()
-
-
-def test_the_printed_prompt_is_what_is_sent(tmp_path: Path) -> None:
-    printed = falsifier("prompt", "AT1", "--variant", "MP4", "--json", cwd=tmp_path)
-    with serving(reply(FULL)) as server:
-        falsifier(*at1(server.url), cwd=tmp_path, env=ENV)
-        sent = server.received[0].body["messages"]
-    assert json.loads(printed.out) == sent
-
-
-def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
-    with serving(reply(BRAKE_LATE), reply(FULL)) as server:
-        falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
-        sent = server.received[1].body["messages"]
-    printed = falsifier(
-        *("prompt", "AT1", "--variant", "MP4", "--run", "run", "--samples", "1", "--json"), cwd=tmp_path
-    )
-    assert json.loads(printed.out) == sent
-
-
-def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
-    first = falsifier("prompt", "AT1", "--engine", "hybrid", cwd=tmp_path)
-    assert "Propose the first 2 different samples" in first.out
-    assert "--- tool" not in first.out
-    falsifier("run", "AT1", "--engine", "corners", "--out", "run", cwd=tmp_path)
-    later = ("prompt", "AT1", "--engine", "hybrid", "--run", "run", "--anonymous")
-    text = falsifier(*later, cwd=tmp_path).out
-    assert "Propose the next 5 different samples" in text
-    assert "--- tool predict, offered while" in text and "At most 3 calls" in text
-    shown = falsifier(*later, "--json", cwd=tmp_path).json
-    assert [m["role"] for m in shown["messages"]] == ["system", "user"]
-    (tool,) = shown["tools"]
-    item = tool["parameters"]["properties"]["candidates"]["items"]
-    assert item["properties"]["signals"]["items"]["properties"]["name"]["enum"] == ["u1", "u2"]
-    assert "throttle" not in text

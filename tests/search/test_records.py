@@ -27,7 +27,9 @@ def test_every_line_of_every_journal_keeps_to_the_schema(campaign: Path) -> None
 
 
 def test_manifests_and_campaigns_keep_to_the_schema(campaign: Path) -> None:
-    for path in campaign.rglob("manifest.json"):
+    manifests = sorted(campaign.rglob("manifest.json"))
+    assert len(manifests) == 8
+    for path in manifests:
         jsonschema.validate(json.loads(path.read_text()), schema("manifest"))
     jsonschema.validate(json.loads((campaign / "campaign.json").read_text()), schema("campaign"))
 

@@ -1,12 +1,13 @@
 """A campaign on a local Dask cluster of two workers."""
 
+import logging
 from pathlib import Path
 
 import pytest
 
 from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SpecError
-from falsifier.evaluation.workers import open_workers
+from falsifier.evaluation.workers import local_executor, open_workers
 from tests.campaigns.support import outcomes, request, work_in_threads
 
 
@@ -34,3 +35,20 @@ def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPat
         open_workers(1, "dask:tcp://127.0.0.1:9"),
     ):
         pass
+
+
+def level() -> int:
+    """Level of the logger that says it, in the process that is asked."""
+    return logging.getLogger("falsifier.fmu").level
+
+
+def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
+    logger = logging.getLogger("falsifier.fmu")
+    before = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        with local_executor(2) as executor:
+            assert executor is not None
+            assert executor.submit(level).result() == logging.ERROR
+    finally:
+        logger.setLevel(before)
