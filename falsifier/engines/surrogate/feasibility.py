@@ -48,6 +48,13 @@ class Feasibility:
             self._weights = _fitted(np.array(self._features), np.array(self._failed, dtype=np.float64))
         return _logistic(self._summary(layout, points) @ self._weights + _PRIOR)
 
+    def excess(self, layout: Layout, points: Array) -> Array:
+        """Return how far the risk is above an even chance, from 0 to 1, shape (m,).
+
+        Below that, only what is promising counts: violations are often close to where simulations fail.
+        """
+        return np.asarray(np.maximum(2.0 * self.risk(layout, points) - 1.0, 0.0))
+
     def _summary(self, layout: Layout, points: Array) -> Array:
         """Return the features of points, from -1 to 1, with a constant, shape (m, 5 groups + 1)."""
         inputs = 2.0 * layout.inputs(points, self.grid) - 1.0

@@ -152,7 +152,7 @@ class Surrogate:
         rng = np.random.default_rng([self.seed, self._asked])
         pending = self._propose(rng)
         for _ in range(self.settings.retries):
-            if self._risk(pending) <= 0.5:
+            if self._risk(pending) == 0.0:
                 break
             pending = min(pending, self._propose(rng), key=self._risk)
         self._asked += 1
@@ -161,10 +161,10 @@ class Surrogate:
         return candidate
 
     def _risk(self, pending: Pending) -> float:
-        """Return the probability that its simulation fails; plans and trust regions have considered it."""
+        """Return the excess risk that its simulation fails; plans and trust regions have considered it."""
         if pending.region is not None or pending.forecast is not None:
             return 0.0
-        return float(self.feasibility.risk(pending.layout, pending.point[None])[0])
+        return float(self.feasibility.excess(pending.layout, pending.point[None])[0])
 
     def _propose(self, rng: np.random.Generator) -> Pending:
         kind = self._opening[self._asked] if self._asked < len(self._opening) else ""
@@ -239,7 +239,7 @@ class Surrogate:
         if not self.feasibility.has_failures:
             return predict
         weight = self.settings.risk_weight
-        return lambda points: predict(points) + weight * self.feasibility.risk(self.layout, points)
+        return lambda points: predict(points) + weight * self.feasibility.excess(self.layout, points)
 
     def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
         """Fit the dynamics; return the indices of the samples, those with the lowest robustness first."""
@@ -255,6 +255,6 @@ class Surrogate:
             self._regions += 1
             self._region = TrustRegion(layout.dimension, self.settings)
         layout = self._region_layouts[(self._regions - 1) % len(self._region_layouts)]
-        point = self._region.ask(rng, partial(self.feasibility.risk, layout))
+        point = self._region.ask(rng, partial(self.feasibility.excess, layout))
         why = f"direct search in a trust region of {layout.dimension} coordinates"
         return Pending("region", layout, point, why, region=self._region)

@@ -44,14 +44,13 @@ class TrustRegion:
 
         Args:
             rng: random generator.
-            risk: returns the probabilities that the simulations of points fail, shape (m,);
-                None: none fails.
+            risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,); None: none fails.
         """
         risk = risk or _no_risk
         self._asked += 1
         if self._asked <= self._settings.region_start or len(self._points) < 2:
             drawn = [self._first(rng)]
-            while risk(drawn[-1][None])[0] > 0.5 and len(drawn) <= self._settings.retries:
+            while risk(drawn[-1][None])[0] > 0.0 and len(drawn) <= self._settings.retries:
                 drawn.append(self._first(rng))
             return drawn[int(np.argmin(risk(np.array(drawn))))]
         points, costs = self._recent()

@@ -1,4 +1,5 @@
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -6,10 +7,10 @@ from falsifier.engines.box import Array
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.layout import planning_layout
-from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.surrogate import Surrogate
 from falsifier.search.run import falsify
 from falsifier.testing import lag, lag_problem
+from tests.engines.support import HASTY
 
 
 def diverges(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
@@ -50,7 +51,14 @@ def test_one_failure_makes_its_surroundings_riskier_than_the_rest() -> None:
 def test_the_engine_avoids_regions_in_which_simulations_fail() -> None:
     problem = lag_problem("G[0,10] (x <= 2)", response=diverges, points=1)
     failures = {}
-    for label, settings in {"learns": Settings(), "does not": Settings(retries=0, risk_weight=0.0)}.items():
+    for label, settings in {"learns": HASTY, "does not": replace(HASTY, retries=0, risk_weight=0.0)}.items():
         runs = [falsify(problem, Surrogate(problem, seed=s, settings=settings), budget=15) for s in range(3)]
         failures[label] = sum(run.spent.failures for run in runs)
     assert failures["learns"] < 0.7 * failures["does not"], failures
+
+
+def test_a_violation_next_to_failures_is_found() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.3)", response=diverges, points=3)
+    for seed in range(3):
+        result = falsify(problem, Surrogate(problem, seed=seed), budget=40)
+        assert result.falsified, result.reason
