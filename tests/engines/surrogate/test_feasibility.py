@@ -3,13 +3,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from falsifier.engines.box import Array
+from falsifier.engines import box
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.layout import planning_layout
 from falsifier.engines.surrogate.surrogate import Surrogate
 from falsifier.search.run import falsify
-from falsifier.testing import lag, lag_problem
+from falsifier.testing import Array, lag, lag_problem
 from tests.engines.support import HASTY
 
 
@@ -20,7 +20,7 @@ def diverges(times: Array, inputs: dict[str, Array], parameters: dict[str, float
     return lag(times, inputs, parameters)
 
 
-def learned(points: Array, failed: Sequence[bool]) -> tuple[Feasibility, Array]:
+def learned(points: box.Array, failed: Sequence[bool]) -> tuple[Feasibility, box.Array]:
     problem = lag_problem(points=1)
     grid = Grid.over(10.0, 10.0, cells=10, shortest=0.1)
     layout = planning_layout(problem.space, grid)
