@@ -204,7 +204,11 @@ class Surrogate:
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
+        gaps = [c.times[1] - c.times[0] for c in self.layout.codings if len(c.times) > 1]
         why = f"inputs switch between their bounds every {dwell:.3g} s, a fraction of an inner window"
+        if not gaps or min(gaps) > dwell:
+            apart = f", {min(gaps):.3g} s apart" if gaps else ""
+            why = f"inputs take a random bound at each control point{apart}"
         return Pending("switching", self.layout, switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
