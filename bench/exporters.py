@@ -124,7 +124,7 @@ def _walk(habit: Habit, folder: Path) -> dict[str, str]:
         cells[name] = _replayed(problem, evaluation.trajectory, folder / "export")
         problem.model.close()
     except FalsifierError as error:
-        cells[name] = " ".join(str(error).split()).replace("|", "/")
+        cells[name] = " ".join(str(error).split()).replace("|", "/").replace(f"{FMUS}/", "")
     return cells
 
 

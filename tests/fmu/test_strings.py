@@ -7,7 +7,7 @@ from tests.fmu import fixtures
 
 
 def simulate(name: str, *strings: tuple[str, str]) -> None:
-    model = FmuModel(fixtures.path(name), isolate=False)
+    model = FmuModel(fixtures.path(name))
     try:
         model.simulate({}, {}, Experiment(1.0, 0.1, ("y",), strings=strings))
     finally:
