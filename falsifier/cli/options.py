@@ -78,7 +78,7 @@ def problem_options(command: Function) -> Function:
             "parameters",
             multiple=True,
             metavar="NAME=VALUE",
-            help="Parameter or start value to set. NAME=LOW:HIGH: search it. Repeatable.",
+            help="Parameter, start value or string to set. NAME=LOW:HIGH: search it. Repeatable.",
         ),
         click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
         click.option(
@@ -87,12 +87,18 @@ def problem_options(command: Function) -> Function:
             metavar="SECONDS",
             help="Step of the output grid on which the requirement is monitored.",
         ),
+        click.option(
+            "--time-limit",
+            type=float,
+            metavar="SECONDS",
+            help="Maximum wall-clock time of one simulation; default: the spec's, or 60.",
+        ),
     )
 
 
 def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the values of problem_options out of a command's keyword arguments."""
-    varied = ("inputs", "parameters", "stop_time", "output_interval", "interface")
+    varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
     stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization")}
     return ProblemSource(**stated, changes=changes)

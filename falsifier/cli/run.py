@@ -35,6 +35,7 @@ from falsifier.search.budget import Budget
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
 from falsifier.search.run import resume as resume_run
+from falsifier.views.fmu_log import FmuLog
 from falsifier.views.progress import make_display
 from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 
@@ -53,6 +54,12 @@ _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified":
 @click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
 @quiet_option
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
+@click.option(
+    "--fmu-log",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Ask the FMU for messages in every simulation, and write them to this file.",
+)
 @json_option
 def run(
     *,
@@ -66,6 +73,7 @@ def run(
     together: bool,
     quiet: bool,
     out: Path | None,
+    fmu_log: Path | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -77,6 +85,10 @@ def run(
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     source, llm = problem_source(options), llm_settings(options)
+    logs = [FmuLog(fmu_log)] if fmu_log else []
+    if fmu_log:
+        changes = source.changes.model_copy(update={"logging": True})
+        source = source.model_copy(update={"changes": changes})
     sources = _all_of(source) if together else (source,)
     with make_display(quiet=quiet) as display:
         results = falsify(
@@ -87,7 +99,7 @@ def run(
             budget=Budget(budget, seconds, max_tokens, max_cost),
             jobs=jobs,
             directory=out or _new_directory(source.target),
-            listeners=[display],
+            listeners=[display, *logs],
         )
     _finish(results, as_json=as_json)
 

@@ -44,6 +44,8 @@ class Variable:
         literals: numbers of an enumeration's items by name.
         description: its meaning, from the model.
         type: name of its data type, such as ``Int8``; empty if unknown.
+        alias_of: the name to use instead, if the model has one variable for both; such a name can be read.
+        is_clocked: whether it belongs to clocks that never tick, so that it keeps its start value.
     """
 
     name: str
@@ -61,6 +63,13 @@ class Variable:
     literals: Mapping[str, int] = field(default_factory=dict)
     description: str = ""
     type: str = ""
+    alias_of: str = ""
+    is_clocked: bool = False
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether both ends of its range are known."""
+        return None not in self.limits
 
     @property
     def type_limits(self) -> tuple[int, int] | None:
@@ -87,11 +96,12 @@ class ModelInfo:
         interfaces: how it can be simulated.
         platforms: names of the platforms for which it contains binaries.
         tool: the tool that generated it.
+        start_time: start time of its default experiment in s, if given; simulations start at 0.
         stop_time: stop time of its default experiment in s, if given.
         step_size: step size of its default experiment in s, if given.
         tolerance: relative tolerance of its default experiment, if given.
         variables: all scalar variables.
-        clocks: names of the clocks that the importing tool would have to tick (FMI 3).
+        notes: what the user should know: what is ignored, unusual or needed, one sentence each.
     """
 
     name: str
@@ -100,11 +110,12 @@ class ModelInfo:
     interfaces: tuple[Interface, ...] = ()
     platforms: tuple[str, ...] = ()
     tool: str = ""
+    start_time: float | None = None
     stop_time: float | None = None
     step_size: float | None = None
     tolerance: float | None = None
     variables: tuple[Variable, ...] = ()
-    clocks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Variable:
         for variable in self.variables:
@@ -116,13 +127,13 @@ class ModelInfo:
         return any(v.name == name for v in self.variables)
 
     def with_causality(self, causality: Causality) -> tuple[Variable, ...]:
-        """Return the variables with this causality, in the model's order."""
-        return tuple(v for v in self.variables if v.causality == causality)
+        """Return the variables with this causality, in the model's order, except those of ignored clocks."""
+        return tuple(v for v in self.variables if v.causality == causality and not v.is_clocked)
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
-        """Input variables in the model's order."""
-        return self.with_causality("input")
+        """Input variables in the model's order; of several names for one input, the first."""
+        return tuple(v for v in self.with_causality("input") if not v.alias_of)
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
@@ -130,9 +141,16 @@ class ModelInfo:
         return self.with_causality("output")
 
     @property
+    def observables(self) -> tuple[Variable, ...]:
+        """Variables to write requirements about: the outputs; without any, the states or the locals."""
+        states = tuple(v for v in self.variables if v.is_state)
+        computed = (v for v in self.with_causality("local") if v.variability in ("continuous", "discrete"))
+        return self.outputs or states or tuple(computed)
+
+    @property
     def parameters(self) -> tuple[Variable, ...]:
-        """Parameters in the model's order."""
-        return self.with_causality("parameter")
+        """Parameters in the model's order; of several names for one parameter, the first."""
+        return tuple(v for v in self.with_causality("parameter") if not v.alias_of)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +165,7 @@ class Experiment:
             output interval.
         tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
         time_limit: maximum wall-clock time of one simulation in s.
+        strings: names and values of string parameters.
     """
 
     stop_time: float
@@ -155,6 +174,7 @@ class Experiment:
     step_size: float | None = None
     tolerance: float | None = None
     time_limit: float = 60.0
+    strings: tuple[tuple[str, str], ...] = ()
 
     @property
     def samples(self) -> int:

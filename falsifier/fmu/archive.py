@@ -151,7 +151,8 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
             f"{path}: rejected because it would unpack to {total / 2**30:.1f} GiB; at most "
             f"{_MAX_BYTES >> 30} GiB are allowed"
         )
-    for name, count in Counter(entry.filename for entry in entries).items():
+    # Some tools list folders several times, which does no harm.
+    for name, count in Counter(entry.filename for entry in entries if not entry.is_dir()).items():
         if count > 1:
             raise ModelError(f"{path}: rejected because it contains {name!r} {count} times")
     for entry in entries:

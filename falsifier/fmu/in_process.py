@@ -27,7 +27,9 @@ class LocalFmu:
         folder = self._folder.path
         try:
             archive.extract(order.path, folder)
-            self._session = Session(order.description, folder, order.interface, self._say)
+            self._session = Session(
+                order.description, folder, order.interface, self._say, logging=order.logging
+            )
         except BaseException:
             self._folder.remove()
             raise
@@ -68,25 +70,25 @@ class LocalFmu:
         self._log.append(printable(line))
 
 
-_FMUS: dict[tuple[str, str], LocalFmu] = {}
+_FMUS: dict[tuple[str, str, bool], LocalFmu] = {}
 
 
 def fmu(order: Order) -> LocalFmu:
     """Return the FMU as loaded in this process; load it if necessary."""
-    key = (order.sha256, order.interface)
+    key = (order.sha256, order.interface, order.logging)
     if key not in _FMUS:
         _FMUS[key] = LocalFmu(order)
     return _FMUS[key]
 
 
-def drop(sha256: str, interface: str) -> None:
+def drop(sha256: str, interface: str, *, logging: bool = False) -> None:
     """Unload an FMU, if it is loaded."""
-    found = _FMUS.pop((sha256, interface), None)
+    found = _FMUS.pop((sha256, interface, logging), None)
     if found is not None:
         found.close()
 
 
 @atexit.register
 def _close_all() -> None:
-    for key in list(_FMUS):
-        drop(*key)
+    for sha256, interface, logging in list(_FMUS):
+        drop(sha256, interface, logging=logging)

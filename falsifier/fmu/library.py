@@ -39,19 +39,28 @@ class Library:
         folder: folder to which the FMU was extracted.
         interface: interface to instantiate.
         log: called with each of the FMU's messages.
+        logging: whether to ask the FMU for messages.
 
     Raises:
         ModelError: if the library is missing, cannot be loaded or cannot be instantiated.
     """
 
-    def __init__(self, description: Description, folder: Path, interface: Interface, log: LogSink) -> None:
+    def __init__(
+        self,
+        description: Description,
+        folder: Path,
+        interface: Interface,
+        log: LogSink,
+        *,
+        logging: bool = False,
+    ) -> None:
         self.description = description
         self.interface = interface
-        self._log = log
+        self._log, self._logging = log, logging
         self._prefix = f"fmi{description.major}"
-        self._check_binary(folder)
+        binary = self._binary(folder)
         try:
-            self._fmu = self._load(folder)
+            self._fmu = self._load(folder, binary)
         except Exception as error:
             raise ModelError(f"{description.info.name}: the library cannot be loaded: {error}") from error
         self._instantiate()
@@ -108,24 +117,35 @@ class Library:
             return f"{self.description.identifiers[self.interface]}_fmi{name}"
         return self._prefix + name
 
-    def _check_binary(self, folder: Path) -> None:
+    def _binary(self, folder: Path) -> Path:
+        """Return the path of the library.
+
+        Raises:
+            ModelError: if there is none for this platform, or several with other names than expected.
+        """
         info = self.description.info
-        identifier = self.description.identifiers[self.interface]
-        file = archive.library_file(info.fmi_version, identifier)
-        if (folder / file).is_file():
-            return
-        has_sources = any((folder / "sources").glob("*.c"))
+        found = self.description.libraries.get(self.interface)
+        if found is not None:
+            return folder / found
+        expected = archive.library_file(info.fmi_version, self.description.identifiers[self.interface])
+        others = sorted(p.name for p in (folder / expected.parent).glob(f"*{expected.suffix}"))
+        if others:
+            raise ModelError(
+                f"{info.name}: {expected} is missing; the folder contains {', '.join(others)} instead, and "
+                "the model identifier tells which one to load: export the FMU again"
+            )
+        has_sources = any((folder / "sources").rglob("*.c"))
         cure = (
             "it contains C sources: compile them with `falsifier build`"
             if has_sources
             else "export it again for this platform"
         )
         raise ModelError(
-            f"{info.name}: no binary for {archive.this_platform()} ({file} is missing), "
+            f"{info.name}: no binary for {archive.this_platform()} ({expected} is missing), "
             f"only {', '.join(info.platforms) or 'no binaries at all'}; {cure}"
         )
 
-    def _load(self, folder: Path) -> Any:
+    def _load(self, folder: Path, binary: Path) -> Any:
         from fmpy import fmi1, fmi2, fmi3
 
         classes: dict[tuple[int, Interface], Any] = {
@@ -140,6 +160,7 @@ class Library:
             guid=self.description.token,
             modelIdentifier=self.description.identifiers[self.interface],
             unzipDirectory=str(folder),
+            libraryPath=str(binary),
             instanceName=self.description.info.name,
             requireFunctions=False,
         )
@@ -159,13 +180,15 @@ class Library:
             raise ModelError(f"{self.description.info.name}: instantiating the FMU failed")
 
     def _arguments(self) -> dict[str, Any]:
+        arguments: dict[str, Any] = {"loggingOn": self._logging}
         if self.description.major == 3:
-            arguments: dict[str, Any] = {"logMessage": self._log_3}
+            arguments["logMessage"] = self._log_3
             if self.interface == "co-simulation":
                 events = self.description.event_mode
                 arguments |= {"eventModeUsed": events, "earlyReturnAllowed": events}
             return arguments
-        return {"functions" if self.description.major == 1 else "callbacks": self._callbacks()}
+        arguments["functions" if self.description.major == 1 else "callbacks"] = self._callbacks()
+        return arguments
 
     def _callbacks(self) -> Any:
         """Return the callbacks of FMI 1 and 2; fmpy's proxy expands the printf-style messages."""

@@ -141,7 +141,7 @@ def _become_worker(
         posix.confine()
         with socket.socket(fileno=os.dup(connection)) as sock:
             os.close(connection)
-            worker.serve(sock, order.description, folder, order.interface, order.reuse)
+            worker.serve(sock, order, folder)
         code = 0
     except BaseException:
         traceback.print_exc()

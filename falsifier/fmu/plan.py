@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from falsifier.core.model import Experiment
-from falsifier.errors import ModelError, SpecError
+from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description import Description
 
 # Maximum relative distance of a ratio of two steps from an integer at which it counts as that integer.
@@ -26,6 +26,7 @@ class Plan:
         max_step: maximum step of the solver in s (model exchange).
         tolerance: relative tolerance; None for the model's default.
         time_limit: maximum wall-clock time of one simulation in s.
+        strings: names and values of string parameters.
     """
 
     inputs: tuple[str, ...]
@@ -38,6 +39,7 @@ class Plan:
     max_step: float
     tolerance: float | None
     time_limit: float
+    strings: tuple[tuple[str, str], ...] = ()
 
     @property
     def steps(self) -> int:
@@ -70,6 +72,7 @@ def make_plan(
         max_step=experiment.step_size or experiment.output_interval,
         tolerance=experiment.tolerance,
         time_limit=experiment.time_limit,
+        strings=experiment.strings,
     )
     model = description.info.name
     kinds = {v.name: v for v in description.info.variables}
@@ -87,7 +90,18 @@ def make_plan(
             raise ModelError(f"{model}: {name!r} cannot be set: {slot.refusal}")
     for name in plan.outputs:
         description.slot(name)
+    for name, _ in plan.strings:
+        _check_string(description, name)
     return plan
+
+
+def _check_string(description: Description, name: str) -> None:
+    model, slot = description.info.name, description.slots.get(name)
+    if slot is None:
+        raise ModelError(f"{model}: no variable {name!r}; {did_you_mean(name, description.slots)}")
+    if slot.refusal or slot.type != "String" or slot.size != 1:
+        reason = slot.refusal or "it is not a single string"
+        raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
 
 
 def _steps_per_output(experiment: Experiment) -> int:

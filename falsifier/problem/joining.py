@@ -1,6 +1,6 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,8 +8,9 @@ from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variab
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu import FmuModel, read_info
-from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
-from falsifier.problem.ranges import fixed_value, input_range, parameter_range
+from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
+from falsifier.problem.grid import Grid, choose_grid, formula_times
+from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
@@ -17,6 +18,8 @@ from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection,
 # 1/30 s, rounding prevents an exact multiple.
 _GRID_ROUNDING = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0
+# Maximum number of states or locals that are recorded if the FMU declares no outputs.
+_MAX_RECORDED = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,7 @@ class Joined:
     space: SearchSpace
     experiment: Experiment
     parameters: Mapping[str, float]
+    notes: tuple[str, ...]
 
 
 def join(
@@ -66,10 +70,18 @@ def join(
             f"no such FMU: {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
         )
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-    model = FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), file))
-    experiment = _experiment(spec, layers, model.info, file)
+    logging = [layer.logging for layer in layers if layer.logging is not None]
+    model = FmuModel(
+        fmu,
+        interface=_interface(spec, layers, read_info(fmu), file),
+        logging=logging[-1] if logging else spec.model.logging,
+    )
+    formulas = [r.formula for r in spec.requirements.values()] if stl is None else [stl]
+    experiment, grid = _experiment(spec, layers, model.info, formulas, file)
     inputs, parameters = _merged(spec, layers)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    strings = _strings(parameters, model.info, path.parent)
+    known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
     is_option = stl is not None or path.suffix == ".fmu"
     key = "--stl" if is_option else f"requirements.{requirement}.formula"
@@ -80,8 +92,15 @@ def join(
         model,
         Requirement(requirement if stl is None else "stl", formula, "" if stl else section.description),
         space,
-        _recording(experiment, model.info, [*spec.model.record, *formula.signals], file),
+        _recording(
+            replace(experiment, strings=strings),
+            model.info,
+            [*spec.model.record, *formula.signals],
+            known,
+            file,
+        ),
         fixed,
+        (*model.info.notes, *_notes(grid, model.info, known)),
     )
 
 
@@ -109,7 +128,6 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
                 "fmu": str(fmu.resolve()),
                 "interface": changes.interface or default_interface(info),
                 "stop_time": stop_time,
-                "output_interval": default_interval(info, stop_time),
             },
             "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
             "requirements": {"stl": {"formula": stl}},
@@ -117,11 +135,18 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
         file=str(fmu),
     )
     if not searched and not spec.inputs:
-        known = [v.name for v in info.inputs]
+        inputs = [v.name for v in info.inputs]
+        why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
-            f"{fmu}: nothing to search; add --input NAME=LOW:HIGH:POINTS. {did_you_mean('', known)}"
+            f"{fmu}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
+            f"{did_you_mean('', inputs)}"
         )
-    return join(spec, "stl", path=fmu, changes=changes)
+    joined = join(spec, "stl", path=fmu, changes=changes)
+    unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
+    if searched or not unbounded:
+        return joined
+    note = f"not searched, because the FMU specifies no min and max: {', '.join(unbounded)}"
+    return replace(joined, notes=(*joined.notes, note))
 
 
 def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
@@ -140,7 +165,11 @@ def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file
     return stated
 
 
-def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, file: str) -> Experiment:
+def _experiment(
+    spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, formulas: Iterable[str], file: str
+) -> tuple[Experiment, Grid | None]:
+    """Return the experiment without outputs, and its grid if nobody stated the interval."""
+
     def stated(key: str) -> float | None:
         value: float | None = getattr(spec.model, key)
         for layer in layers:
@@ -151,38 +180,63 @@ def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, fil
     stop_time = stated("stop_time") or info.stop_time
     if stop_time is None:
         raise SpecError("the FMU has no default stop time; add this key", file=file, key="model.stop_time")
-    output_interval = stated("output_interval") or info.step_size
+    output_interval, step_size = stated("output_interval"), stated("step_size")
+    grid = None
     if output_interval is None:
-        raise SpecError("the FMU has no default step; add this key", file=file, key="model.output_interval")
+        # All formulas of a spec, so that its requirements can share a search.
+        grid = _grid(stop_time, formula_times(formulas), info, step_size, file)
+        output_interval = grid.interval
     intervals = stop_time / output_interval
     if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
+        fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None, file)
         raise SpecError(
             f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "
-            f"try {stop_time / max(round(intervals), 1):.6g}",
+            f"try {fits.interval:.12g}",
             file=file,
             key="model.output_interval",
         )
-    return Experiment(
+    experiment = Experiment(
         stop_time=stop_time,
         output_interval=stop_time / round(intervals),
         outputs=(),
-        step_size=stated("step_size"),
+        step_size=step_size,
         tolerance=stated("tolerance"),
-        time_limit=spec.model.time_limit or _DEFAULT_TIME_LIMIT,
+        time_limit=stated("time_limit") or _DEFAULT_TIME_LIMIT,
     )
+    return experiment, grid
 
 
-def _recording(experiment: Experiment, info: ModelInfo, extra: Iterable[str], file: str) -> Experiment:
-    """Return the experiment that records all outputs and those extra variables that are not inputs."""
-    inputs = {v.name for v in info.inputs}
+def _grid(
+    stop_time: float, times: Iterable[float], info: ModelInfo, step_size: float | None, file: str
+) -> Grid:
+    try:
+        return choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
+    except SpecError as error:
+        raise SpecError(str(error), file=file) from None
+
+
+def _notes(grid: Grid | None, info: ModelInfo, known: Collection[str]) -> Iterator[str]:
+    if grid is not None:
+        yield f"time grid of {grid.interval:g} s: {grid.reason}"
+    unset = [v.name for v in info.inputs if v.name not in known]
+    if unset:
+        yield f"inputs without a start value, left to the FMU: {', '.join(unset)}"
+
+
+def _recording(
+    experiment: Experiment, info: ModelInfo, extra: Iterable[str], known: Collection[str], file: str
+) -> Experiment:
+    """Return the experiment that records all outputs and those extra variables whose values are unknown."""
     outputs = [v.name for v in info.outputs if v.kind != "string"]
+    if not outputs and len(info.observables) <= _MAX_RECORDED:
+        outputs = [v.name for v in info.observables if v.kind != "string"]
     for name in extra:
         if name not in info:
-            known = [v.name for v in info.variables]
+            names = [v.name for v in info.variables]
             raise SpecError(
-                f"unknown variable {name!r}; {did_you_mean(name, known)}", file=file, key="model.record"
+                f"unknown variable {name!r}; {did_you_mean(name, names)}", file=file, key="model.record"
             )
-        if name not in outputs and name not in inputs:
+        if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
     return replace(experiment, outputs=tuple(outputs))
 
@@ -210,6 +264,11 @@ def _space(
     fixed: dict[str, float] = {}
     for name, section in inputs.items():
         key = f"inputs.{name}"
+        if name in info and info[name].alias_of:
+            other = info[name].alias_of
+            raise SpecError(
+                f"the FMU has one input with two names: use {other!r} instead", file=file, key=key
+            )
         variable = _variable(name, info.inputs, "input", file, key)
         if section.value is not None:
             fixed[name] = fixed_value(variable, section.value, file=file, key=f"{key}.value")
@@ -221,10 +280,12 @@ def _space(
         settable = [v for v in info.variables if v.settable and v.causality != "input"]
         if name in info and not info[name].settable:
             v = info[name]
-            raise SpecError(
-                f"cannot be set: it is a {v.variability} {v.causality} of the FMU", file=file, key=key
-            )
+            reason = f"it is a {v.variability} {v.causality} of the FMU"
+            reason = f"it is another name of {v.alias_of!r}; use that one" if v.alias_of else reason
+            raise SpecError(f"cannot be set: {reason}", file=file, key=key)
         variable = _variable(name, settable, "parameter or start value", file, key)
+        if variable.kind == "string" and parameter.value is not None:
+            continue
         if parameter.range is not None:
             ranges.append(parameter_range(variable, parameter.range, file=file, key=f"{key}.range"))
         elif parameter.value is not None:
@@ -237,6 +298,17 @@ def _space(
             key="inputs",
         )
     return SearchSpace(tuple(searched), tuple(ranges), experiment.stop_time), fixed
+
+
+def _strings(
+    parameters: Mapping[str, ParameterSection], info: ModelInfo, folder: Path
+) -> tuple[tuple[str, str], ...]:
+    """Return the values of string parameters; files are named relative to the spec's folder."""
+    return tuple(
+        (name, fixed_text(section.value, folder))
+        for name, section in parameters.items()
+        if section.value is not None and info[name].kind == "string"
+    )
 
 
 def _variable(name: str, variables: Iterable[Variable], kind: str, file: str, key: str) -> Variable:

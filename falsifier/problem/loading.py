@@ -63,6 +63,7 @@ def load_problem(
     parameters: Mapping[str, ParameterChoice] | None = None,
     stop_time: float | None = None,
     output_interval: float | None = None,
+    time_limit: float | None = None,
     interface: Interface | None = None,
 ) -> Problem:
     """Load one problem.
@@ -77,6 +78,7 @@ def load_problem(
         parameters: overrides for the spec's parameters; see ParameterChoice.
         stop_time: end of each simulation in s.
         output_interval: step of the monitored time grid in s.
+        time_limit: maximum wall-clock time of one simulation in s.
         interface: interface with which the FMU is simulated.
 
     Raises:
@@ -88,6 +90,7 @@ def load_problem(
         parameters=parameters or {},
         stop_time=stop_time,
         output_interval=output_interval,
+        time_limit=time_limit,
         interface=interface,
     )
     return load_source(
@@ -181,7 +184,13 @@ def _of_spec(source: ProblemSource) -> Problem:
 
 def _made(joined: Joined, source: ProblemSource) -> Problem:
     return Problem(
-        joined.model, joined.requirement, joined.space, joined.experiment, joined.parameters, source
+        joined.model,
+        joined.requirement,
+        joined.space,
+        joined.experiment,
+        joined.parameters,
+        source,
+        joined.notes,
     )
 
 

@@ -1,6 +1,7 @@
 """Conversion of Python values and command-line options to the sections of a spec."""
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -21,8 +22,8 @@ InputChoice = (
     | InputSection
     | None
 )
-# A value, a range to search, or a complete section of a spec.
-ParameterChoice = float | tuple[float, float] | ParameterSection
+# A value, text for a string, a range to search, or a complete section of a spec.
+ParameterChoice = float | str | tuple[float, float] | ParameterSection
 
 
 def changes_from(
@@ -59,7 +60,8 @@ def changes_from_options(
         inputs: ``name=low:high``, ``name=low:high:points`` or ``name=low:high:points:interpolation``
             (searched), ``name`` (searched as in the spec, or between the FMU's min and max) or
             ``name=value`` (kept constant).
-        parameters: ``name=value`` (fixed) or ``name=low:high`` (searched).
+        parameters: ``name=value`` (fixed), ``name=low:high`` (searched) or ``name=text`` (a string; a file is
+            named relative to the current folder).
         experiment: fields of ModelChanges; None leaves a field unchanged.
 
     Raises:
@@ -76,9 +78,8 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     """
     options = [("--input", _input_option(name, section)) for name, section in changes.inputs.items()]
     for name, parameter in changes.parameters.items():
-        said = (parameter.value,) if parameter.range is None else parameter.range
-        options.append(("--param", f"{name}={':'.join(f'{v:.17g}' for v in said if v is not None)}"))
-    for field in ("interface", "stop_time", "output_interval"):
+        options.append(("--param", f"{name}={_parameter_option(parameter)}"))
+    for field in ("interface", "stop_time", "output_interval", "time_limit"):
         if (value := getattr(changes, field)) is not None:
             options.append((f"--{field.replace('_', '-')}", str(value)))
     return options
@@ -119,9 +120,11 @@ def _parameter_section(name: str, choice: ParameterChoice) -> object:
             return choice.model_dump(exclude_unset=True)
         case int() | float():
             return {"value": choice}
+        case str():
+            return {"value": named_file(choice, Path())}
         case (low, high):
             return {"range": (low, high)}
-    raise SpecError(f"parameters.{name}: expected a number or (low, high)")
+    raise SpecError(f"parameters.{name}: expected a number, text or (low, high)")
 
 
 def _input(option: str) -> tuple[str, dict[str, object]]:
@@ -151,11 +154,24 @@ def _input(option: str) -> tuple[str, dict[str, object]]:
 
 def _parameter(option: str) -> tuple[str, dict[str, object]]:
     name, parts = _split(option, "--param")
-    if len(parts) == 1:
-        return name, {"value": _number(parts[0], option)}
-    if len(parts) == 2:
-        return name, {"range": (_number(parts[0], option), _number(parts[1], option))}
+    numbers = [_as_number(part) for part in parts]
+    if None in numbers:
+        return name, {"value": named_file(":".join(parts), Path())}
+    if len(numbers) == 1:
+        return name, {"value": numbers[0]}
+    if len(numbers) == 2:
+        return name, {"range": (numbers[0], numbers[1])}
     raise SpecError(f"--param {option}: expected NAME=VALUE or NAME=LOW:HIGH")
+
+
+def named_file(text: str, folder: Path) -> str:
+    """Return the absolute path if the text names a file, or a folder with a slash; otherwise the text."""
+    path = folder / text
+    try:
+        is_path = path.is_file() or ("/" in text and path.is_dir())
+    except (OSError, ValueError):
+        return text
+    return str(path.absolute()) if text and is_path else text
 
 
 def _split(option: str, flag: str) -> tuple[str, list[str]]:
@@ -165,11 +181,24 @@ def _split(option: str, flag: str) -> tuple[str, list[str]]:
     return name.strip(), rest.strip().split(":")
 
 
+def _as_number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def _number(text: str, option: str) -> float:
     try:
         return float(text)
     except ValueError:
         raise SpecError(f"{option}: {text!r} is not a number") from None
+
+
+def _parameter_option(section: ParameterSection) -> str:
+    if section.range is not None:
+        return ":".join(f"{v:.17g}" for v in section.range)
+    return section.value if isinstance(section.value, str) else f"{section.value:.17g}"
 
 
 def _input_option(name: str, section: InputSection) -> str:

@@ -24,6 +24,7 @@ class Problem:
         experiment: how each simulation is run.
         parameters: fixed values of parameters, start values and constant inputs, by name.
         source: how it was loaded; None if it was made in Python, or changed after it was loaded.
+        notes: what was chosen or ignored when it was loaded and the user should know, in words.
     """
 
     model: Model
@@ -32,6 +33,7 @@ class Problem:
     experiment: Experiment
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: ProblemSource | None = None
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
     def from_fmu(
@@ -45,6 +47,7 @@ class Problem:
         output_interval: float | None = None,
         step_size: float | None = None,
         tolerance: float | None = None,
+        time_limit: float | None = None,
         interface: Interface | None = None,
     ) -> Self:
         """Return the problem for an FMU and a formula.
@@ -56,10 +59,11 @@ class Problem:
                 all real inputs with a min and a max are.
             parameters: values of parameters and start values, or ranges to search, by name.
             stop_time: end of each simulation in s; default: the FMU's.
-            output_interval: step of the monitored time grid in s; default: the FMU's step if it divides the
-                stop time, else a thousandth of the stop time.
+            output_interval: step of the monitored time grid in s; default: the FMU's step, or the next
+                smaller one that fits the stop time and the formula's times.
             step_size: communication step or maximum solver step in s; default: the output interval.
             tolerance: relative tolerance of the solver; default: the FMU's.
+            time_limit: maximum wall-clock time of one simulation in s; default: 60.
             interface: interface of the FMU; default: co-simulation if the FMU offers it.
 
         Raises:
@@ -77,12 +81,19 @@ class Problem:
             output_interval=output_interval,
             step_size=step_size,
             tolerance=tolerance,
+            time_limit=time_limit,
             interface=interface,
         )
         joined = join_fmu(Path(fmu), formula, changes=changes)
         source = ProblemSource(target=str(fmu), stl=formula, changes=changes)
         return cls(
-            joined.model, joined.requirement, joined.space, joined.experiment, joined.parameters, source
+            joined.model,
+            joined.requirement,
+            joined.space,
+            joined.experiment,
+            joined.parameters,
+            source,
+            joined.notes,
         )
 
     @property

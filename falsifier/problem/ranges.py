@@ -1,10 +1,12 @@
 """Ranges and values of a spec, checked against the FMU's variables and completed from them."""
 
 from math import ceil, floor
+from pathlib import Path
 
 from falsifier.core.model import Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, ValueKind
 from falsifier.errors import SpecError
+from falsifier.problem.options import named_file
 from falsifier.problem.spec import InputSection
 
 
@@ -77,12 +79,24 @@ def parameter_range(
     )
 
 
-def fixed_value(variable: Variable, value: float, *, file: str | None, key: str) -> float:
+def fixed_text(value: float | str, folder: Path) -> str:
+    """Return the value of a string; a file that it names relative to a folder gets its full path."""
+    return named_file(value, folder) if isinstance(value, str) else f"{value:.17g}"
+
+
+def fixed_value(variable: Variable, value: float | str, *, file: str | None, key: str) -> float:
     """Return a fixed value after checking it.
 
     Raises:
         SpecError: if the variable's type does not allow it.
     """
+    if isinstance(value, str):
+        raise SpecError(
+            f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
+            f"{variable.kind}",
+            file=file,
+            key=key,
+        )
     _check_type(variable, f"{value:g}", (value, value), file, key)
     if variable.kind != "real" and not _contains_a_number(variable, value, value):
         expected = "one of " + _items(variable) if variable.literals else "an integer"

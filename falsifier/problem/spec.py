@@ -66,27 +66,31 @@ class InputSection(_Strict):
         return self
 
 
-def _bare_number_is_a_value(section: object) -> object:
-    return {"value": section} if isinstance(section, int | float | bool) else section
+def _bare_value(section: object) -> object:
+    return {"value": section} if isinstance(section, int | float | bool | str) else section
 
 
 class ParameterSection(_Strict):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
     range: tuple[Number, Number] | None = Field(None, description="[low, high] to search within.")
-    value: Number | None = Field(None, description="Fixed value.")
+    value: Number | str | None = Field(
+        None, description="Fixed value; text for a string. A file is named relative to the spec file."
+    )
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "ParameterSection":
         if self.range is not None:
             _check_order(self.range)
         if (self.range is None) == (self.value is None):
-            raise ValueError("expected either range = [low, high] (searched) or value = number (fixed)")
+            raise ValueError(
+                "expected either range = [low, high] (searched) or value = number or text (fixed)"
+            )
         return self
 
 
 Inputs = dict[str, InputSection]
-Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_number_is_a_value)]]
+Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_value)]]
 
 
 class ModelSection(_Strict):
@@ -101,6 +105,7 @@ class ModelSection(_Strict):
     time_limit: Seconds | None = Field(
         None, description="Maximum wall-clock time of one simulation in s; default: 60."
     )
+    logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
 
 
@@ -112,6 +117,8 @@ class ModelChanges(_Strict):
     output_interval: Seconds | None = None
     step_size: Seconds | None = None
     tolerance: Seconds | None = None
+    time_limit: Seconds | None = None
+    logging: bool | None = None
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
 

@@ -17,6 +17,7 @@ class Spent:
 
     Attributes:
         simulations: number of simulated candidates, including failed simulations.
+        failures: number of simulations among them that failed, crashed or timed out.
         seconds: wall-clock time of the run.
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
@@ -36,6 +37,18 @@ class Spent:
     completion_tokens: int = 0
     reasoning_tokens: int = 0
     cost: float | None = 0.0
+    failures: int = 0
+
+    @property
+    def has_mostly_failed(self) -> bool:
+        """Whether more than half of the simulations failed, so that little was searched."""
+        return 2 * self.failures > self.simulations
+
+    @property
+    def simulations_text(self) -> str:
+        """Number of simulations in words, with those that failed."""
+        failed = f", {self.failures} of them failed" if self.failures else ""
+        return counted(self.simulations, "simulation") + failed
 
     @property
     def tokens(self) -> int:

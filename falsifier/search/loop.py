@@ -134,7 +134,9 @@ def search(
     try:
         loop.attach()
         reason = loop.run(batch)
-        status = "failed" if loop.all_failed() else "not falsified"
+        status = "not falsified"
+        if loop.spent.has_mostly_failed:
+            status, reason = "failed", loop.failure_text()
     except KeyboardInterrupt:
         status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
@@ -179,6 +181,7 @@ class _Loop:
         self.directory = directory
         self.listeners = listeners
         self.count = 0
+        self.last_error = ""
         self.started = perf_counter() - steps.seconds
         self.spent = Spent()
 
@@ -205,11 +208,10 @@ class _Loop:
         turns = 0
         while standing := [t for t in self.targets if t.counterexample is None]:
             limit = self.budget.exceeded(self.clock())
-            if limit is not None or self.count >= _MAX_INITIAL_FAILURES:
-                if self.all_failed():
-                    return self.failure_text()
-                if limit is not None:
-                    return limit
+            if limit is not None:
+                return limit
+            if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
+                return self.failure_text()
             turn = standing[turns % len(standing)]
             turns += 1
             told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
@@ -233,13 +235,14 @@ class _Loop:
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
-        return self.count > 0 and all(t.best is None for t in self.targets)
+        return 0 < self.count == self.spent.failures
 
     def failure_text(self) -> str:
-        """The reason of a run in which every simulation failed."""
-        last = self.targets[0].evaluations[-1]
-        failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
-        return f"{failed} failed; the last error: {last.reason}"
+        """The reason of a run in which most simulations failed."""
+        failed = f"{self.spent.failures} of {self.count} simulations"
+        if self.all_failed():
+            failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
+        return f"{failed} failed; the last error: {self.last_error}"
 
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
@@ -265,10 +268,13 @@ class _Loop:
     ) -> None:
         """Count and announce one simulation, judged against each requirement not yet falsified."""
         improved = [target.note(seen) for target, seen in judged]
+        failed = all(seen.status != "ok" for _, seen in judged)
+        self.last_error = evaluation.reason if failed else self.last_error
         self.spent = replace(
             self.clock(),
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
+            failures=self.spent.failures + failed,
         )
         self.emit(
             Evaluated(

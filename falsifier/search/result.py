@@ -19,7 +19,7 @@ class Result:
     Attributes:
         problem: what was searched.
         status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
-            ``interrupted`` or ``failed`` (the simulator or the language model).
+            ``interrupted`` or ``failed`` (the language model, or more than half of the simulations).
         reason: why the run ended, in words.
         counterexample: the confirmed violation, or None.
         best: evaluation with the smallest robustness, or None if every simulation failed.

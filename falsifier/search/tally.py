@@ -54,6 +54,7 @@ class Tally:
         self._requirement = requirement
         self._spent = Spent()
         self._simulation_seconds = 0.0
+        self._failures = 0
         self._robustness: list[float] = []
         self._latest: VerdictRecord | None = None
 
@@ -61,7 +62,10 @@ class Tally:
     def spent(self) -> Spent:
         """What the run has spent; wall-clock seconds are known only after it has ended."""
         return replace(
-            self._spent, simulations=len(self._robustness), simulation_seconds=self._simulation_seconds
+            self._spent,
+            simulations=len(self._robustness),
+            simulation_seconds=self._simulation_seconds,
+            failures=self._failures,
         )
 
     @property
@@ -125,6 +129,7 @@ class Tally:
             self.trajectories[record.index] = record.trajectory
         self._robustness.append(value)
         self._simulation_seconds += record.seconds
+        self._failures += all(v is None for v in judged.values())
 
 
 def read_tally(directory: Path, requirement: str | None = None) -> Tally:

@@ -83,7 +83,7 @@ class PlainScoreboard:
 def run_line(run: RunProgress) -> str:
     """Describe an ended run in one line."""
     best = "" if run.best is None else f", best robustness {run.best:+.4g}"
-    count = counted(run.spent.simulations, "simulation")
+    count = run.spent.simulations_text
     reason = f": {run.reason}" if run.status == "failed" else ""
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
 
@@ -96,7 +96,7 @@ def overall_line(progress: Progress, rate: float | None, *, stopped: bool = Fals
         f"{counts['falsified']} falsified",
         *([f"{counts['failed']} failed"] if counts["failed"] else []),
         *([] if stopped else [f"{counts['running']} running"]),
-        counted(spent.simulations, "simulation") + ("" if rate is None else f" ({rate:.0f}/s)"),
+        spent.simulations_text + ("" if rate is None else f" ({rate:.0f}/s)"),
     ]
     if spent.calls:
         cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"

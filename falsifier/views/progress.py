@@ -11,6 +11,9 @@ from falsifier.views.html import el, join
 if TYPE_CHECKING:
     from rich.console import Console
 
+# Number of failed simulations from which on a warning is due.
+_WARNED_FAILURES = 3
+
 
 @contextmanager
 def make_display(*, quiet: bool = False) -> Iterator[Listener]:
@@ -38,13 +41,18 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     )
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("starting", total=None, note="")
+        warn = FailureWarning()
 
         def show(event: Event) -> None:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
+                    for line in _notes(event):
+                        progress.console.print(line, highlight=False, markup=False)
                     progress.update(task, description=_title(event), total=total)
                 case Evaluated():
+                    if warning := warn(event):
+                        progress.console.print(warning, highlight=False, markup=False)
                     progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
                     progress.update(task, note=f"LLM replied, {event.spent.tokens} tokens so far")
@@ -72,6 +80,7 @@ class PlainDisplay:
 
     def __init__(self, console: "Console") -> None:
         self._console = console
+        self._warn = FailureWarning()
 
     def __call__(self, event: Event) -> None:
         """Print a line if the event deserves one."""
@@ -82,9 +91,13 @@ class PlainDisplay:
                 for problem in event.problems:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
+                for line in _notes(event):
+                    self._line(line)
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 how = "timed out" if evaluation.status == "timeout" else evaluation.status
                 self._line(f"simulation {event.index + 1} {how}: {evaluation.reason}")
+                if warning := self._warn(event):
+                    self._line(warning)
             case Evaluated(evaluation=evaluation, best=best) if (
                 best is not None and best.candidate is evaluation.candidate
             ):
@@ -96,6 +109,24 @@ class PlainDisplay:
 
     def _line(self, text: str) -> None:
         self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+class FailureWarning:
+    """Tells once that more than half of the simulations have failed, if these are more than a few."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def __call__(self, event: Evaluated) -> str | None:
+        """Return the warning, or None if there is nothing to tell."""
+        spent = event.spent
+        if self._told or spent.failures < _WARNED_FAILURES or not spent.has_mostly_failed:
+            return None
+        self._told = True
+        return (
+            f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run counts as "
+            "failed if more than half do"
+        )
 
 
 def note(event: Evaluated) -> str:
@@ -149,6 +180,11 @@ class NotebookLine:
             self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
         else:
             self._handle.update(line)
+
+
+def _notes(event: RunStarted) -> list[str]:
+    """Return what was chosen or ignored when the problems were loaded; what several share, once."""
+    return list(dict.fromkeys(note for problem in event.problems for note in problem.notes))
 
 
 def _confirmed(event: Confirmed) -> str:

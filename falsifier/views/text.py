@@ -16,8 +16,8 @@ from falsifier.search.result import Result
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    simulations = counted(result.spent.simulations, "simulation")
-    lines = [f"{result.problem.name}: {result.status} after {simulations} ({seconds_text(result.spent)})"]
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
+    lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
         lines.append(f"  confirmed      {result.counterexample.reason}")
@@ -49,7 +49,7 @@ def results_text(results: Sequence[Result]) -> str:
         where = "" if result.counterexample is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
-            f"{counted(result.spent.simulations, 'simulation')}{robustness}{where}"
+            f"{result.spent.simulations_text}{robustness}{where}"
         )
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
@@ -117,7 +117,9 @@ def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
 
 
 def _can_continue(result: Result) -> bool:
-    return result.status in ("interrupted", "failed") and bool(result.evaluations)
+    if not result.evaluations or result.spent.has_mostly_failed:
+        return False
+    return result.status in ("interrupted", "failed")
 
 
 def _continue_line(directory: Path) -> str:

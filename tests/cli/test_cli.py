@@ -24,7 +24,7 @@ from tests.command import ROOT, falsifier
         (["rn", "AT1"], "did you mean 'run'"),
         (
             ["run", "AT9"],
-            "CC5, CCx, NNb, NNx\n",
+            "AT1, AT2, AT51, AT52",
         ),
         (["run", "AT1", "--llm", "openai/gpt-5-mini"], "set OPENAI_API_KEY"),
         (["run", "AT1", "--llm", "opnai/x", "--variant", "MP9"], "unknown prompt variant 'MP9'"),

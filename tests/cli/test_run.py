@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.search.journal import read_journal
 from tests.command import ROOT, falsifier, listen_to_interrupts
+from tests.fmu.fixtures import path as fixture
 from tests.patience import HANG, wait_until
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
@@ -131,3 +133,37 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     assert done.code == 2
     assert "file/run" in done.err
     assert "Traceback" not in done.err
+
+
+def test_an_input_of_the_formula_need_not_be_searched(tmp_path: Path) -> None:
+    arguments = (
+        "--stl",
+        "G[0,20] (brake > 10 or speed <= 120)",
+        "--input",
+        "throttle=0:100:7",
+        "--budget",
+        "9",
+    )
+    done = falsifier("run", str(bundled("fmus") / "AT.fmu"), *arguments, "--quiet", cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert "falsified after" in done.out
+
+
+def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:
+    arguments = (
+        "--stl",
+        "G[0,10] (y <= 100)",
+        "--input",
+        "u=4.9:10:1",
+        "--budget",
+        "8",
+        "--engine",
+        "uniform",
+    )
+    done = falsifier("run", str(fixture("Silent_2")), *arguments, "--fmu-log", "logs/fmu.txt", cwd=tmp_path)
+    assert done.code == 3, done.out
+    assert re.search(r"stl: failed after 8 simulations, \d of them failed", done.out)
+    assert re.search(r"warning: \d of \d simulations have failed", done.err)
+    log = (tmp_path / "logs" / "fmu.txt").read_text()
+    assert log.count("simulation ") == 8
+    assert "  error: the solver did not converge: the valve is open too far" in log

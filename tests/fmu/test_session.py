@@ -29,7 +29,7 @@ WAYS: list[tuple[str, Reuse]] = [
     ("SavedState_3", "state"),
     ("LyingState_2", "instance"),
     ("SpentState_3", "instance"),
-    ("KeepsStatic_2", "process"),
+    ("KeepsStatic_2", "library"),
 ]
 
 

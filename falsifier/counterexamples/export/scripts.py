@@ -2,8 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from os.path import relpath
-from pathlib import Path
 
 from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.evaluation.evaluate import Evaluation
@@ -24,15 +22,29 @@ _REPLAY = '''\
 Recorded robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {predicate}
 """
 
+import csv
 import json
 import sys
 from pathlib import Path
 
+import numpy
 from fmpy import simulate_fmu
-from fmpy.util import read_csv
 
 HERE = Path(__file__).resolve().parent
+# Name of each output: the FMU's variable, and the element if that is an array.
+OUTPUTS = {outputs}
 FMU = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / {fmu}
+
+
+def read_inputs():
+    """Read input.csv; cells of arrays hold all elements. Unlike with fmpy, names may contain commas."""
+    lines = (HERE / "input.csv").read_text(encoding="utf-8").splitlines()
+    names, *rows = csv.reader(lines)
+    cells = [[tuple(map(float, cell.split())) for cell in row] for row in rows]
+    sizes = [len(cell) for cell in cells[0]]
+    columns = [(n, float, (size,)) if size > 1 else (n, float) for n, size in zip(names, sizes)]
+    return numpy.array([tuple(c if len(c) > 1 else c[0] for c in row) for row in cells], columns)
+
 
 result = simulate_fmu(
     str(FMU),
@@ -45,18 +57,21 @@ result = simulate_fmu(
     record_events=False,
     start_values=json.loads((HERE / "start_values.json").read_text()),
     input={inputs},
-    output={outputs},
+    output=sorted({{variable for variable, _ in OUTPUTS.values()}}),
 )[::{every}]
+columns = {{"time": result["time"]}}
+for name, (variable, element) in OUTPUTS.items():
+    columns[name] = result[variable].reshape(len(result), -1)[:, element]
 
-lines = [",".join(result.dtype.names)]
-lines += [",".join(repr(float(value)) for value in row) for row in result]
+lines = [",".join(f'"{{name}}"' if "," in name else name for name in columns)]
+lines += [",".join(repr(float(value)) for value in row) for row in zip(*columns.values())]
 (HERE / "outputs.csv").write_text("\\n".join(lines) + "\\n")
 
 shown = {shown}
 critical = int(abs(result["time"] - {critical_time!r}).argmin())
 print("".join(f"{{name:>14}}" for name in shown))
 for k in range(max(critical - {around}, 0), min(critical + {around} + 1, len(result))):
-    values = "".join(f"{{float(result[name][k]):14.6g}}" for name in shown)
+    values = "".join(f"{{float(columns[name][k]):14.6g}}" for name in shown)
     print(values + ("  <- critical time" if k == critical else ""))
 print(f"all {{len(result)}} rows are in outputs.csv next to this script")
 '''
@@ -90,7 +105,7 @@ def test_{name}_is_no_longer_violated() -> None:
 '''
 
 
-def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> str | None:
+def replay_script(problem: Problem, evaluation: Evaluation) -> str | None:
     """Python script that needs only FMPy; None if the model is not an FMU."""
     model, verdict, experiment = problem.model, evaluation.verdict, problem.experiment
     if not isinstance(model, FmuModel) or verdict is None:
@@ -105,13 +120,13 @@ def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> 
         robustness=verdict.robustness,
         critical_time=verdict.critical_time,
         predicate=verdict.predicate,
-        fmu=json.dumps(Path(relpath(model.path, directory.resolve())).as_posix()),
+        fmu=json.dumps(model.path.name),
         fmi_type=_FMPY_TYPES[model.interface],
         stop_time=experiment.stop_time,
         step=experiment.stop_time / round(experiment.stop_time / step),
         tolerance=experiment.tolerance,
-        inputs='read_csv(HERE / "input.csv")' if _has_inputs(problem) else "None",
-        outputs=json.dumps(list(experiment.outputs)),
+        inputs="read_inputs()" if _has_inputs(problem) else "None",
+        outputs=json.dumps({name: model.place(name) for name in experiment.outputs}),
         shown=json.dumps(
             ["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]
         ),
@@ -120,11 +135,12 @@ def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> 
     )
 
 
-def openmodelica_script(problem: Problem, start: Mapping[str, float]) -> str | None:
+def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> str | None:
     """OpenModelica script; None if the model is not an FMU."""
     if not isinstance(problem.model, FmuModel):
         return None
-    overrides = ",".join(f"{name}={value!r}" for name, value in start.items())
+    texts = {name: value if isinstance(value, str) else repr(value) for name, value in start.items()}
+    overrides = ",".join(f"{name}={text}" for name, text in texts.items())
     flags = ["-csvInput=input.csv"] if _has_inputs(problem) else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name

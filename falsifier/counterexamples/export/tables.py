@@ -8,41 +8,62 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from falsifier.core.model import Model
+from falsifier.counterexamples.export.arrays import by_declaration, start_of
 from falsifier.counterexamples.export.inputs import InputTable
 
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _MATLAB_NAME_LENGTH = 63
 
 
-def write_csv(table: InputTable, path: Path) -> Path:
-    """Write the inputs with a header of quoted names; numbers are written with full precision."""
-    columns = {"time": table.times, **table.columns}
-    lines = [",".join(f'"{name}"' for name in columns)]
-    lines += [",".join(map(repr, row)) for row in np.stack(list(columns.values()), axis=1).tolist()]
+def write_csv(table: InputTable, path: Path, model: Model | None = None) -> Path:
+    """Write the inputs with a header of quoted names; numbers are written with full precision.
+
+    Args:
+        table: the inputs.
+        path: file to write.
+        model: the FMU, whose arrays are one column each, with a space between two elements.
+    """
+    columns = {"time": [table.times], **{name: [column] for name, column in table.columns.items()}}
+    if model is not None:
+        grouped = by_declaration(
+            model, table.columns, lambda name: np.full(table.times.shape, start_of(model, name))
+        )
+        columns = {"time": [table.times], **grouped}
+    lines = [",".join('"' + name.replace('"', '""') + '"' for name in columns)]
+    cells = [np.stack(column, axis=1).tolist() for column in columns.values()]
+    lines += [",".join(" ".join(map(repr, cell)) for cell in row) for row in zip(*cells, strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 
-def write_json(start: Mapping[str, float], path: Path) -> Path:
-    """Write the start values as one JSON object."""
-    path.write_text(json.dumps(dict(start), indent=2) + "\n", encoding="utf-8")
+def write_json(start: Mapping[str, float | str], path: Path, model: Model | None = None) -> Path:
+    """Write the start values as one JSON object; arrays of the FMU are lists of all elements."""
+    shown: dict[str, object] = dict(start)
+    if model is not None:
+        numbers = {name: value for name, value in start.items() if not isinstance(value, str)}
+        grouped = by_declaration(model, numbers, lambda name: start_of(model, name))
+        shown = {name: values if len(values) > 1 else values[0] for name, values in grouped.items()}
+        shown |= {name: value for name, value in start.items() if isinstance(value, str)}
+    path.write_text(json.dumps(shown, indent=2) + "\n", encoding="utf-8")
     return path
 
 
-def write_ssv(start: Mapping[str, float], name: str, path: Path) -> Path:
+def write_ssv(start: Mapping[str, float | str], name: str, path: Path) -> Path:
     """Write the start values as a parameter set of System Structure and Parameterization 1.0."""
     ElementTree.register_namespace("ssv", _SSV)
     root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": name})
     parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
     for key, value in start.items():
         parameter = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", {"name": key})
-        ElementTree.SubElement(parameter, f"{{{_SSV}}}Real", {"value": repr(float(value))})
+        kind, text = ("String", value) if isinstance(value, str) else ("Real", repr(float(value)))
+        ElementTree.SubElement(parameter, f"{{{_SSV}}}{kind}", {"value": text})
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
     return path
 
 
-def write_mat(table: InputTable, start: Mapping[str, float], path: Path) -> Path:
+def write_mat(table: InputTable, start: Mapping[str, float | str], path: Path) -> Path:
     """Write inputs and start values for MATLAB, under valid MATLAB names.
 
     Each input is a matrix with the columns time and value, the format of From Workspace blocks and root
@@ -52,7 +73,7 @@ def write_mat(table: InputTable, start: Mapping[str, float], path: Path) -> Path
     from scipy.io import savemat
 
     inputs = {matlab_name(n): np.stack((table.times, column), axis=1) for n, column in table.columns.items()}
-    structure = {matlab_name(n): float(v) for n, v in start.items()}
+    structure = {matlab_name(n): v if isinstance(v, str) else float(v) for n, v in start.items()}
     names = np.array([[matlab_name(n), n] for n in (*table.columns, *start)], dtype=object)
     savemat(
         path, {**inputs, "start_values": structure or np.empty((0, 0)), "names": names}, long_field_names=True

@@ -90,6 +90,11 @@ class History:
             self._coordinates,
             discrete=frozenset(name for name in outputs if _is_discrete(problem, name, trajectory)),
             stretches=self.settings.stretches,
+            constants={
+                name: float(trajectory[name][0])
+                for name in formula.signals
+                if name not in driven and name not in outputs
+            },
         )
 
     def scaled_objective(self) -> Objective:

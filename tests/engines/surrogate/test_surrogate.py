@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
@@ -110,3 +111,16 @@ def test_parallel_candidates_differ() -> None:
     engine = Surrogate(problem, seed=0, settings=Settings(pool=60, children=30, generations=2))
     engine.tell([evaluate(problem, c) for c in engine.ask(3)])
     assert len({c.key for c in engine.ask(6)}) == 6
+
+
+@pytest.mark.parametrize(
+    ("points", "free", "why"),
+    [
+        (3, None, "inputs take a random bound at each control point, 5 s apart"),
+        (4, FREE, "inputs switch between their bounds every "),
+    ],
+)
+def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | None, why: str) -> None:
+    problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", points=points, free=free)
+    engine = Surrogate(problem, seed=0, settings=HASTY)
+    assert any(candidate.rationale.startswith(why) for candidate in engine.ask(4))
