@@ -1,18 +1,31 @@
 """The command line. Commands live in their own modules and are imported when they are used."""
 
+import errno
 import os
 import sys
 import traceback
+from contextlib import suppress
 from importlib import import_module
 from typing import NoReturn
 
 import click
 
 from falsifier import __version__
+from falsifier.cli.streams import (
+    INTERRUPTED,
+    end_at_interrupts,
+    open_streams,
+    settle_streams,
+    stop_at_interrupts,
+)
 from falsifier.errors import FalsifierError, did_you_mean
+from falsifier.views.terminal import warn
 
 # What a shell reports of a program whose reader has gone: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
+_FAILED = 3
+# What a machine has run out of: disk, quota, memory, files, processes.
+_EXHAUSTED = frozenset((errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EAGAIN))
 
 # name: (module, what --help says)
 _COMMANDS = {
@@ -79,44 +92,59 @@ def cli() -> None:
     """Run the command that was named."""
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point: every error ends with its exit code, and never with the code of a falsification."""
     # The engines' matrices are small: threads of the algebra library only get in each other's way.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    open_streams()
+    stop_at_interrupts()
+    code = _carried_out(sys.argv[1:])
+    end_at_interrupts(code)
+    settle_streams()
+    sys.exit(code)
+
+
+def _carried_out(arguments: list[str]) -> int:
+    """Carry out a command; return its exit code."""
     try:
         # Not cli.main, which ends with 1, the code of a falsification, when a pipe is closed.
-        with cli.make_context("falsifier", sys.argv[1:]) as context:
+        with cli.make_context("falsifier", arguments) as context:
             cli.invoke(context)
-        sys.exit(0)
+        return 0
+    except SystemExit as end:
+        return _FAILED if isinstance(end.code, str) else int(end.code or 0)
     except click.exceptions.Exit as end:
-        sys.exit(end.exit_code)
+        return end.exit_code
     except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except BrokenPipeError:  # who read the output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more fails at exit
-        sys.exit(_PIPE_CLOSED)
+        with suppress(OSError):
+            error.show()
+        return 2
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
-        sys.exit(130)
+        warn("interrupted")
+        return INTERRUPTED
     except FalsifierError as error:
-        click.echo(f"falsifier: {error}", err=True)
-        sys.exit(error.exit_code)
+        warn(f"falsifier: {error}")
+        return error.exit_code
+    except BrokenPipeError:  # who read the output has seen enough
+        return _PIPE_CLOSED
     except OSError as error:
-        if error.filename is None:
-            _report_defect()
-        click.echo(
-            f"falsifier: {error.filename}: {error.strerror}; choose a place that can be read and written, "
-            "for example with --out DIR",
-            err=True,
-        )
-        sys.exit(2)
+        return _report_refusal(error)
+    except MemoryError:
+        warn("falsifier: not enough memory; free some, or raise the limit (ulimit)")
+        return _FAILED
     except Exception:
-        _report_defect()
+        warn(f"{traceback.format_exc()}falsifier: this is a defect of falsifier itself; please report it")
+        return _FAILED
 
 
-def _report_defect() -> NoReturn:
-    """Print the exception that is being handled and end with the code of a failure."""
-    traceback.print_exc()
-    click.echo("falsifier: this is a defect of falsifier itself; please report the lines above", err=True)
-    sys.exit(3)
+def _report_refusal(error: OSError) -> int:
+    """Say what the operating system refused; return the exit code."""
+    where = "" if error.filename is None else f"{error.filename}: "
+    if error.errno in _EXHAUSTED:
+        warn(f"falsifier: {where}{error.strerror}; free some, then run the command again")
+        return _FAILED
+    if error.filename is None:
+        warn(f"falsifier: {error}")
+        return _FAILED
+    warn(f"falsifier: {where}{error.strerror}; choose a place that can be read and written, with --out DIR")
+    return 2

@@ -1,11 +1,10 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
-import sys
 import time
 from datetime import datetime
 from itertools import product
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NoReturn, get_args
 
 import click
 
@@ -24,12 +23,14 @@ from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
 from falsifier.campaigns.suites import SUITES
 from falsifier.cli.options import asking, asking_options, json_option, quiet_option
+from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.request import Effort, LLMSettings
 from falsifier.views.campaign_text import campaign_display, overall_line
+from falsifier.views.terminal import warn
 
 # Time in s between two looks of falsifier watch.
 _WATCH_PERIOD = 0.5
@@ -141,7 +142,7 @@ def bench(
         suite=suite_name,
     )
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
-    click.echo(f"{len(request.runs)} runs in {directory}", err=True)
+    warn(f"{len(request.runs)} runs in {directory}")
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
@@ -165,9 +166,9 @@ def watch(*, directory: Path, once: bool) -> None:
                 working = is_worked_on(directory)
             show(follower.look())
     progress = follower.look()  # after the lock: who let it go has written everything
-    click.echo(overall_line(progress, None, stopped=not working))
+    say(overall_line(progress, None, stopped=not working))
     if not working and progress.finished < len(progress.runs):
-        click.echo(f"stopped; falsifier resume {directory} goes on")
+        say(f"stopped; falsifier resume {directory} goes on")
 
 
 def resume_campaign(
@@ -179,7 +180,7 @@ def resume_campaign(
     finish(directory, outcome, table="main", as_json=as_json)
 
 
-def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> None:
+def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> NoReturn:
     """Save the tables, print one, and end with the exit code."""
     runs, published = load(directory), read_published()
     for name, make in TABLES.items():
@@ -189,13 +190,13 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
             write_whole(directory / f"table-{name}.csv", made.csv())
     data = statistics_json(runs)
     write_whole(directory / "table.json", data)
-    click.echo(data if as_json else TABLES[table](runs, published).text(), nl=not as_json)
     if outcome.reason:
-        click.echo(f"stopped: {outcome.reason}; go on with: falsifier resume {directory}", err=True)
+        warn(f"stopped: {outcome.reason}; go on with: falsifier resume {directory}")
     failed = outcome.progress.counts["failed"]
     if failed:
-        click.echo(f"{failed} runs failed; falsifier resume {directory} tries them again", err=True)
-    sys.exit(3 if failed or outcome.reason else 0)
+        warn(f"{failed} runs failed; falsifier resume {directory} tries them again")
+    text = data if as_json else TABLES[table](runs, published).text()
+    conclude(text, 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.options import json_option
+from falsifier.cli.output import say
 from falsifier.core.files import bundled
+from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
@@ -51,7 +53,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
     found = read_info(source)
     if as_json:
-        click.echo(json.dumps(asdict(found), indent=2))
+        say(json.dumps(asdict(found), indent=2))
         return
     _print_info(found, everything=everything)
     if checked:
@@ -68,7 +70,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
     from falsifier.fmu.build import build as compile_sources
 
     written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
-    click.echo(f"{written} written")
+    say(f"{written} written")
 
 
 @click.command()
@@ -89,7 +91,7 @@ def init(*, fmu: Path, out: Path | None, force: bool) -> None:
     )  # refuses what cannot be simulated
     path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
     load_problems(str(path))
-    click.echo(f"{path} written. Put in the real ranges and the requirement, then: falsifier run '{path}'")
+    say(f"{path} written. Put in the real ranges and the requirement, then: falsifier run '{path}'")
 
 
 @click.command()
@@ -98,7 +100,7 @@ def init(*, fmu: Path, out: Path | None, force: bool) -> None:
 def check(*, target: str, profile: str | None) -> None:
     """Check a spec file: its keys, its signals, its ranges and its formulas; nothing is simulated."""
     for problem in load_problems(target, profile=profile):
-        click.echo(_problem_line(problem))
+        say(_problem_line(problem))
 
 
 @click.command()
@@ -112,7 +114,7 @@ def check(*, target: str, profile: str | None) -> None:
 )
 def schema(*, what: str) -> None:
     """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
-    click.echo(json.dumps(_schema(what), indent=2))
+    say(json.dumps(_schema(what), indent=2))
 
 
 def _schema(what: str) -> dict[str, Any]:
@@ -146,12 +148,10 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         movements = step_convergence(model, experiment, signals)
     finally:
         model.close()
-    click.echo(
-        f"\n{interface}, step {experiment.output_interval:g} s against half of it, over {stop_time:g} s:"
-    )
+    say(f"\n{interface}, step {experiment.output_interval:g} s against half of it, over {stop_time:g} s:")
     for name, moved in movements.items():
         unit = f" {found[name].unit}" if found[name].unit else ""
-        click.echo(
+        say(
             f"  {name} moves by at most {moved.largest:.3g}{unit} at {moved.time:.4g} s "
             f"({moved.relative:.2%} of its range)"
         )
@@ -192,19 +192,18 @@ def _print_info(found: ModelInfo, *, everything: bool) -> None:
 
 def _describe(console: "Console", found: ModelInfo, *, everything: bool) -> None:
     console.print(
-        f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces) or _NO_INTERFACE}"
+        f"[bold]{_shown(found.name)}[/bold]  FMI {_shown(found.fmi_version)}, "
+        f"{', '.join(found.interfaces) or _NO_INTERFACE}"
     )
     if found.clocks:
         console.print(
-            f"cannot be simulated: its clocks {', '.join(found.clocks)} would have to be ticked from "
-            "outside, which is not supported; export the model without input clocks",
-            markup=False,
+            f"cannot be simulated: its clocks {_shown(', '.join(found.clocks))} would have to be ticked from "
+            "outside, which is not supported; export the model without input clocks"
         )
     if found.description:
-        console.print(found.description, markup=False)
-    console.print(
-        f"platforms: {', '.join(found.platforms) or 'none'}; made by {found.tool or 'unknown'}", markup=False
-    )
+        console.print(_shown(found.description))
+    platforms = ", ".join(found.platforms) or "none"
+    console.print(f"platforms: {_shown(platforms)}; made by {_shown(found.tool or 'unknown')}")
     experiment = (
         f"{label} {value:g}{unit}"
         for label, value, unit in (
@@ -241,8 +240,15 @@ def _table(title: str, variables: tuple[Variable, ...]) -> "Table":
     for v in variables:
         unit = f"{v.unit} (shown in {v.display_unit})" if v.display_unit else v.unit
         cells = (v.name, v.kind, unit, _cell(v.low), _cell(v.high), _cell(v.start), v.description)
-        table.add_row(*(cell.replace("[", "\\[") for cell in cells))
+        table.add_row(*map(_shown, cells))
     return table
+
+
+def _shown(text: str) -> str:
+    """Return a text from an FMU so that rich prints it as it is, without control characters."""
+    from rich.markup import escape
+
+    return escape(one_line(text))
 
 
 def _cell(value: float | str | None) -> str:

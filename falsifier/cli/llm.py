@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.options import json_option, problem_options, problem_source
+from falsifier.cli.output import say
 from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def prompt(
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
         tools = (preview_tool(problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous),)
-    click.echo(_as_json(messages, tools) if as_json else _as_text(messages, tools))
+    say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
 
 
 def _as_json(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
@@ -96,7 +97,7 @@ def check(*, name: str, api_base: str | None, effort: str | None) -> None:
     found = check_llm(name, api_base=api_base, effort=effort)
     price = "unknown" if found.price is None else str(found.price)
     key = f"key from {found.key}" if found.key else "no key needed"
-    click.echo(
+    say(
         f"{found.llm}: answers ({found.reply!r} after {found.seconds:.1f} s, {found.usage.tokens} tokens); "
         f"{key}; price {price}"
     )

@@ -20,13 +20,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import write_whole
+from falsifier.core.files import file_name, write_whole
 from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source, reloadable, spec_file
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import ProblemSource, Target
 from falsifier.search import manifest
 from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.search.manifest import RequirementRecord
@@ -185,13 +185,13 @@ def counterexample_file(path: Path) -> Path:
     return found[0]
 
 
-def file_name(requirement: str = "") -> str:
+def file_of(requirement: str = "") -> str:
     """Name of the counterexample's file in a run directory; with the requirement if several share a search.
 
-    >>> file_name(), file_name("AT1")
+    >>> file_of(), file_of("AT1")
     ('counterexample.json', 'counterexample-AT1.json')
     """
-    return f"counterexample-{requirement}.json" if requirement else FILE_NAME
+    return f"counterexample-{file_name(requirement)}.json" if requirement else FILE_NAME
 
 
 def keep_recorded(directory: Path) -> None:
@@ -209,7 +209,7 @@ def keep_recorded(directory: Path) -> None:
         if not isinstance(record, ConfirmedRecord) or record.outcome != "confirmed":
             continue
         name = record.requirement
-        file = directory / file_name(name if described.shared else "")
+        file = directory / file_of(name if described.shared else "")
         if file.exists():
             continue
         if name not in evaluations:
@@ -293,7 +293,7 @@ class Database:
 
     def _place(self, problem: Problem) -> Path:
         spec = None if problem.source is None else spec_file(problem.source)
-        return self.folder / (f"{spec.stem}.{problem.name}" if spec else problem.name)
+        return self.folder / file_name(f"{spec.stem}.{problem.name}" if spec else problem.name)
 
 
 def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
@@ -307,10 +307,10 @@ def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
 
 def _split(target: str) -> tuple[Path | None, str]:
     """Split a target into its file (None for a bundled name) and the rest with its colon."""
-    if target.endswith((".toml", ".fmu")):
-        return Path(target), ""
-    file, colon, requirement = target.rpartition(":")
-    return (Path(file), f":{requirement}") if colon and file.endswith(".toml") else (None, "")
+    parts = Target.parse(target)
+    if not parts.file:
+        return None, ""
+    return Path(parts.file), f":{parts.requirement}" if parts.requirement else ""
 
 
 def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:

@@ -5,6 +5,7 @@ from itertools import islice
 from math import ceil, floor
 from pathlib import Path
 
+from falsifier.core.literals import one_line, toml_key, toml_string
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
@@ -36,26 +37,27 @@ def starter_spec(fmu: Path, info: ModelInfo) -> str:
 def _model_section(fmu: Path, info: ModelInfo) -> str:
     stop_time = info.stop_time or _DEFAULT_STOP_TIME
     doubt = "" if info.stop_time else "  # the FMU specifies none: check this"
-    about = f"# {info.name}: {info.description}\n\n" if info.description else f"# {info.name}\n\n"
+    about = f"{info.name}: {info.description}" if info.description else info.name
     return (
-        f'{about}[model]\nfmu = "{fmu.as_posix()}"\ninterface = "{default_interface(info)}"\n'
+        f"# {one_line(about)}\n\n[model]\nfmu = {toml_string(fmu.as_posix())}\n"
+        f'interface = "{default_interface(info)}"\n'
         f"stop_time = {stop_time!r}{doubt}\noutput_interval = {default_interval(info, stop_time)!r}"
     )
 
 
 def _input_section(v: Variable) -> str:
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
-    comment = f"# {meaning}\n" if meaning else ""
-    comment += f"# {_items(v)}\n" if v.literals else ""
+    comment = f"# {one_line(meaning)}\n" if meaning else ""
+    comment += f"# {one_line(_items(v))}\n" if v.literals else ""
     least, most = v.limits
     low, high = (0.0, 1.0) if least is None or most is None else (least, most)
     if low == high:
-        return f"{comment}[inputs.{_toml_key(v.name)}]\nvalue = {low!r}"
+        return f"{comment}[inputs.{toml_key(v.name)}]\nvalue = {low!r}"
     unknown = least is None or most is None
     doubt = "  # the FMU specifies no min and max: replace with the real range" if unknown else ""
     interpolation = "pchip" if v.kind == "real" else "constant"
     return (
-        f"{comment}[inputs.{_toml_key(v.name)}]\nrange = {_range(v, low, high)}{doubt}\n"
+        f"{comment}[inputs.{toml_key(v.name)}]\nrange = {_range(v, low, high)}{doubt}\n"
         f'control_points = {DEFAULT_POINTS}\ninterpolation = "{interpolation}"'
     )
 
@@ -66,7 +68,7 @@ def _searched_parameter(v: Variable) -> str:
     least, most = v.limits
     low = start - reach if least is None else least
     high = start + reach if most is None else most
-    return f"[parameters.{_toml_key(v.name)}]  # replace with the real range\nrange = {_range(v, low, high)}"
+    return f"[parameters.{toml_key(v.name)}]  # replace with the real range\nrange = {_range(v, low, high)}"
 
 
 def _range(v: Variable, low: float, high: float) -> str:
@@ -85,9 +87,8 @@ def _parameter_hints(parameters: Iterable[Variable]) -> str:
     for v in islice(parameters, _SHOWN_PARAMETERS):
         low, high = v.limits
         limits = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
-        hints.append(
-            f"# parameters.{_toml_key(v.name)}.range = {limits}  # default: {v.start} {v.unit}".rstrip()
-        )
+        default = one_line(f"default: {v.start} {v.unit}")
+        hints.append(f"# parameters.{toml_key(v.name)}.range = {limits}  # {default}")
     return "\n".join(hints)
 
 
@@ -97,12 +98,8 @@ def _requirement_section(info: ModelInfo) -> str:
         raise SpecError(f"{info.name}: the FMU has no numeric output to write a requirement about")
     bound = _UNREACHED if output.high is None else output.high
     stop_time = info.stop_time or _DEFAULT_STOP_TIME
+    formula = f"G[0,{stop_time:.10g}] ({name_text(output.name)} <= {bound:.10g})"
     return (
-        "[requirements.R1]\n"
-        f"formula = 'G[0,{stop_time:.10g}] ({name_text(output.name)} <= {bound:.10g})'"
+        f"[requirements.R1]\nformula = {toml_string(formula)}"
         '  # replace with the real requirement\ndescription = ""'
     )
-
-
-def _toml_key(name: str) -> str:
-    return name if name.replace("_", "").replace("-", "").isalnum() else f'"{name}"'

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import overload
 
+from falsifier.core.files import file_name
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError, SpecError
@@ -112,7 +113,7 @@ def falsify(
         )
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
-            place = place / group[0].name
+            place = place / file_name(group[0].name)
         found = carry_out(
             request,
             group,

@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from falsifier.core.literals import one_line
 from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
 from falsifier.views.html import el, join
+from falsifier.views.terminal import error_console, moving, unbroken
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,25 +19,24 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     if quiet:
         yield lambda event: None
         return
-    from rich.console import Console
-
-    console = Console(stderr=True)
+    console = error_console()
     if console.is_jupyter:  # there rich's own live line needs widgets
         yield NotebookLine()
         return
     if not console.is_terminal:
-        yield PlainDisplay(console)
+        yield unbroken(PlainDisplay(console))
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as progress:
+    progress = Progress(*columns, console=console, transient=True)
+    with moving(progress):
         task = progress.add_task("starting", total=None, note="")
 
         def show(event: Event) -> None:
@@ -49,13 +50,12 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                     progress.update(task, note=f"LLM answered, {event.spent.tokens} tokens so far")
                 case Confirmed():
                     c = event.confirmation
-                    progress.console.print(
-                        f"violation {c.outcome}: {c.reason}", highlight=False, markup=False
-                    )
+                    text = one_line(f"violation {c.outcome}: {c.reason}")
+                    progress.console.print(text, highlight=False, markup=False)
                 case _:
                     pass
 
-        yield show
+        yield unbroken(show)
 
 
 def progress() -> Listener:
@@ -63,10 +63,8 @@ def progress() -> Listener:
 
     >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
     """
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    return NotebookLine() if console.is_jupyter else PlainDisplay(console)
+    console = error_console()
+    return NotebookLine() if console.is_jupyter else unbroken(PlainDisplay(console))
 
 
 class PlainDisplay:
@@ -95,7 +93,7 @@ class PlainDisplay:
                 pass
 
     def _line(self, text: str) -> None:
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+        self._console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
 
 
 def note(event: Evaluated) -> str:
@@ -151,4 +149,4 @@ class NotebookLine:
 
 def _title(event: RunStarted) -> str:
     """What is searched, and by whom."""
-    return f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}"
+    return one_line(f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}")

@@ -1,12 +1,13 @@
 """What people see of a finished run: the result as text or JSON."""
 
-import sys
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines
-from falsifier.counterexamples.store import file_name
+from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search import manifest
 from falsifier.search.budget import Spent
@@ -24,7 +25,7 @@ def result_text(result: Result) -> str:
     else:
         lines.append(f"  reason         {result.reason}")
         if result.status in ("interrupted", "failed") and result.directory is not None and result.evaluations:
-            lines.append(f"  go on with     falsifier resume '{result.directory}'")
+            lines.append(f"  go on with     falsifier resume {shlex.quote(str(result.directory))}")
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += _evaluation_lines(result, shown)
@@ -36,7 +37,7 @@ def result_text(result: Result) -> str:
         lines.append(f"  files          {result.directory}")
         if result.counterexample is not None:
             lines.append(f"  picture        {_picture(result)}")
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def results_text(results: Sequence[Result]) -> str:
@@ -53,13 +54,15 @@ def results_text(results: Sequence[Result]) -> str:
         )
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
-    return "\n".join([*lines, f"{falsified} of {len(results)} falsified ({seconds_text(total)})"])
+    return "\n".join(
+        [*map(one_line, lines), f"{falsified} of {len(results)} falsified ({seconds_text(total)})"]
+    )
 
 
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; several results in one directory have one each."""
     shared = result.directory is not None and manifest.read(result.directory).shared
-    return file_name(result.problem.name if shared else "")
+    return file_of(result.problem.name if shared else "")
 
 
 def result_json(result: Result) -> dict[str, Any]:
@@ -132,8 +135,3 @@ def seconds_text(spent: Spent) -> str:
 
 def _unit(unit: str) -> str:
     return f" {unit}" if unit else ""
-
-
-def warn(text: str) -> None:
-    """Print a message for people on stderr."""
-    print(text, file=sys.stderr)

@@ -14,7 +14,12 @@
 from pathlib import Path
 
 from falsifier.counterexamples.export.inputs import input_table, start_values
-from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
+from falsifier.counterexamples.export.scripts import (
+    identifier,
+    openmodelica_script,
+    pytest_file,
+    replay_script,
+)
 from falsifier.counterexamples.export.tables import write_csv, write_json, write_mat, write_ssv
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
@@ -48,16 +53,12 @@ def export_counterexample(
     if table.columns:
         files.append(write_csv(table, directory / "input.csv"))
     scripts = {
-        "replay.py": replay_script(problem, evaluation, directory),
+        "replay.py": replay_script(problem, evaluation, table.columns, directory),
         "replay.mos": openmodelica_script(problem, start),
-        f"test_{_identifier(problem.name)}.py": pytest_file(stored),
+        f"test_{identifier(problem.name)}.py": pytest_file(stored),
     }
     for name, text in scripts.items():
         if text is not None:
             (directory / name).write_text(text, encoding="utf-8")
             files.append(directory / name)
     return files
-
-
-def _identifier(name: str) -> str:
-    return "".join(c if c.isalnum() else "_" for c in name)

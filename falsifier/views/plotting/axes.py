@@ -1,10 +1,22 @@
-"""Axes of one's own, and the figure that axes are on."""
+"""Axes of one's own, the figure that axes are on, and text on it."""
 
 from typing import TYPE_CHECKING
+
+from falsifier.core.literals import one_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+# Maximum number of characters of a title or label.
+_LONGEST_CAPTION = 120
+
+
+def caption(text: str) -> str:
+    """Return a text for a picture: one line, not too long, and without matplotlib's mathematical notation."""
+    line = one_line(text)
+    shown = line if len(line) <= _LONGEST_CAPTION else f"{line[:_LONGEST_CAPTION]} ..."
+    return shown.replace("$", r"\$")
 
 
 def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":

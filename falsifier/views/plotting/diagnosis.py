@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
-from falsifier.views.plotting.axes import figure_of
+from falsifier.views.plotting.axes import caption, figure_of
 from falsifier.views.plotting.evaluation import plot_requirement
 
 if TYPE_CHECKING:
@@ -44,5 +44,5 @@ def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" =
         y, colour = _ROW * (len(windows) - row), _COLOURS[row % len(_COLOURS)]
         ax.fill_between([start, end], y, y - _BAR, color=colour, transform=in_axes, linewidth=0, alpha=0.8)
         operator = step.text.partition(" was ")[0]
-        ax.text(start, y, operator, color=colour, transform=in_axes, va="bottom", fontsize=8)
+        ax.text(start, y, caption(operator), color=colour, transform=in_axes, va="bottom", fontsize=8)
     return figure_of(ax)

@@ -114,7 +114,8 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     problem, budget = request.source, request.budget
     if problem is None:
         return "(its problem was made in Python)"
-    target = problem.target.rpartition(":")[0] if shared else problem.target
+    spec = problem.parts.file or problem.target.partition(":")[0]
+    target = spec if shared else problem.target
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
         ("--profile", problem.profile),

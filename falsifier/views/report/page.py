@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Table
+from falsifier.core.files import file_name
 from falsifier.core.words import choices
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
@@ -190,4 +191,4 @@ def _environment(content: Content) -> Html:
 
 
 def _anchor(section: Section) -> str:
-    return f"requirement-{section.name}"
+    return f"requirement-{file_name(section.name)}"

@@ -14,7 +14,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.counterexamples.export import export_counterexample
 from falsifier.counterexamples.export.inputs import input_table, start_values
-from falsifier.counterexamples.export.tables import matlab_name, write_csv, write_json, write_mat, write_ssv
+from falsifier.counterexamples.export.tables import matlab_names, write_csv, write_json, write_mat, write_ssv
 from falsifier.counterexamples.store import FILE_NAME, load, to_store
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -231,7 +231,7 @@ def test_the_mat_file_holds_time_and_value_by_names_that_matlab_accepts(tmp_path
     assert content["u"].tolist() == [[0.0, 0.0], [5.0, 0.0], [5.0, 1.0], [10.0, 1.0]]
     assert content["start_values"]["a_b_2_"][0, 0].item() == 3.0
     assert [[cell.item() for cell in row] for row in content["names"]] == [["u", "u"], ["a_b_2_", "a.b[2]"]]
-    assert matlab_name("1 x") == "x1_x"
+    assert matlab_names(["1 x", "1_x", "end"]) == {"1 x": "x1_x", "1_x": "x1_x_2", "end": "end_2"}
 
 
 def test_what_does_not_apply_is_left_out(tmp_path: Path) -> None:
