@@ -1,12 +1,13 @@
-# Two commands matter: `make demo` and `make test`. Both set up what they need in this folder.
+# The main targets are `make demo` and `make test`. Both install what they need in this folder.
 
-# The first Python on this machine that is new enough.
+# The first Python on this machine that is recent enough.
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test lint types pytest fmus clean
+.PHONY: demo test lint types pytest docs fmus clean
 
+# `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
 	@$(BIN)/falsifier run AT1 --out runs/demo-$$(date +%Y%m%d-%H%M%S); test $$? -eq 1
 
@@ -22,13 +23,16 @@ types: .venv/test
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest
 
-# Rebuilds every FMU in fmus/ from modelica/; the exporter has an environment of its own, because its parser and
-# the monitor's want different versions of one library.
+docs: .venv/test
+	$(BIN)/mkdocs build --strict
+
+# Rebuilds every FMU in fmus/ from modelica/. The exporter has its own environment, because pymoca and rtamt need
+# different versions of the antlr runtime.
 fmus: .venv-export/installed
 	$(MAKE) -C modelica PYTHON=$(CURDIR)/.venv-export/bin/python fmus
 
 .venv/installed: pyproject.toml constraints.txt
-	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is needed: install it, or say make PYTHON=/path/to/python3"; exit 2; }
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is required; install it, or run make PYTHON=/path/to/python3"; exit 2; }
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
 	@touch $@
@@ -38,10 +42,10 @@ fmus: .venv-export/installed
 	@touch $@
 
 .venv-export/installed: modelica/export/requirements.txt
-	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is needed: install it, or say make PYTHON=/path/to/python3"; exit 2; }
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is required; install it, or run make PYTHON=/path/to/python3"; exit 2; }
 	$(PYTHON) -m venv .venv-export
 	.venv-export/bin/pip install --quiet --disable-pip-version-check -r modelica/export/requirements.txt
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-export .mypy_cache .ruff_cache .pytest_cache .hypothesis runs
+	rm -rf .venv .venv-export build .mypy_cache .ruff_cache .pytest_cache .hypothesis runs

@@ -1,8 +1,8 @@
-"""Requirements as tests: ``pytest --falsifier specs/`` collects each requirement of each spec file.
+"""Requirements as pytest tests: ``pytest --falsifier specs/`` collects every requirement of every spec file.
 
-Stored counterexamples are run first, then a bounded search looks for a new one. Ordinary tests use the
-fixture ``falsifier_check``. This module stands outside the package, so that pytest loads nothing of the
-package unless it is asked to.
+Stored counterexamples are replayed first, then a search within a budget looks for a new one. Ordinary tests
+use the fixture ``falsifier_check``. This module is outside the package, because pytest imports its plugins at
+every start and the package takes time to import.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,22 +21,29 @@ _OPTIONS = ("budget", "engine", "seed")
 
 
 class FalsifiedError(AssertionError):
-    """A requirement is violated; the message is all that there is to say."""
+    """A requirement is violated; reported by its message alone, without a traceback."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options and their ini keys."""
     group = parser.getgroup("falsifier", "requirements of FMUs")
-    group.addoption("--falsifier", action="store_true", help="collect the requirements of spec files (.toml)")
     group.addoption(
-        "--falsifier-budget", metavar="N", type=int, help=f"simulations a requirement ({_DEFAULT_BUDGET})"
+        "--falsifier", action="store_true", help="collect the requirements in spec files (.toml) as tests"
     )
-    group.addoption("--falsifier-engine", metavar="NAME", help="search engine")
-    group.addoption("--falsifier-seed", metavar="N", type=int, help="seed of the engine (0)")
+    group.addoption(
+        "--falsifier-budget",
+        metavar="N",
+        type=int,
+        help=f"maximum number of simulations per requirement (default: {_DEFAULT_BUDGET})",
+    )
+    group.addoption(
+        "--falsifier-engine", metavar="NAME", help="search engine (default: as for falsifier run)"
+    )
+    group.addoption("--falsifier-seed", metavar="N", type=int, help="random seed (default: 0)")
     group.addoption(
         "--falsifier-database",
         metavar="DIR",
-        help=f"folder of stored counterexamples, relative to the root ({_DEFAULT_DATABASE})",
+        help=f"folder of stored counterexamples, relative to rootdir (default: {_DEFAULT_DATABASE})",
     )
     for name in (*_OPTIONS, "database"):
         parser.addini(f"falsifier_{name}", f"same as --falsifier-{name}")
@@ -46,12 +53,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker."""
     config.addinivalue_line(
         "markers",
-        "falsifier(budget=, engine=, seed=): how a requirement is checked; collected requirements bear it",
+        "falsifier(budget=, engine=, seed=): how to check a requirement; set on all collected requirements",
     )
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Collect spec files when --falsifier is given."""
+    """Collect spec files if --falsifier is given; other TOML files are left to other plugins."""
     if not parent.config.getoption("falsifier") or file_path.suffix != ".toml":
         return None
     import tomllib
@@ -69,7 +76,7 @@ class SpecFile(pytest.File):
     """A spec file; its requirements are the tests."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """Yield one item a requirement."""
+        """Yield one item per requirement."""
         from falsifier.errors import SpecError
         from falsifier.problem.spec import read_spec
 
@@ -87,11 +94,11 @@ class RequirementItem(pytest.Item):
     """One requirement."""
 
     def runtest(self) -> None:
-        """Check it."""
+        """Check the requirement with the options of the command line."""
         _check(self, f"{self.path}:{self.name}", {})
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Show what was found, without the plugin's own lines."""
+        """Show only the message of an expected failure, without a traceback through the plugin."""
         from falsifier.errors import FalsifierError
 
         if isinstance(excinfo.value, FalsifiedError | FalsifierError):
@@ -99,29 +106,32 @@ class RequirementItem(pytest.Item):
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """Where the item stands."""
+        """Report the spec file and the requirement as the item's location."""
         return self.path, None, f"{self.path.name}:{self.name}"
 
 
 @pytest.fixture
 def falsifier_check(request: pytest.FixtureRequest) -> Callable[..., "Checked"]:
-    """Fixture: ``falsifier_check(problem, budget=..., engine=..., seed=...)`` fails at a violation.
+    """Fixture: ``falsifier_check(problem, budget=..., engine=..., seed=...)`` fails if a violation is found.
 
-    The problem is a ``Problem``, or what ``falsifier run`` takes: ``"AT1"``, ``"my.toml:REQ"``.
+    The problem is a ``Problem``, or a target of ``falsifier run``: ``"AT1"``, ``"my.toml:REQ"``.
     """
 
     def check(problem: "Problem | str", **options: Any) -> "Checked":
         __tracebackhide__ = True
         unknown = options.keys() - set(_OPTIONS)
         if unknown:
-            raise TypeError(f"falsifier_check: unknown {sorted(unknown)}, known: {', '.join(_OPTIONS)}")
+            raise TypeError(
+                f"falsifier_check: unknown arguments {', '.join(sorted(unknown))}; expected some of "
+                f"{', '.join(_OPTIONS)}"
+            )
         return _check(request.node, problem, options)
 
     return check
 
 
 def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) -> "Checked":
-    """Check a problem and fail where it is violated."""
+    """Check a problem and fail if its requirement is violated."""
     __tracebackhide__ = True
     from falsifier.counterexamples.regression import check
     from falsifier.counterexamples.store import Database
@@ -152,13 +162,13 @@ def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) 
 
 
 def _setting(config: pytest.Config, name: str) -> Any:
-    """Value of the command line, else of the ini file, else None."""
+    """Value from the command line, otherwise from the ini file, otherwise None."""
     stated = config.getoption(f"falsifier_{name}")
     return stated if stated is not None else config.getini(f"falsifier_{name}") or None
 
 
 def _message(item: pytest.Item, checked: "Checked") -> str:
-    """Counterexample, its picture and the command that runs it again."""
+    """The counterexample, its picture, the command that replays it, and the explanation."""
     from falsifier.core.files import file_name
     from falsifier.core.words import candidate_lines
     from falsifier.counterexamples.explain import explain
@@ -169,11 +179,9 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     pictures = item.config.cache.mkdir("falsifier") if item.config.cache else item.config.rootpath
     picture = pictures / f"{file_name(problem.name)}.png"
     save_figure(plot_evaluation(problem, found.evaluation), picture)
-    how = (
-        "a stored counterexample violates it" if checked.result is None else "a search found a counterexample"
-    )
+    how = "stored counterexample" if checked.result is None else "counterexample found by a search"
     lines = [
-        f"{problem.name} is violated: {how}",
+        f"{problem.name} is violated by a {how}",
         f"  requirement    {problem.requirement.formula}",
         f"  confirmed      {found.reason}",
         *(f"  {line}" for line in candidate_lines(found.evaluation.candidate, problem.space)),
@@ -181,12 +189,12 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     ]
     if checked.file is not None:
         lines.append(f"  stored         {_short(checked.file)}")
-        lines.append(f"  again          {_command(item, checked)}")
+        lines.append(f"  replay with    {_command(item, checked)}")
     return "\n".join([*lines, "", explain(problem, found.evaluation).text])
 
 
 def _command(item: pytest.Item, checked: "Checked") -> str:
-    """Command that runs the counterexample again; of a problem made in Python, the test itself."""
+    """Command that replays the counterexample; if the problem was made in Python, the test itself."""
     from falsifier.counterexamples.store import load
 
     assert checked.file is not None
@@ -195,6 +203,6 @@ def _command(item: pytest.Item, checked: "Checked") -> str:
 
 
 def _short(path: Path) -> Path:
-    """Return the path as seen from the working directory, where it lies below."""
+    """Return the path relative to the working directory if it is below that."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path

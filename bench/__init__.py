@@ -1,1 +1,1 @@
-"""Measurements, run by hand; their results are the tables beside them."""
+"""Measurements, run by hand; the results are committed as the Markdown tables in this folder."""

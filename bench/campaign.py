@@ -1,4 +1,4 @@
-"""What campaigns and their reports cost beside the simulations.
+"""Overhead of campaigns and their reports, in addition to the simulations.
 
 Usage: python bench/campaign.py; prints the table. Committed result: bench/campaign.md.
 """
@@ -37,27 +37,26 @@ BUDGET = 1500
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure, and print the table."""
     print(f"Python {platform.python_version()}, {platform.machine()}; {SIMULATIONS} simulations each.\n")
-    print("| requirement | simulation ms | engine ms | judging ms | record and loop ms | share of the last |")
+    print("| requirement | simulation ms | engine ms | monitor ms | record and loop ms | share of the last |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for target in ("AT:AT1", "CC:CC4", "NN:NNx", "SC:SC"):
             print(overhead(target, Path(folder) / target.replace(":", "-")), flush=True)
         seconds, count = long_journal(Path(folder) / "AT-AT1", Path(folder) / "long")
-        print(f"\nA journal of {count} simulations is loaded in {seconds:.2f} s.")
+        print(f"\nLoading a journal of {count} simulations takes {seconds:.2f} s.")
         seconds, runs, size = full_report(Path(folder))
         print(
-            f"A report on {runs} runs of {BUDGET} simulations is written in {seconds:.1f} s, "
-            f"{size / 1e6:.1f} MB."
+            f"Writing a report on {runs} runs of {BUDGET} simulations ({size / 1e6:.1f} MB) takes "
+            f"{seconds:.1f} s."
         )
 
 
 def overhead(target: str, directory: Path) -> str:
-    """Return where the wall-clock time of a recorded run goes, per simulation, as a row of the table.
+    """Measure how the wall-clock time of a recorded run divides, per simulation; return a row of the table.
 
-    Judging is sampling the inputs and the monitor; record and loop is what is left beside the simulations,
-    the engine and judging.
+    "Monitor" includes sampling the inputs; "record and loop" is the remainder.
     """
     request = cross(suite_of(target), [Method("uniform")], seeds=[0], budget=Budget(SIMULATIONS))[0]
     problem = load_source(request.problems[0])
@@ -71,40 +70,40 @@ def overhead(target: str, directory: Path) -> str:
         whole = perf_counter() - started
     problem.model.close()
     simulating = result.spent.simulation_seconds
-    judging = executor.seconds - simulating
-    parts = [simulating, engine.seconds, judging, whole - executor.seconds - engine.seconds]
+    monitoring = executor.seconds - simulating
+    parts = [simulating, engine.seconds, monitoring, whole - executor.seconds - engine.seconds]
     cells = (f"{1e3 * part / result.spent.simulations:.3f}" for part in parts)
     return f"| {target.split(':')[1]} | {' | '.join(cells)} | {parts[-1] / whole:.1%} |"
 
 
 class TimedEngine:
-    """An engine and the seconds that it took."""
+    """An engine that measures the time spent in its ``ask`` and ``tell``, in s."""
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self.seconds = engine, 0.0
         self.name = engine.name
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Engine.ask."""
+        """Ask the wrapped engine and add the time that it takes."""
         started = perf_counter()
         candidates = self.engine.ask(n)
         self.seconds += perf_counter() - started
         return candidates
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Engine.tell."""
+        """Tell the wrapped engine and add the time that it takes."""
         started = perf_counter()
         self.engine.tell(evaluations)
         self.seconds += perf_counter() - started
 
 
 class TimedExecutor(Executor):
-    """Runs what it is given at once and counts the seconds."""
+    """Runs each task immediately in this process and adds the time that it takes, in s."""
 
     seconds = 0.0
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """See Executor.submit."""
+        """Run the task and return its finished future."""
         done: Future[Any] = Future()
         started = perf_counter()
         done.set_result(fn(*args, **kwargs))
@@ -113,12 +112,12 @@ class TimedExecutor(Executor):
 
 
 def suite_of(target: str) -> list[ProblemSource]:
-    """The suite's request for one target."""
+    """Return the suite's problem source for one target."""
     return [request for request in suite("arch-comp") if request.target == target]
 
 
 def long_journal(run: Path, place: Path) -> tuple[float, int]:
-    """Time to load a journal that repeats a run's lines, and its simulations."""
+    """Return the time in s to load a journal that repeats a run's lines, and its number of simulations."""
     place.mkdir()
     shutil.copy(run / "manifest.json", place)
     pairs = [
@@ -133,7 +132,11 @@ def long_journal(run: Path, place: Path) -> tuple[float, int]:
 
 
 def full_report(folder: Path) -> tuple[float, int, int]:
-    """Time to write the report of a whole suite whose runs all found something at their last simulation."""
+    """Measure writing the report of a whole suite in which every run falsified at its last simulation.
+
+    Returns:
+        Time in s, number of runs, size of the report in bytes.
+    """
     runs = cross(suite("arch-comp"), [Method("uniform")], seeds=range(10), budget=Budget(BUDGET))
     request = CampaignRequest(runs=runs, suite="arch-comp")
     directory = folder / "suite"
@@ -147,7 +150,7 @@ def full_report(folder: Path) -> tuple[float, int, int]:
 
 
 def make_run(request: RunRequest, place: Path) -> None:
-    """A run directory as a search leaves it, with one real simulation in place of all."""
+    """Write a run directory as a search does, but with one real simulation repeated."""
     problem = load_source(request.problems[0])
     place.mkdir(parents=True)
     (place / "trajectories").mkdir()
@@ -176,7 +179,7 @@ def make_run(request: RunRequest, place: Path) -> None:
             outcome="confirmed",
             robustness=-1.0,
             reference=-1.0,
-            reason="made for a measurement",
+            reason="written by a benchmark",
             spent={"simulations": BUDGET},
         )
         file.write(confirmed.model_dump_json() + "\n")

@@ -1,9 +1,9 @@
-"""What a search costs beyond the FMU: 1000 evaluations of AT1 with monitor and journal.
+"""Overhead of a search over the FMU's own time: 1000 evaluations of AT1 with monitor and journal.
 
     python -m bench.evaluations
 
-The FMU's own time is that of the same candidates simulated in the same worker, without sampling of
-inputs for the trajectory, without monitor and without journal.
+The FMU's own time is measured with the same candidates in the same worker, but without sampling of the
+inputs, monitor and journal.
 """
 
 import tempfile
@@ -17,11 +17,11 @@ ROUNDS = 3
 
 
 def main() -> None:
-    """Print the two times and their ratio, the best of some rounds."""
-    # A bound that no input reaches: all evaluations are made.
+    """Print both times and their ratio, the best of several rounds."""
+    # No input reaches this bound, so the search does not stop early.
     problem = load_problem("AT1", stl="G[0,20] (speed <= 1000)")
     candidates = make_engine("uniform", problem, seed=1).ask(COUNT)
-    for candidate in candidates[:20]:  # compiles, and starts the worker
+    for candidate in candidates[:20]:  # compiles the loops and starts the worker
         trajectory = problem.model.simulate(candidate.signals, {}, problem.experiment)
     monitor_for(problem).evaluate(trajectory)
     own, whole = [], []

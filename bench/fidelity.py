@@ -1,9 +1,10 @@
-"""Do the bundled systems behave as the published ones? Uniform random inputs tell.
+"""Do the bundled models behave like the published ones? A test with uniform random inputs.
 
-Samples each requirement's search space uniformly, counts violations, and sets 1/p beside the published mean
+Samples each requirement's search space uniformly, counts violations, and compares 1/p with the published mean
 number of simulations until the first violation. The mean of ten such numbers has a standard error of about
-1/p / sqrt(10), so z = (published / measured - 1) * sqrt(10). Where not all ten published runs falsified in
-1500 simulations, P is the probability of a number of falsified runs no likelier than the published one.
+1/p / sqrt(10), so z = (published / measured - 1) * sqrt(10). If not all ten published runs falsified within
+1500 simulations, P is the probability of a number of falsified runs that is no more likely than the published
+one.
 
     python bench/fidelity.py              # the table of bench/fidelity.md
     python bench/fidelity.py AT CC --share 0.1
@@ -31,13 +32,13 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Problems that share their simulations, and how many of them.
+    """Problems that share their simulations, and the number of simulations.
 
     Attributes:
-        requirements: names of bundled requirements over one search space.
+        requirements: names of bundled requirements with the same search space.
         samples: number of simulations.
-        variant: what is not as the spec says, for people; empty otherwise.
-        volume: share of the spec's search space that is sampled; no violation is known outside of it.
+        variant: difference from the spec, in words; empty if there is none.
+        volume: share of the spec's search space that is sampled; no violation is known outside it.
     """
 
     requirements: tuple[str, ...]
@@ -76,10 +77,10 @@ class Count:
 
     Attributes:
         requirement: its name.
-        row: where it was counted.
+        row: the simulated problems.
         samples: number of simulations.
-        violations: how many of them violate it.
-        lowest: smallest robustness seen.
+        violations: number of simulations that violate it.
+        lowest: lowest robustness.
     """
 
     requirement: str
@@ -121,7 +122,7 @@ def _cornered(problem: Problem) -> Problem:
 
 
 def count(system: str, row: Row, samples: int, seed: int) -> list[Count]:
-    """Simulate uniform candidates and judge each by all requirements of the row."""
+    """Simulate uniform random candidates and evaluate all requirements of the row on each."""
     rng = np.random.default_rng(seed)
     group = problems(system, row)
     first = group[0]
@@ -144,15 +145,15 @@ def count(system: str, row: Row, samples: int, seed: int) -> list[Count]:
 
 
 def expected_runs(probability: float, budget: int, runs: int) -> float:
-    """Expected number of runs that falsify within the budget."""
+    """Return the expected number of runs that falsify within the budget."""
     return runs * (1 - (1 - probability) ** budget)
 
 
 def agreement(found: Count, falsified: int, budget: int, runs: int) -> float:
-    """Probability of a number of falsified runs that is no likelier than the published one.
+    """Return the probability of a number of falsified runs that is no more likely than the published one.
 
-    The measured probability is known up to its counting error: its posterior is a gamma distribution
-    (Jeffreys' prior), over which the binomial distribution of falsified runs is averaged.
+    The measured probability has a counting error: its posterior is a gamma distribution (Jeffreys' prior),
+    over which the binomial distribution of falsified runs is averaged.
     """
     from scipy.stats import binom, gamma
 
@@ -164,7 +165,7 @@ def agreement(found: Count, falsified: int, budget: int, runs: int) -> float:
 
 
 def line(found: Count, published: dict[str, Any]) -> str:
-    """One line of the table."""
+    """Return one line of the table."""
     p = found.probability
     error = sqrt(found.violations) / found.samples * found.row.volume
     mean = 1 / p if p else inf
@@ -195,7 +196,7 @@ def _cells(texts: Sequence[str]) -> str:
 
 
 def table(systems: Sequence[str], share: float, seed: int) -> Iterator[str]:
-    """Lines of the table, each as soon as it is counted."""
+    """Yield the lines of the table, each as soon as it has been measured."""
     published = tomllib.loads((ROOT / "specs" / "published.toml").read_text(encoding="utf-8"))
     header = ["requirement", "violations", "p", "1/p", "lowest robustness"]
     header += ["published: falsified runs, mean", "expected runs", "agreement"]
@@ -210,8 +211,8 @@ def table(systems: Sequence[str], share: float, seed: int) -> Iterator[str]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("systems", nargs="*", default=list(ROWS), help=f"some of {', '.join(ROWS)}")
-    parser.add_argument("--share", type=float, default=1.0, help="share of the samples to take")
+    parser.add_argument("systems", nargs="*", default=list(ROWS), help=f"default: {', '.join(ROWS)}")
+    parser.add_argument("--share", type=float, default=1.0, help="fraction of the samples to simulate")
     parser.add_argument("--seed", type=int, default=20250601)
     options = parser.parse_args()
     started = time.perf_counter()

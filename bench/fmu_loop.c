@@ -1,7 +1,8 @@
-/* The least that a simulation can cost: a C program that makes the calls of one co-simulation and nothing else.
+/* Lower bound for the time of a simulation: a C program that makes the calls of one co-simulation and nothing else.
 
-   fmu_loop LIBRARY VERSION GUID STEPS STEP OUTPUT... , then one line on stdin per simulation with the input
-   samples' number (0: no input); answers with microseconds. Inputs are samples of a sine, computed before. */
+   fmu_loop LIBRARY VERSION GUID STEPS STEP INPUT OUTPUT...: INPUT and OUTPUT are value references, INPUT is -1 if
+   there is none. It simulates once per line on stdin and prints the time in microseconds. The input is a sine,
+   sampled beforehand. */
 
 #include <dlfcn.h>
 #include <math.h>

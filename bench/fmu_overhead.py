@@ -1,12 +1,11 @@
-"""What a simulation costs beyond the FMU.
+"""Overhead of a simulation over the FMU's own time.
 
 ``python -m bench.fmu_overhead [--rounds N] [--out bench/fmu_overhead.md]``
 
-Interleaved, one simulation of each kind in turn: fmpy.simulate_fmu, FmuModel in this process, FmuModel in its
-worker, and a C program that makes the same calls (bench/fmu_loop.c, needs a C compiler). The FMUs do one
-Runge-Kutta step of one or two states per communication step (tests/fixtures/fmus, Cheap*); where they have an
-input it varies in time, with 7 control points that are new for each simulation. Then 3000 simulations in a
-row, a crash, and a hang.
+Simulates in turn with fmpy.simulate_fmu, FmuModel in this process, FmuModel in its worker, and a C program
+that makes the same calls (bench/fmu_loop.c, needs a C compiler). The FMUs do one Runge-Kutta step of one or
+two states per communication step (tests/fixtures/fmus, Cheap*); if they have an input, it varies over time,
+with 7 control points that are new for each simulation. Then 3000 simulations in a row, a crash, and a hang.
 """
 
 import argparse
@@ -40,7 +39,7 @@ CASES = [
 
 
 class CProgram:
-    """The C program on one FMU."""
+    """The C program, running for one FMU."""
 
     def __init__(
         self, folder: Path, path: Path, steps: int, inputs: list[str], outputs: tuple[str, ...]
@@ -64,7 +63,7 @@ class CProgram:
         )  # fmt: skip
 
     def __call__(self) -> float:
-        """Simulate once; microseconds as the program measures them."""
+        """Simulate once; return the time in microseconds, measured by the program."""
         assert self._process.stdin is not None and self._process.stdout is not None
         self._process.stdin.write("\n")
         return float(self._process.stdout.readline())
@@ -77,14 +76,14 @@ class CProgram:
 
 
 def timed(action: Callable[[], object]) -> float:
-    """Microseconds of one call."""
+    """Return the time of one call in microseconds."""
     started = time.perf_counter()
     action()
     return 1e6 * (time.perf_counter() - started)
 
 
 def measure(name: str, steps: int, rounds: int, folder: Path) -> dict[str, NDArray[np.float64]]:
-    """Microseconds by kind of simulation, shape (rounds,) each."""
+    """Return the times in microseconds by kind of simulation, shape (rounds,) each."""
     from fmpy import simulate_fmu
 
     path = FMUS / f"{name}.fmu"
@@ -124,9 +123,9 @@ def measure(name: str, steps: int, rounds: int, folder: Path) -> dict[str, NDArr
     taken: dict[str, list[float]] = {kind: [] for kind in kinds}
     for k in range(rounds):
         for kind, action in kinds.items():
-            # fmpy takes a hundred times as long: one round in ten is enough of it.
+            # fmpy takes a hundred times as long, so it runs only in every tenth round.
             if kind != "fmpy" or k % 10 == 0:
-                action()  # caches are cold after another kind's turn
+                action()  # warms the caches after the other kinds
                 taken[kind].append(action())
     program.close()
     local.close()
@@ -135,18 +134,18 @@ def measure(name: str, steps: int, rounds: int, folder: Path) -> dict[str, NDArr
 
 
 def memory_kib(pid: int) -> int:
-    """Resident memory of a process."""
+    """Return the resident memory of a process in KiB."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
     return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS")))
 
 
 def descriptors() -> int:
-    """Number of open files of this process."""
-    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 (counts, does not need paths)
+    """Return the number of open files of this process."""
+    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 (counts names, needs no paths)
 
 
 def endurance(count: int) -> str:
-    """What 3000 simulations in a row leave behind."""
+    """Return a table of memory and open files before and after many simulations in a row."""
     lines = []
     for name in ("CheapLag_2", "NoReset_2"):
         model = FmuModel(FMUS / f"{name}.fmu")
@@ -169,7 +168,7 @@ def endurance(count: int) -> str:
 
 
 def failure(misdeed: int, limit: float) -> tuple[float, float]:
-    """Median milliseconds until a crash or hang is reported, and until the next simulation is done."""
+    """Return the median time in ms until a crash or hang is reported, and that of the next simulation."""
     model = FmuModel(FMUS / "Misdeeds_2.fmu")
     experiment = Experiment(1.0, 0.1, ("y",), time_limit=limit)
     noticed, recovered = [], []
@@ -186,14 +185,15 @@ def failure(misdeed: int, limit: float) -> tuple[float, float]:
 
 
 def report(rounds: int) -> str:
-    """The whole table as Markdown."""
+    """Return all results as Markdown."""
     load = os.getloadavg()[0]
     lines = [
-        "# What a simulation costs beyond the FMU",
+        "# Overhead of a simulation over the FMU's own time",
         "",
         f"`python -m bench.fmu_overhead --rounds {rounds}`; {platform.machine()}, {os.cpu_count()} cores, "
-        f"load {load:.1f} before the start, Python {platform.python_version()}. Microseconds: minimum "
-        "(median) of interleaved rounds; ratios: of minima (median of the ratios, for fmpy of medians).",
+        f"load {load:.1f} before the start, Python {platform.python_version()}. Times in microseconds: "
+        "minimum (median) of interleaved rounds; ratios of minima (median of the ratios; for fmpy, ratio of "
+        "medians).",
         "",
         "| FMU, steps | C program | in process | in a worker | fmpy.simulate_fmu | fmpy / in process "
         "| in process / C | worker - process |",
@@ -216,14 +216,15 @@ def report(rounds: int) -> str:
     crash, hang = failure(1, 60.0), failure(2, 0.2)
     lines += [
         "",
-        "3000 simulations in a row in a worker: KiB of resident memory and open files, before -> after.",
+        "3000 simulations in a row in a worker: resident memory in KiB and open files, before -> after.",
         "",
         "| FMU | parent | worker | open files |",
         "|---|---|---|---|",
         endurance(3000),
         "",
         f"A segmentation fault is reported after {crash[0]:.1f} ms; the next simulation takes {crash[1]:.1f} "
-        f"ms. An endless loop with a limit of 200 ms: {hang[0]:.0f} ms and {hang[1]:.1f} ms. Medians of 20.",
+        f"ms. An endless loop with a time limit of 200 ms: {hang[0]:.0f} ms and {hang[1]:.1f} ms. Medians of "
+        "20.",
         "",
     ]
     return "\n".join(lines)

@@ -1,7 +1,7 @@
-"""Time spent inside the bundled FMUs for one run: set inputs, doStep, get outputs in a compiled loop.
+"""Time spent inside the bundled FMUs per simulation: set inputs, doStep, get outputs in a compiled loop.
 
-Usage: python bench/fmu_speed.py [fmus/AT.fmu ...]; without names all FMI 2.0 FMUs of fmus/ are measured and
-the table is printed. Committed result: bench/fmu_speed.md.
+Usage: python bench/fmu_speed.py [fmus/AT.fmu ...]; default: all FMI 2.0 FMUs in fmus/. Prints the table.
+Committed result: bench/fmu_speed.md.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _bind(library: Any, name: str, arguments: list[Any], result: Any = ctypes.c_
 
 
 def make_loop(library: Any) -> Any:
-    """A compiled communication loop over the functions of one FMU."""
+    """Return a compiled communication loop over the functions of one FMU."""
     array = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
     set_real = _bind(library, "fmi2SetReal", array)
     get_real = _bind(library, "fmi2GetReal", array)
@@ -66,7 +66,7 @@ def make_loop(library: Any) -> Any:
 
 
 def measure(path: Path) -> list[Row]:
-    """Time one FMU with inputs that change at every communication step and with inputs held 0.05 s."""
+    """Time one FMU with inputs that change at every communication step, and with inputs held for 0.05 s."""
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
@@ -136,7 +136,7 @@ def measure(path: Path) -> list[Row]:
 
 
 def main() -> None:
-    """Measure and print the table."""
+    """Measure, and print the table."""
     from fmpy import read_model_description
 
     given = [Path(name) for name in sys.argv[1:]] or sorted((ROOT / "fmus").glob("*.fmu"))
@@ -146,8 +146,8 @@ def main() -> None:
     print(
         "`python bench/fmu_speed.py`: set inputs, doStep, get outputs in a numba loop on one core, no Python"
     )
-    print(f"in between. {RUNS} runs each, random inputs of {CONTROL_POINTS} control points; {processor}.\n")
-    print("| FMU | run | communication step | inputs | fastest ms | median ms |")
+    print(f"in between. {RUNS} simulations each, {CONTROL_POINTS} random control points; {processor}.\n")
+    print("| FMU | stop time | communication step | inputs | fastest ms | median ms |")
     print("|---|---|---|---|---|---|")
     for path in paths:
         for row in measure(path):

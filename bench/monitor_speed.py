@@ -1,12 +1,12 @@
 """How long does one robustness value take, here and in other monitors?
 
 Four formulas on trajectories of 501, 5001 and 50001 samples over 100 s. Each round runs every monitor on the
-same smooth trajectory, fast ones in blocks, and the table shows the processor time of the best round, as
-neighbours on the machine disturb upwards only; Python collects no garbage meanwhile. Formulas are parsed and
-compiled beforehand; ``here`` is the whole call from a trajectory to a verdict with robustness, critical time,
-predicate and values. rtamt gets the samples as lists, which it handles faster than arrays. stlrom has to load
-the samples, so its time is load and evaluation; the evaluation alone stands in brackets. Monitors that are
-not installed are left out, and so are runs that would take minutes.
+same smooth trajectory, fast ones in blocks. The table shows the processor time of the best round, because
+other processes can only increase it; garbage collection is off. Formulas are parsed and compiled beforehand;
+``here`` is the complete call from a trajectory to a verdict with robustness, critical time, predicate and
+values. rtamt gets the samples as lists, which it processes faster than arrays. stlrom has to load the
+samples, so its time is that of loading and evaluating, with the evaluation alone in parentheses. Monitors
+that are not installed are omitted, and so are evaluations that would take minutes.
 
     python bench/monitor_speed.py > bench/monitor_speed.md
 """
@@ -54,7 +54,7 @@ Call = Callable[[], float]
 
 
 def smooth(samples: int) -> Trajectory:
-    """Trajectory of 100 s in which all four formulas look at most of their windows."""
+    """Return a trajectory of 100 s that exercises most windows of all four formulas."""
     t = np.linspace(0.0, 100.0, samples)
     columns = {
         "speed": 60 + 50 * np.sin(t / 9) + 10 * np.sin(t / 1.3),
@@ -65,13 +65,13 @@ def smooth(samples: int) -> Trajectory:
 
 
 def here(name: str, t: Trajectory) -> Call:
-    """Our monitor, with everything that a verdict holds."""
+    """Return a call of our monitor, which computes a complete verdict."""
     monitor = Monitor(parse(FORMULAS[name]), 100.0 / (len(t) - 1), len(t))
     return lambda: monitor.evaluate(t).robustness
 
 
 def rtamt_discrete(name: str, t: Trajectory) -> Call | None:
-    """Discrete time, counted in samples of one second."""
+    """Return a call of rtamt in discrete time, counted in samples of one second; None if it is too slow."""
     if (name, len(t)) in TOO_SLOW:
         return None
     per_second = (len(t) - 1) // 100
@@ -84,7 +84,7 @@ def rtamt_discrete(name: str, t: Trajectory) -> Call | None:
 
 
 def rtamt_dense(name: str, t: Trajectory) -> Call:
-    """Dense time, in the default unit s."""
+    """Return a call of rtamt in dense time, in its default unit s."""
     specification = _rtamt().StlDenseTimeOfflineSpecification()
     _prepare(specification, t, RTAMT[name].format(*map(str, range(66))))
     times = t.times.tolist()
@@ -96,7 +96,7 @@ def rtamt_dense(name: str, t: Trajectory) -> Call:
 
 
 def stlrom(name: str, t: Trajectory, *, load: bool) -> Call:
-    """The monitor of Breach in dense time, with values held between samples."""
+    """Return a call of stlrom, Breach's monitor, in dense time, with values held between samples."""
     from stlrom import STLDriver  # type: ignore[import-not-found,unused-ignore]
 
     driver = STLDriver()
@@ -114,7 +114,7 @@ def stlrom(name: str, t: Trajectory, *, load: bool) -> Call:
 
 
 def installed(module: str) -> bool:
-    """Whether a peer can be imported."""
+    """Whether another monitor can be imported."""
     with contextlib.suppress(ImportError):
         __import__(module)
         return True
@@ -135,7 +135,7 @@ def _prepare(specification: Any, t: Trajectory, text: str) -> None:
 
 
 def measure(calls: dict[str, Call], rounds: int = 15) -> dict[str, float]:
-    """Seconds of each call in its best round; all run in turn, slow ones in fewer rounds."""
+    """Return the time in s of each call in its best round; they run in turn, slow ones in fewer rounds."""
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     gc.collect()
     gc.disable()
@@ -149,7 +149,7 @@ def measure(calls: dict[str, Call], rounds: int = 15) -> dict[str, float]:
 
 
 def _seconds(call: Call) -> float:
-    """Mean processor seconds of a call in a block of about 5 ms."""
+    """Return the mean processor time in s of a call in a block of about 5 ms."""
     started = time.process_time()
     call()
     once = time.process_time() - started
@@ -161,7 +161,7 @@ def _seconds(call: Call) -> float:
 
 
 def rows() -> Iterator[str]:
-    """Rows of the table of single trajectories."""
+    """Yield the rows of the table for single trajectories."""
     has_stlrom = installed("stlrom")
     for samples in LENGTHS:
         t = smooth(samples)
@@ -186,7 +186,7 @@ def _peer(seconds: float | None, ours: float) -> str:
 
 
 def batch() -> str:
-    """One line on many trajectories at once."""
+    """Return one line on the evaluation of many trajectories at once."""
     rng = np.random.default_rng(1)
     columns = {
         "speed": 40 + 15 * rng.standard_normal((1000, 101)),
@@ -201,7 +201,7 @@ def main() -> None:
     """Print the tables."""
     warnings.simplefilter("ignore")
     print("# Time of one robustness value\n")
-    print("Microseconds of processor time; `x` is the multiple of the time here. How it is measured:")
+    print("Processor time in microseconds; `x` is the multiple of the time here. Method: see")
     print("`bench/monitor_speed.py`. moonlight needs Java 21 and was not measured.\n")
     print(f"Machine: {platform.machine()}, Python {platform.python_version()}, 2 shared cores.\n")
     for name, text in FORMULAS.items():

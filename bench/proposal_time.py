@@ -1,9 +1,9 @@
-"""How long does an engine think about a proposal, and does that grow with the history?
+"""How long does an engine take for a proposal, and does that grow with the history?
 
     python bench/proposal_time.py                      # default engine, AT51, fixed parameterization
     python bench/proposal_time.py --engine bayesian --requirement CC4
 
-Processor time of asking and telling, in a search that goes on after a violation. Committed result:
+Processor time of ask and tell, in a search that continues after a violation. Committed result:
 bench/proposal_time.md.
 """
 
@@ -12,7 +12,7 @@ import os
 import time
 from itertools import pairwise
 
-# The engines' matrices are small: threads of the linear algebra cost more than they bring.
+# For the engines' small matrices, threads of the linear algebra cost more than they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -42,7 +42,7 @@ def main() -> None:
         engine.tell([evaluation])
         seconds.append(asking + time.process_time() - started)
     print(f"`{options.engine}` on {options.requirement}, seed {options.seed}.\n")
-    print("| earlier simulations | mean s | most s |\n|---|---|---|")
+    print("| earlier simulations | mean s | max s |\n|---|---|---|")
     for first, last in pairwise(EDGES):
         part = seconds[first:last]
         print(f"| {first} to {last - 1} | {sum(part) / len(part):.3f} | {max(part):.3f} |")

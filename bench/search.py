@@ -1,10 +1,10 @@
-"""How many simulations do the engines need? Measured beside the published numbers.
+"""How many simulations do the engines need, compared with the published numbers?
 
-Each run is a search by the public API until a violation is confirmed or the budget is used up. FR is the
+Each run is a search with the public API until a violation is confirmed or the budget is used up. FR is the
 number of falsified runs, S the mean number of simulations over them. Seeds 100 to 109 were not used while
-the engines were made. Dwell is the shortest time between two changes of a counterexample's inputs and
-switches their number, medians over the counterexamples: they say how plausible an input of a free
-parameterization is.
+developing the engines. Dwell is the shortest time between two changes of a counterexample's input, switches
+is the number of changes, both as medians over the counterexamples; they show how plausible the inputs of a
+free parameterization are.
 
     python bench/search.py                                    # default engine, free parameterization
     python bench/search.py --parameterization fixed --requirements CC1 CC2
@@ -20,7 +20,7 @@ from pathlib import Path
 from statistics import mean, median
 from typing import Any
 
-# The engines' matrices are small: threads of the linear algebra cost more than they bring.
+# For the engines' small matrices, threads of the linear algebra cost more than they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -39,7 +39,7 @@ LONG = {"CC4": 1500, "CCx": 1500}
 
 
 def row(requirement: str, results: Sequence[Result], published: dict[str, Any]) -> str:
-    """One line of the table."""
+    """Return one row of the table."""
     counts = [r.spent.simulations for r in results if r.falsified]
     found = [r.counterexample.candidate for r in results if r.counterexample is not None]
     dwells = [s.shortest_dwell for c in found for s in c.signals.values() if s.shortest_dwell is not None]
@@ -79,8 +79,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--engine", choices=sorted(set(ENGINES) - {"hybrid"}), default=DEFAULT_ENGINE)
     parser.add_argument("--requirements", nargs="+", choices=known, default=known, metavar="NAME")
-    parser.add_argument("--seeds", type=_seeds, default=range(100, 110), help="such as 100-109")
-    parser.add_argument("--budget", type=int, help="most simulations; 300, or 1500 where tools need hundreds")
+    parser.add_argument("--seeds", type=_seeds, default=range(100, 110), help="for example 100-109")
+    parser.add_argument(
+        "--budget",
+        type=int,
+        help="maximum number of simulations; default: 300, for CC4 and CCx 1500",
+    )
     parser.add_argument("--parameterization", choices=["free", "fixed"], default="free")
     options = parser.parse_args()
     published = tomllib.loads((ROOT / "specs" / "published.toml").read_text("utf-8"))
@@ -90,8 +94,8 @@ def main() -> None:
     )
     print(f" to {options.seeds[-1]}\n")
     print(
-        "| requirement | best tool FR: S | uniform FR: S | FR | S | median | most | dwell [s] | switches "
-        "| s/proposal | best of the others |"
+        "| requirement | best tool FR: S | uniform FR: S | FR | S | median | max | dwell [s] | switches "
+        "| s/proposal | best robustness of the other runs |"
     )
     print(f"|{'---|' * 11}")
     for requirement in options.requirements:

@@ -7,24 +7,24 @@
     problem = Problem.from_fmu("my.fmu", "G[0,10] (h >= 0)", inputs={"u": (-1, 1)})
     result = falsify(problem, budget=300)
 
-Everything heavy (numba, fmpy, litellm, matplotlib) is imported when it is first needed.
+Heavy dependencies (numba, fmpy, litellm, matplotlib) are imported on first use.
 
-The house has twelve rooms. Each imports from itself and from those above it, never from one below::
+The code is divided into twelve packages. Each imports only from itself and from those above it::
 
     core/             signals, search spaces, candidates, trajectories, models
     stl/              formulas, robustness and critical time
-    fmu/              what FMUs say of themselves, and how they are stepped
-    problem/          what is simulated, what must hold, what may be varied
-    evaluation/       one candidate in, one evaluation out
-    llm/              chat with language models
-    engines/          who suggests the next candidates
+    fmu/              reading and simulating FMUs
+    problem/          model, requirement and search space; spec files
+    evaluation/       simulating and judging one candidate
+    llm/              asking language models
+    engines/          suggesting the next candidates
     search/           one run: the loop, its budget, its record
-    counterexamples/  stored, shrunk, explained, exported
-    campaigns/        requirements x methods x seeds
-    views/            what people see
+    counterexamples/  storing, shrinking, explaining, exporting
+    campaigns/        runs of requirements x methods x seeds
+    views/            terminal text, figures, reports
     cli/              the command line
 
-Beside them stand errors (one tree) and testing (contracts for engines of your own).
+In addition, ``errors`` contains the exceptions and ``testing`` contract tests for engines of your own.
 """
 
 import sys
@@ -221,7 +221,7 @@ __all__ = [
 
 
 def _register_formatters() -> None:
-    """Have a notebook show the values of this package."""
+    """Let IPython show the values of this package as tables and figures."""
     from falsifier.views.notebook import register
 
     register()

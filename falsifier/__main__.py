@@ -1,4 +1,4 @@
-"""``python -m falsifier``: the command line, where ``falsifier`` itself is not on the path."""
+"""``python -m falsifier``: the command line, for when ``falsifier`` is not on the path."""
 
 from falsifier.cli import main
 

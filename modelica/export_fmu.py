@@ -2,7 +2,7 @@
 # requires-python = ">=3.11"
 # dependencies = ["pymoca==0.12.0", "antlr4-python3-runtime==4.13.2", "ziglang==0.17.0"]
 # ///
-"""Turn Modelica models into FMUs: `python modelica/export_fmu.py ArchComp.AT --output AT.fmu`."""
+"""Export Modelica models as FMUs: `python modelica/export_fmu.py ArchComp.AT --output AT.fmu`."""
 
 import sys
 

@@ -64,11 +64,11 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     assert first.returncode == 1, first.stdout + first.stderr
     assert "1 failed, 1 passed" in first.stdout
     for part in (
-        "fast is violated: a search found a counterexample",
+        "fast is violated by a counterexample found by a search",
         "throttle [%] constant 100",
         "brake [ft.lbf] constant 0",
-        "It takes throttle",
-        "again          falsifier replay counterexamples/car.fast/",
+        "Throttle is necessary",
+        "replay with    falsifier replay counterexamples/car.fast/",
     ):
         assert part in first.stdout
     pictures = [line.split()[-1] for line in first.stdout.splitlines() if line.startswith("  picture ")]
@@ -77,7 +77,7 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     assert [p.parent.name for p in stored] == ["car.fast"]
     assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
     second = run_pytest(repository, "--falsifier", "specs", "-k", "fast")
-    assert "fast is violated: a stored counterexample violates it" in second.stdout
+    assert "fast is violated by a stored counterexample" in second.stdout
     assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").returncode == 5
 
 
@@ -126,8 +126,8 @@ def test_typo(falsifier_check):
     )
     done = run_pytest(repository, "tests")
     assert "1 failed, 4 passed" in done.stdout, done.stdout
-    assert "LAG is violated: a search found a counterexample" in done.stdout
-    assert "again          pytest 'tests/test_lag.py::test_violated'" in done.stdout
+    assert "LAG is violated by a counterexample found by a search" in done.stdout
+    assert "replay with    pytest 'tests/test_lag.py::test_violated'" in done.stdout
     assert "pytest_falsifier.py" not in done.stdout
 
 

@@ -52,7 +52,7 @@ class Schedule:
             proceed = tick() and proceed
 
     def _submit(self) -> None:
-        if self._suspects:
+        if self._suspects:  # alone, so that a dead worker identifies its run
             if not self._running:
                 self._start(self._suspects.popleft())
             return

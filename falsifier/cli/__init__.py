@@ -1,4 +1,4 @@
-"""The command line. Commands live in their own modules and are imported when they are used."""
+"""The command line. The modules of commands are imported only when a command is used."""
 
 import errno
 import os
@@ -21,32 +21,32 @@ from falsifier.cli.streams import (
 from falsifier.errors import FalsifierError, did_you_mean
 from falsifier.views.terminal import warn
 
-# What a shell reports of a program whose reader has gone: 128 + SIGPIPE.
+# Exit code that a shell reports for a program whose pipe was closed: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
 _FAILED = 3
 # What a machine has run out of: disk, quota, memory, files, processes.
 _EXHAUSTED = frozenset((errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EAGAIN))
 
-# name: (module, what --help says)
+# name: (module, summary in --help)
 _COMMANDS = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
     "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
-    "replay": ("falsifier.cli.counterexample", "Run a stored counterexample again."),
+    "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
     "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),
-    "explain": ("falsifier.cli.counterexample", "Say why a counterexample violates and what it takes."),
+    "explain": ("falsifier.cli.counterexample", "Explain why a counterexample violates."),
     "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
-    "robustness-map": ("falsifier.cli.counterexample", "Show how far a violation reaches around it."),
-    "bench": ("falsifier.cli.campaign", "Run requirements x engines x seeds; print the protocol's table."),
-    "watch": ("falsifier.cli.campaign", "Follow a running campaign from another shell."),
-    "report": ("falsifier.cli.report", "Write a page, tables or JUnit results of a run or campaign."),
-    "validate": ("falsifier.cli.report", "Re-simulate counterexamples in the competition's format."),
-    "info": ("falsifier.cli.inspect", "Show what an FMU says of itself."),
+    "robustness-map": ("falsifier.cli.counterexample", "Map the robustness around a counterexample."),
+    "bench": ("falsifier.cli.campaign", "Run requirements x methods x seeds, and print a table."),
+    "watch": ("falsifier.cli.campaign", "Follow a running campaign from another terminal."),
+    "report": ("falsifier.cli.report", "Report on a run or campaign: HTML, Markdown, JUnit XML."),
+    "validate": ("falsifier.cli.report", "Re-simulate counterexamples in ARCH-COMP format."),
+    "info": ("falsifier.cli.inspect", "Show an FMU's interfaces, variables, units and ranges."),
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
     "build": ("falsifier.cli.inspect", "Compile an FMU's C sources for this platform."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
     "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
-    "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model; send nothing."),
-    "llm": ("falsifier.cli.llm", "Check a language model: its name, its key and one small round trip."),
+    "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model."),
+    "llm": ("falsifier.cli.llm", "Check a language model with one short request."),
 }
 
 
@@ -78,23 +78,23 @@ _HELP = """Find inputs that make an FMU violate a requirement.
 
 \b
 falsifier run AT1                                      a bundled problem
-falsifier run my.toml:REQ --budget 300                 one of your own
+falsifier run my.toml:REQ --budget 300                 a requirement of your own
 falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --input u=-1:1:5
 
-Exit code 0: nothing falsified, 1: falsified, 2: wrong usage or spec, 3: simulator, language model or
-machine failed, 130: interrupted.
+Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or spec, 3 simulator, language model or machine
+failed, 130 interrupted.
 """
 
 
 @click.command(cls=_LazyGroup, help=_HELP, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="falsifier")
 def cli() -> None:
-    """Run the command that was named."""
+    """Run the given command; its help text is _HELP."""
 
 
 def main() -> NoReturn:
-    """Entry point: every error ends with its exit code, and never with the code of a falsification."""
-    # The engines' matrices are small: threads of the algebra library only get in each other's way.
+    """Entry point; no error ends with exit code 1, which means falsified."""
+    # The engines' matrices are small: threads of the linear algebra library would only slow them down.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     open_streams()
     stop_at_interrupts()
@@ -107,7 +107,7 @@ def main() -> NoReturn:
 def _carried_out(arguments: list[str]) -> int:
     """Carry out a command; return its exit code."""
     try:
-        # Not cli.main, which ends with 1, the code of a falsification, when a pipe is closed.
+        # Not cli.main: it ends with exit code 1, which means falsified, if a pipe is closed.
         with cli.make_context("falsifier", arguments) as context:
             cli.invoke(context)
         return 0
@@ -138,7 +138,7 @@ def _carried_out(arguments: list[str]) -> int:
 
 
 def _report_refusal(error: OSError) -> int:
-    """Say what the operating system refused; return the exit code."""
+    """Print what the operating system refused; return the exit code."""
     where = "" if error.filename is None else f"{error.filename}: "
     if error.errno in _EXHAUSTED:
         warn(f"falsifier: {where}{error.strerror}; free some, then run the command again")
@@ -146,5 +146,8 @@ def _report_refusal(error: OSError) -> int:
     if error.filename is None:
         warn(f"falsifier: {error}")
         return _FAILED
-    warn(f"falsifier: {where}{error.strerror}; choose a place that can be read and written, with --out DIR")
+    warn(
+        f"falsifier: {where}{error.strerror}; choose a readable and writable location, for example with "
+        "--out DIR"
+    )
     return 2

@@ -1,5 +1,6 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
+import shlex
 import time
 from datetime import datetime
 from itertools import product
@@ -22,9 +23,29 @@ from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
 from falsifier.campaigns.suites import SUITES
-from falsifier.cli.options import asking, asking_options, json_option, quiet_option
+from falsifier.cli.options import (
+    asking,
+    asking_options,
+    budget_option,
+    directory_argument,
+    effort_option,
+    engine_option,
+    executor_option,
+    jobs_option,
+    json_option,
+    limit_options,
+    llm_option,
+    out_option,
+    parameterization_option,
+    profile_option,
+    quiet_option,
+    seed_option,
+    total_options,
+    variant_option,
+)
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
+from falsifier.core.words import counted
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
@@ -32,51 +53,62 @@ from falsifier.search.request import Effort, LLMSettings
 from falsifier.views.campaign_text import campaign_display, overall_line
 from falsifier.views.terminal import warn
 
-# Time in s between two looks of falsifier watch.
+# Time in s between two updates of falsifier watch.
 _WATCH_PERIOD = 0.5
+# Simulations per run that the competition's protocol allows.
+_PROTOCOL_BUDGET = 1500
 
-jobs_option = click.option(
-    "--jobs", type=int, default=1, show_default=True, help="Runs at a time on this machine."
-)
-executor_option = click.option(
-    "--executor",
-    metavar="dask:tcp://HOST:PORT",
-    help="Run on a Dask cluster instead. Workers that do not see DIR are stopped by --total-... between runs "
-    "only.",
-)
-table_option = click.option(
-    "--table", "table", type=click.Choice(list(TABLES)), default="main", show_default=True
-)
+_BENCH_HELP = """Run requirements x methods x seeds and print a table in the format of the ARCH-COMP category.
+
+TARGETS are requirements (AT1) or specs with all their requirements (my.toml); without any, give --suite.
+
+\b
+falsifier bench --suite arch-comp --engine surrogate --runs 10 --budget 1500 --jobs 2
+falsifier bench AT CC --llm openai/gpt-5-nano@low --variant MP1 --variant MP4 --table ablation
+
+Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or were stopped.
+"""
 
 
-@click.command()
+@click.command(help=_BENCH_HELP)
 @click.argument("targets", nargs=-1)
-@click.option("--suite", "suite_name", type=click.Choice(SUITES), help="A known list of requirements.")
-@click.option("--instance", type=click.Choice(["1", "2"]), help="Of the suite: its parameterization.")
-@click.option("--profile", help="Another parameterization that the specs offer.")
+@click.option("--suite", "suite_name", type=click.Choice(SUITES), help="Published list of requirements.")
 @click.option(
-    "--parameterization", multiple=True, type=click.Choice(["fixed", "free"]), help="Default: fixed."
+    "--instance",
+    type=click.Choice(["1", "2"]),
+    help="Parameterization of the suite, as the category numbers it.",
 )
-@click.option("--engine", "engines", multiple=True, metavar="NAME", help="Search engine. Repeatable.")
-@click.option("--llm", "llms", multiple=True, metavar="NAME[@EFFORT]", help="Language model. Repeatable.")
-@click.option("--effort", type=click.Choice(get_args(Effort)), help="Of llms without one of their own.")
-@click.option("--variant", "variants", multiple=True, metavar="MP1..", help="Prompt variant. Repeatable.")
+@profile_option
+@parameterization_option(multiple=True)
+@engine_option(multiple=True)
+@llm_option(multiple=True)
+@effort_option
+@variant_option(multiple=True)
 @asking_options
-@click.option("--runs", type=click.IntRange(1), default=10, show_default=True, help="Runs of each.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the first run; others count up.")
-@click.option("--budget", type=int, default=1500, show_default=True, help="Most simulations a run.")
-@click.option("--seconds", type=float, help="Most wall-clock seconds a run.")
-@click.option("--max-tokens", type=int, help="Most tokens of the language model a run.")
-@click.option("--max-cost", type=float, help="Most US dollars for the language model a run.")
-@click.option("--total-budget", type=int, help="Most simulations of all runs together.")
-@click.option("--total-seconds", type=float, help="Most wall-clock seconds of the campaign.")
-@click.option("--total-tokens", type=int, help="Most tokens of all runs together.")
-@click.option("--total-cost", type=float, help="Most US dollars of all runs together.")
-@click.option("--calls", type=click.IntRange(1), default=8, show_default=True, help="Model runs at a time.")
-@jobs_option
+@click.option(
+    "--runs",
+    type=click.IntRange(1),
+    default=10,
+    show_default=True,
+    help="Number of runs per requirement and method, each with its own seed.",
+)
+@seed_option("Random seed of the first run; the others count up.")
+@budget_option(_PROTOCOL_BUDGET, note=" per run")
+@limit_options(note=" per run")
+@total_options
+@click.option(
+    "--calls",
+    type=click.IntRange(1),
+    default=8,
+    show_default=True,
+    help="Maximum number of concurrent runs that use a language model.",
+)
+@jobs_option("runs")
 @executor_option
-@table_option
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Default: runs/NAME-TIME.")
+@click.option(
+    "--table", type=click.Choice(list(TABLES)), default="main", show_default=True, help="Table to print."
+)
+@out_option("Campaign directory; default: runs/bench-TIME.", metavar="DIR")
 @quiet_option
 @json_option
 def bench(
@@ -109,25 +141,15 @@ def bench(
     as_json: bool,
     **options: Any,
 ) -> None:
-    r"""Run requirements x methods x seeds and print the protocol's table.
-
-    TARGETS are requirements (AT1), specs with all their requirements (my.toml), or none with --suite.
-
-    \b
-    falsifier bench --suite arch-comp --engine surrogate --runs 10 --budget 1500 --jobs 2
-    falsifier bench AT CC --llm openai/gpt-5-nano@low --variant MP1 --variant MP4 --table ablation
-
-    Exit code 0: all runs finished; 3: some failed or were stopped.
-    """
     if instance is not None:
         if suite_name is None or profile is not None:
-            raise click.UsageError("--instance belongs to --suite, and goes without --profile")
+            raise click.UsageError("--instance requires --suite and cannot be combined with --profile")
         profile = "instance2" if instance == "2" else None
     if bool(targets) == (suite_name is not None):
-        raise click.UsageError("give requirements or specs, or --suite")
+        raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
-    methods = _methods(engines, llms, effort, variants, parameterization or ("fixed",), profile or "", how)
+    methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)
     request = CampaignRequest(
         runs=cross(
@@ -142,19 +164,19 @@ def bench(
         suite=suite_name,
     )
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
-    warn(f"{len(request.runs)} runs in {directory}")
+    warn(f"{counted(len(request.runs), 'run')} in {directory}")
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
 
 
 @click.command()
-@click.argument("directory", type=click.Path(path_type=Path))
-@click.option("--once", is_flag=True, help="Say how far it is, and end.")
+@directory_argument
+@click.option("--once", is_flag=True, help="Print the current progress and exit.")
 def watch(*, directory: Path, once: bool) -> None:
-    """Follow the campaign in DIRECTORY from another shell until it ends or is stopped.
+    """Follow the campaign in DIRECTORY from another terminal until it ends or is stopped.
 
-    Nothing is written there.
+    This writes nothing to DIRECTORY.
     """
     follower = Follower(directory)
     working = is_worked_on(directory)
@@ -165,23 +187,23 @@ def watch(*, directory: Path, once: bool) -> None:
                 time.sleep(_WATCH_PERIOD)
                 working = is_worked_on(directory)
             show(follower.look())
-    progress = follower.look()  # after the lock: who let it go has written everything
+    progress = follower.look()  # after the lock was released: by then everything has been written
     say(overall_line(progress, None, stopped=not working))
     if not working and progress.finished < len(progress.runs):
-        say(f"stopped; falsifier resume {directory} goes on")
+        say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
 
 
 def resume_campaign(
     directory: Path, *, jobs: int, executor: str | None, limits: Budget | None, quiet: bool, as_json: bool
 ) -> None:
-    """Go on with a campaign for ``falsifier resume``."""
+    """Continue a campaign, for ``falsifier resume``."""
     with campaign_display(quiet=quiet) as show:
         outcome = _resume(directory, jobs=jobs, executor=executor, limits=limits, listeners=[show])
     finish(directory, outcome, table="main", as_json=as_json)
 
 
 def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> NoReturn:
-    """Save the tables, print one, and end with the exit code."""
+    """Save all tables, print one of them, and exit with the campaign's exit code."""
     runs, published = load(directory), read_published()
     for name, make in TABLES.items():
         made = make(runs, published)
@@ -190,17 +212,18 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
             write_whole(directory / f"table-{name}.csv", made.csv())
     data = statistics_json(runs)
     write_whole(directory / "table.json", data)
+    again = f"falsifier resume {shlex.quote(str(directory))}"
     if outcome.reason:
-        warn(f"stopped: {outcome.reason}; go on with: falsifier resume {directory}")
+        warn(f"stopped: {outcome.reason}; to continue: {again}")
     failed = outcome.progress.counts["failed"]
     if failed:
-        warn(f"{failed} runs failed; falsifier resume {directory} tries them again")
+        warn(f"{counted(failed, 'run')} failed; to retry: {again}")
     text = data if as_json else TABLES[table](runs, published).text()
     conclude(text, 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:
-    """One source for each requirement; a spec without a requirement's name stands for all that it has."""
+    """One source per requirement; a spec without a requirement's name stands for all its requirements."""
     return [
         source for target in targets for source in sources_of(ProblemSource(target=target, profile=profile))
     ]
@@ -215,9 +238,9 @@ def _methods(
     profile: str,
     how: LLMSettings,
 ) -> list[Method]:
-    """Engines alone, or engines x LLMs x variants if an LLM is named; each in all parameterizations."""
+    """Engines alone, or engines x LLMs x variants if an LLM is named; each with all parameterizations."""
     if not llms and (variants or effort):
-        raise click.UsageError("--variant and --effort need --llm NAME")
+        raise click.UsageError("--variant and --effort require --llm NAME")
     named = [_llm(llm, effort) for llm in llms] or [("", "")]
     return [
         Method(engine, llm, level, variant, parameterization, profile, how.anonymous, how.fallback or "")
@@ -228,6 +251,6 @@ def _methods(
 
 
 def _llm(text: str, effort: str | None) -> tuple[str, str]:
-    """Name and effort of ``NAME`` or ``NAME@EFFORT``; other texts behind an @ belong to the name."""
+    """Split ``NAME[@EFFORT]`` into name and effort; any other text after an @ belongs to the name."""
     name, _, level = text.rpartition("@")
     return (name, level) if name and level in get_args(Effort) else (text, effort or "")

@@ -1,18 +1,28 @@
-"""What is done with a counterexample: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``."""
+"""Commands on counterexamples: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
-from falsifier.cli.options import json_option
+from falsifier.cli.options import (
+    api_base_option,
+    budget_option,
+    effort_option,
+    json_option,
+    llm_option,
+    out_option,
+    run_argument,
+    seed_option,
+    store_option,
+)
 from falsifier.cli.output import conclude, say
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import candidate_lines, in_one_line
+from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.store import (
     Database,
     Replayed,
@@ -31,21 +41,23 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.views.terminal import warn
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def _run_argument(command: F) -> F:
-    return click.argument("run", metavar="RUN", type=click.Path(path_type=Path))(command)
+# Shrinking usually reaches a local minimum with fewer simulations.
+_SHRINK_BUDGET = 500
 
 
 @click.command()
-@_run_argument
-@click.option("--other-interface", "other", is_flag=True, help="Simulate through the FMU's other interface.")
+@run_argument
+@click.option(
+    "--other-interface", "other", is_flag=True, help="Simulate through the FMU's other FMI interface."
+)
 @json_option
 def replay(*, run: Path, other: bool, as_json: bool) -> None:
-    """Run a counterexample again, whatever has changed since; exit code 1 when it still violates.
+    """Simulate a counterexample again, even if the FMU or the requirement has changed since.
 
     RUN is a run directory or a counterexample file.
+
+    Exit codes: 0 no longer violated, or fragile, 1 still violated, 2 it does not fit the problem, 3 the
+    simulation failed.
     """
     stored = load(run)
     with _problem(stored) as problem:
@@ -59,18 +71,22 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
 
 
 @click.command()
-@_run_argument
-@click.option("--budget", type=int, default=500, show_default=True, help="Most simulations.")
-@click.option("--margin", type=float, default=0.0, help="Keep the robustness at or below minus this.")
-@click.option("--out", type=click.Path(path_type=Path), help="File; default: shrunk.json beside RUN's.")
+@run_argument
+@budget_option(_SHRINK_BUDGET)
 @click.option(
-    "--store", type=click.Path(path_type=Path), help="Keep it in this folder of counterexamples too."
+    "--margin",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Keep the robustness at or below minus this value.",
 )
+@out_option("File to write; default: shrunk.json in RUN's directory.")
+@store_option
 @json_option
 def shrink(
     *, run: Path, budget: int, margin: float, out: Path | None, store: Path | None, as_json: bool
 ) -> None:
-    """Make a counterexample as simple as possible while it violates; the original is kept.
+    """Make a counterexample as simple as possible such that it still violates; the original is kept.
 
     RUN is a run directory or a counterexample file.
     """
@@ -94,13 +110,17 @@ def shrink(
     written = write_counterexample(confirmation, file.parent, name=file.name)
     if store is not None:
         written.append(Database(store).save(problem, to_store(confirmation)))
-    end = "a local minimum" if shrunk.minimal else f"the budget of {budget} simulations is used up"
+    end = (
+        "no simpler one found nearby"
+        if shrunk.minimal
+        else f"the budget of {counted(budget, 'simulation')} is used up"
+    )
     if as_json:
         content = _confirmation_json(confirmation)
         content |= {"minimal": shrunk.minimal, "simulations": shrunk.simulations}
         say(json.dumps(content | {"files": list(map(str, written))}, indent=2))
         return
-    say(f"{problem.name}: shrunk with {shrunk.simulations} simulations, {end}")
+    say(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
     say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
     for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
         say(f"  {line}")
@@ -108,21 +128,22 @@ def shrink(
 
 
 @click.command()
-@_run_argument
-@click.option("--llm", metavar="NAME", help="Language model that tells it in its own words, too.")
-@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the LLM.")
-@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
+@run_argument
+@llm_option()
+@effort_option
+@api_base_option
 @json_option
 def explain(*, run: Path, llm: str | None, effort: str | None, api_base: str | None, as_json: bool) -> None:
-    """Say in a paragraph why a counterexample violates and which inputs it takes.
+    """Explain in one paragraph why a counterexample violates and which inputs are necessary.
 
-    RUN is a run directory or a counterexample file.
+    RUN is a run directory or a counterexample file. With --llm, a language model describes it in its own
+    words, too.
     """
     from falsifier.counterexamples.explain import explain as explain_violation
     from falsifier.counterexamples.explain import narrate
 
     if llm is None and (effort is not None or api_base is not None):
-        raise click.UsageError("--effort and --api-base need --llm NAME")
+        raise click.UsageError("--effort and --api-base require --llm NAME")
     stored = load(run)
     chat = None
     if llm is not None:
@@ -144,13 +165,9 @@ def explain(*, run: Path, llm: str | None, effort: str | None, api_base: str | N
 
 
 @click.command()
-@_run_argument
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Default: export beside RUN's file."
-)
-@click.option(
-    "--store", type=click.Path(path_type=Path), help="Keep it in this folder of counterexamples too."
-)
+@run_argument
+@out_option("Directory to write; default: export in RUN's directory.", metavar="DIR")
+@store_option
 def export(*, run: Path, out: Path | None, store: Path | None) -> None:
     """Write a counterexample for FMPy, fmusim, OpenModelica, Simulink and pytest.
 
@@ -169,21 +186,25 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
 
 
 @click.command("robustness-map")
-@_run_argument
+@run_argument
 @click.option(
-    "--radius", type=float, default=0.05, show_default=True, help="Largest change, share of a range."
+    "--radius",
+    type=float,
+    default=0.05,
+    show_default=True,
+    help="Largest change of an input, as a share of its range.",
 )
-@click.option("--samples", type=int, default=256, show_default=True, help="Simulations of random changes.")
-@click.option("--grid", type=int, default=21, show_default=True, help="Points a side of the map.")
-@click.option("--seed", type=int, default=0, show_default=True)
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Picture; default: robustness-map.png beside RUN's."
+    "--samples", type=int, default=256, show_default=True, help="Number of random changes to simulate."
 )
+@click.option("--grid", type=int, default=21, show_default=True, help="Points per side of the map.")
+@seed_option()
+@out_option("Picture to write; default: robustness-map.png in RUN's directory.")
 @json_option
 def robustness_map(
     *, run: Path, radius: float, samples: int, grid: int, seed: int, out: Path | None, as_json: bool
 ) -> None:
-    """Sample around a counterexample and draw where the violation persists.
+    """Change the inputs of a counterexample at random and plot where they still violate.
 
     RUN is a run directory or a counterexample file.
     """
@@ -210,7 +231,7 @@ def robustness_map(
 
 
 def _beside(run: Path, name: str) -> Path:
-    """Place beside a counterexample's file; of several in one folder each has its own."""
+    """Path next to a counterexample's file, with its suffix if the directory contains several."""
     file, place = counterexample_file(run), Path(name)
     which = file.stem.removeprefix("counterexample") if file.stem.startswith("counterexample-") else ""
     return file.with_name(f"{place.stem}{which}{place.suffix}")
@@ -218,7 +239,7 @@ def _beside(run: Path, name: str) -> Path:
 
 @contextmanager
 def _problem(stored: StoredCounterexample) -> Iterator[Problem]:
-    """Problem of a counterexample, its model closed at the end."""
+    """Load the problem of a counterexample, and close its model at the end."""
     problem = problem_of(stored)
     try:
         yield problem
@@ -229,8 +250,11 @@ def _problem(stored: StoredCounterexample) -> Iterator[Problem]:
 def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
     evaluation = evaluate(problem, problem.space.admit(Candidate.from_json(stored.candidate)))
     if not evaluation.violated:
-        found = evaluation.reason or f"its robustness is {evaluation.robustness:+.6g} now"
-        raise SpecError(f"the counterexample of {problem.name} does not violate any more: {found}")
+        found = evaluation.reason or f"its robustness is now {evaluation.robustness:+.6g}"
+        raise SpecError(
+            f"the counterexample of {problem.name} no longer violates: {found}; to search for another one: "
+            "falsifier run"
+        )
     return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
 
 

@@ -1,4 +1,4 @@
-"""Files that commands leave behind: a counterexample as JSON with its picture beside it."""
+"""Files written by several commands: a counterexample as JSON, and its picture."""
 
 from pathlib import Path
 
@@ -9,14 +9,14 @@ from falsifier.views.terminal import warn
 
 
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
-    """Write a counterexample as JSON, as ``falsifier replay`` reads it, and as a picture; return the files.
+    """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
 
     A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it.
 
     Args:
         confirmation: the violation.
         directory: where to write.
-        name: of the JSON file; the picture is named like it.
+        name: name of the JSON file; the picture has the same name, with the extension .png.
 
     Raises:
         OSError: if the JSON file cannot be written.

@@ -1,6 +1,7 @@
-"""``falsifier info``, ``init``, ``build``, ``check`` and ``schema``: everything that does not search."""
+"""``falsifier info``, ``init``, ``build``, ``check`` and ``schema``: commands that do not search."""
 
 import json
+import shlex
 import sys
 from dataclasses import asdict
 from os.path import relpath
@@ -9,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import json_option
+from falsifier.cli.options import json_option, out_option, profile_option
 from falsifier.cli.output import say
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.signals import Signal
+from falsifier.core.words import counted
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import default_interface, default_interval
 from falsifier.problem.loading import load_problems
@@ -27,27 +29,30 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-# Rows of a table of parameters or states; models have thousands of them.
+# Maximum rows of a table: models may have thousands of parameters or states.
 _SHOWN_VARIABLES = 60
-# Seconds that are simulated to check the step where the FMU gives no stop time.
+# Simulated time in s for info --check if the FMU states no stop time.
 _CHECKED_SECONDS = 10.0
 _NO_INTERFACE = "no interface that can be simulated (scheduled execution is not supported)"
-# Columns of text where the width of the terminal cannot be asked.
+# Text width if the output is not a terminal.
 _PIPED_WIDTH = 160
 
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("--all", "everything", is_flag=True, help="Show all variables, internal ones too.")
+@click.option("--all", "everything", is_flag=True, help="Show all variables, including internal ones.")
 @click.option(
     "--check",
     "checked",
     is_flag=True,
-    help="Simulate with the step and with half of it: how far outputs move.",
+    help="Simulate with the step and with half of it, and show the largest differences of the outputs.",
 )
 @json_option
 def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
-    """Show what an FMU, or that of a spec file, says of itself: interfaces, variables, units and ranges."""
+    """Show an FMU's interfaces, variables, units and ranges.
+
+    FMU is an FMU, the name of a bundled one (AT), or a spec file, which stands for its FMU.
+    """
     from falsifier.fmu import read_info
 
     source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
@@ -62,11 +67,9 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), help="FMU to write; default: NAME-PLATFORM.fmu."
-)
+@out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
-    """Compile the C sources inside an FMU for this platform and write a copy of it with the library."""
+    """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
     from falsifier.fmu.build import build as compile_sources
 
     written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
@@ -75,30 +78,30 @@ def build(*, fmu: Path, out: Path | None) -> None:
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="Spec file; default: beside the FMU.")
+@out_option("Spec file to write; default: NAME.toml in the FMU's directory.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(*, fmu: Path, out: Path | None, force: bool) -> None:
-    """Write a starter spec for an FMU; it loads as it is."""
+    """Write a starter spec for an FMU: valid, and to be completed with ranges and requirements."""
     from falsifier.fmu import FmuModel, read_info
 
     source = _existing_fmu(fmu)
     path = out or fmu.with_suffix(".toml")
     if path.exists() and not force:
-        raise SpecError(f"{path} exists already: give another --out, or --force to replace it")
+        raise SpecError(f"{path} already exists: choose another --out, or add --force to replace it")
     found = read_info(source)
-    FmuModel(
-        source, interface=default_interface(found) or "co-simulation"
-    )  # refuses what cannot be simulated
+    # Raises an error if the FMU cannot be simulated, before a useless spec is written.
+    FmuModel(source, interface=default_interface(found) or "co-simulation")
     path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
     load_problems(str(path))
-    say(f"{path} written. Put in the real ranges and the requirement, then: falsifier run '{path}'")
+    command = f"falsifier run {shlex.quote(str(path))}"
+    say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 
 
 @click.command()
 @click.argument("target")
-@click.option("--profile", help="Another parameterization that the spec offers.")
+@profile_option
 def check(*, target: str, profile: str | None) -> None:
-    """Check a spec file: its keys, its signals, its ranges and its formulas; nothing is simulated."""
+    """Check the keys, signals, ranges and formulas of a spec file without simulating."""
     for problem in load_problems(target, profile=profile):
         say(_problem_line(problem))
 
@@ -110,7 +113,7 @@ def check(*, target: str, profile: str | None) -> None:
     type=click.Choice(["spec", "manifest", "journal", "campaign"]),
     default="spec",
     show_default=True,
-    help="Spec files, or a file of run directories; journal: one line of it.",
+    help="What to describe: spec files, or a file in run directories (journal: one line of it).",
 )
 def schema(*, what: str) -> None:
     """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
@@ -128,13 +131,13 @@ def _schema(what: str) -> dict[str, Any]:
 
 
 def _print_convergence(fmu: Path, found: ModelInfo) -> None:
-    """Say how far halving the step moves the outputs, with every bounded input going up and down once."""
+    """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.fmu import FmuModel
     from falsifier.fmu.step_check import step_convergence
 
     interface = default_interface(found)
     if interface is None:
-        raise SpecError(f"{fmu}: the FMU offers no interface that can be simulated")
+        raise SpecError(f"{fmu}: {_NO_INTERFACE}; export the model for co-simulation or model exchange")
     stop_time = found.stop_time or _CHECKED_SECONDS
     outputs = tuple(v.name for v in found.outputs if v.kind != "string")
     experiment = Experiment(stop_time, default_interval(found, stop_time), outputs)
@@ -148,12 +151,12 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         movements = step_convergence(model, experiment, signals)
     finally:
         model.close()
-    say(f"\n{interface}, step {experiment.output_interval:g} s against half of it, over {stop_time:g} s:")
+    say(f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s")
     for name, moved in movements.items():
         unit = f" {found[name].unit}" if found[name].unit else ""
         say(
-            f"  {name} moves by at most {moved.largest:.3g}{unit} at {moved.time:.4g} s "
-            f"({moved.relative:.2%} of its range)"
+            f"  {name} changes by at most {moved.largest:.3g}{unit}, at {moved.time:.4g} s "
+            f"({100 * moved.relative:.2f} % of its range)"
         )
 
 
@@ -163,18 +166,19 @@ def _existing_fmu(fmu: Path) -> Path:
     inside = bundled("fmus") / f"{fmu.name.removesuffix('.fmu')}.fmu"
     if fmu.parent == Path() and inside.is_file():
         return inside
-    raise SpecError(f"there is no file {fmu}")
+    raise SpecError(f"{fmu}: no such file; expected the path of an FMU, or the name of a bundled one")
 
 
 def _relative(fmu: Path, spec: Path) -> Path:
-    """Path of the FMU as seen from the spec's folder (Path.relative_to cannot walk up before Python 3.12)."""
+    """Path of the FMU relative to the spec's directory (Path.relative_to has walk_up only in Python 3.12)."""
     return Path(relpath(fmu.resolve(), spec.resolve().parent))
 
 
 def _problem_line(problem: Problem) -> str:
     space = problem.space
     searched = [
-        f"{r.name} [{r.low:g}, {r.high:g}] {r.control_points} {r.interpolation} points" for r in space.inputs
+        f"{r.name} [{r.low:g}, {r.high:g}] ({counted(r.control_points, 'control point')}, {r.interpolation})"
+        for r in space.inputs
     ]
     searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
@@ -184,7 +188,7 @@ def _print_info(found: ModelInfo, *, everything: bool) -> None:
     from rich.console import Console
 
     console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPED_WIDTH)
-    # In one piece and by click: rich would end with 1, the code of a falsification, when a pipe is closed.
+    # Captured and printed by click: if a pipe is closed, rich would exit with code 1, which means falsified.
     with console.capture() as text:
         _describe(console, found, everything=everything)
     click.echo(text.get(), nl=False)
@@ -197,13 +201,13 @@ def _describe(console: "Console", found: ModelInfo, *, everything: bool) -> None
     )
     if found.clocks:
         console.print(
-            f"cannot be simulated: its clocks {_shown(', '.join(found.clocks))} would have to be ticked from "
-            "outside, which is not supported; export the model without input clocks"
+            f"cannot be simulated: its input clocks ({_shown(', '.join(found.clocks))}) need external ticks, "
+            "which are not supported; export the model without input clocks"
         )
     if found.description:
         console.print(_shown(found.description))
     platforms = ", ".join(found.platforms) or "none"
-    console.print(f"platforms: {_shown(platforms)}; made by {_shown(found.tool or 'unknown')}")
+    console.print(f"platforms: {_shown(platforms)}; generated by {_shown(found.tool or 'an unknown tool')}")
     experiment = (
         f"{label} {value:g}{unit}"
         for label, value, unit in (
@@ -228,7 +232,7 @@ def _describe(console: "Console", found: ModelInfo, *, everything: bool) -> None
             limit = len(variables) if everything else _SHOWN_VARIABLES
             console.print(_table(title, variables[:limit]))
             if len(variables) > limit:
-                console.print(f"... and {len(variables) - limit} more {title}: --all shows them")
+                console.print(f"... and {len(variables) - limit} more; --all shows all {title}")
 
 
 def _table(title: str, variables: tuple[Variable, ...]) -> "Table":
@@ -238,7 +242,7 @@ def _table(title: str, variables: tuple[Variable, ...]) -> "Table":
     for column in ("name", "type", "unit", "min", "max", "start", "description"):
         table.add_column(column, justify="right" if column in ("min", "max", "start") else "left")
     for v in variables:
-        unit = f"{v.unit} (shown in {v.display_unit})" if v.display_unit else v.unit
+        unit = f"{v.unit} (displayed in {v.display_unit})" if v.display_unit else v.unit
         cells = (v.name, v.kind, unit, _cell(v.low), _cell(v.high), _cell(v.start), v.description)
         table.add_row(*map(_shown, cells))
     return table

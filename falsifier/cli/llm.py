@@ -1,4 +1,4 @@
-"""``falsifier prompt`` and ``falsifier llm``: what a language model is sent, and whether it answers."""
+"""``falsifier prompt`` and ``falsifier llm``: what a language model is sent, and whether it replies."""
 
 import json
 from collections.abc import Sequence
@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import json_option, problem_options, problem_source
+from falsifier.cli.options import (
+    anonymous_option,
+    api_base_option,
+    effort_option,
+    json_option,
+    problem_options,
+    problem_source,
+    variant_option,
+)
 from falsifier.cli.output import say
+from falsifier.core.words import counted
 from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
@@ -17,18 +26,22 @@ if TYPE_CHECKING:
 
 @click.command()
 @problem_options
-@click.option("--variant", metavar="MP1..", help="Prompt variant; default: the one that runs use.")
-@click.option("--anonymous", is_flag=True, help="With neutral names only.")
+@variant_option()
+@anonymous_option
 @click.option(
-    "--run", "directory", type=click.Path(path_type=Path), help="Show the prompt behind this run's samples."
+    "--run",
+    "directory",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Run whose samples the prompt contains; default: none, as at the start of a run.",
 )
-@click.option("--samples", type=int, help="With --run: only its first samples.")
-@click.option(
+@click.option("--samples", type=int, help="With --run: use only its first samples.")
+@click.option(  # only these two engines write prompts
     "--engine",
     type=click.Choice(["llm", "hybrid"]),
     default="llm",
     show_default=True,
-    help="Who asks; hybrid: for several candidates at a time, with the tool that it offers.",
+    help="Engine that asks; hybrid asks for several candidates at a time and offers a tool.",
 )
 @json_option
 def prompt(
@@ -41,13 +54,13 @@ def prompt(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Print exactly what would be sent next; send nothing."""
+    """Print exactly what would be sent to a language model next, without sending it."""
     from falsifier.engines.hybrid import Settings as HybridSettings
     from falsifier.engines.llm import preview, preview_tool
     from falsifier.search.journal import read_journal, recorded_evaluations
 
     if samples is not None and directory is None:
-        raise click.UsageError("--samples needs --run DIR")
+        raise click.UsageError("--samples requires --run DIR")
     problem = load_source(problem_source(options))
     evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
     told = evaluations[:samples]
@@ -71,10 +84,10 @@ def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
     parts = [f"--- {message.role} ---\n{message.content}" for message in messages]
     if tools:
         parts.append(
-            "(The engine adds why it asks, and what its numerical model expects, to the last message.)"
+            "(The engine appends its reason for asking and its own predictions to the last message.)"
         )
     parts += [
-        f"--- tool {tool.name}, offered while the engine's forecasts are good ---\n{tool.description}\n"
+        f"--- tool {tool.name}, offered while the engine's predictions are good ---\n{tool.description}\n"
         f"arguments: {json.dumps(tool.parameters)}"
         for tool in tools
     ]
@@ -83,21 +96,24 @@ def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
 
 @click.group()
 def llm() -> None:
-    """Language models."""
+    """Commands on language models."""
 
 
 @llm.command()
 @click.argument("name")
-@click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
-@click.option("--effort", type=click.Choice(["low", "medium", "high"]), help="Reasoning effort of the LLM.")
+@api_base_option
+@effort_option
 def check(*, name: str, api_base: str | None, effort: str | None) -> None:
-    """Check the language model NAME: its name, its key and one small round trip, and say what it costs."""
+    """Check name and key of a language model with one short request.
+
+    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini. The output includes the price.
+    """
     from falsifier.llm.connect import check_llm
 
     found = check_llm(name, api_base=api_base, effort=effort)
     price = "unknown" if found.price is None else str(found.price)
     key = f"key from {found.key}" if found.key else "no key needed"
     say(
-        f"{found.llm}: answers ({found.reply!r} after {found.seconds:.1f} s, {found.usage.tokens} tokens); "
-        f"{key}; price {price}"
+        f"{found.llm}: replied {found.reply!r} after {found.seconds:.1f} s "
+        f"({counted(found.usage.tokens, 'token')}); {key}; price: {price}"
     )

@@ -1,121 +1,181 @@
-"""Options that bear the same names in every command."""
+"""Options of the command line, each defined once: the same name and help in every command that has it.
+
+Functions that end in ``_options`` add a group of options to a command. Where commands need different defaults
+or add a remark, a function makes the option.
+"""
 
 import logging
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, get_args
 
 import click
 
 from falsifier.core.secrets import is_secret_option
+from falsifier.engines import DEFAULT_ENGINE, ENGINES
+from falsifier.llm.prompts.variants import DEFAULT_VARIANT
 from falsifier.problem.options import changes_from_options
 from falsifier.problem.source import ProblemSource
-from falsifier.search.request import LLMSettings
+from falsifier.search.request import Effort, LLMSettings
 
-F = TypeVar("F", bound=Callable[..., Any])
+Function = Callable[..., Any]
+Decorator = Callable[[Function], Function]
 
 
-def problem_options(command: F) -> F:
-    """Add the target and everything that changes a problem."""
-    for decorate in reversed(
-        (
-            click.argument("target"),
-            click.option("--stl", metavar="FORMULA", help="Judge this formula instead of the spec's."),
-            click.option("--profile", help="Another parameterization that the spec offers, e.g. instance2."),
-            click.option(
-                "--parameterization",
-                type=click.Choice(["free", "fixed"]),
-                default="free",
-                show_default=True,
-                help="free: control points within the spec's limits; fixed: only the spec's own.",
-            ),
-            click.option(
-                "--interface",
-                type=click.Choice(["co-simulation", "model-exchange"]),
-                help="How the FMU is simulated.",
-            ),
-            click.option(
-                "--input",
-                "inputs",
-                multiple=True,
-                metavar="NAME=LOW:HIGH:POINTS",
-                help="Search this input signal (NAME alone: as the spec says, or between the FMU's min and "
-                "max; NAME=VALUE: keep it constant). Repeatable.",
-            ),
-            click.option(
-                "--param",
-                "parameters",
-                multiple=True,
-                metavar="NAME=VALUE",
-                help="Set a parameter or start value (or NAME=LOW:HIGH: search it). Repeatable.",
-            ),
-            click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
-            click.option(
-                "--output-interval", type=float, metavar="SECONDS", help="Step of the monitored grid."
-            ),
-        )
-    ):
+def _add(command: Function, *decorators: Decorator) -> Function:
+    """Add options to a command; --help lists them in this order."""
+    for decorate in reversed(decorators):
         command = decorate(command)
     return command
 
 
+def profile_option(command: Function) -> Function:
+    return click.option(
+        "--profile", metavar="NAME", help="Named parameterization that the spec offers, e.g. instance2."
+    )(command)
+
+
+def parameterization_option(*, multiple: bool = False) -> Decorator:
+    # Campaigns are compared with published results, which exist for the fixed parameterization only.
+    return click.option(
+        "--parameterization",
+        type=click.Choice(["free", "fixed"]),
+        multiple=multiple,
+        default=("fixed",) if multiple else "free",
+        show_default=True,
+        help=_repeatable(
+            "free: engines may choose control points within the spec's limits; fixed: the spec's own.",
+            multiple=multiple,
+        ),
+    )
+
+
+def problem_options(command: Function) -> Function:
+    """Add the target and everything that changes a problem."""
+    return _add(
+        command,
+        click.argument("target"),
+        click.option("--stl", metavar="FORMULA", help="Formula to use instead of the spec's requirement."),
+        profile_option,
+        parameterization_option(),
+        click.option(
+            "--interface",
+            type=click.Choice(["co-simulation", "model-exchange"]),
+            help="FMI interface to simulate; default: the spec's, or co-simulation if the FMU offers it.",
+        ),
+        click.option(
+            "--input",
+            "inputs",
+            multiple=True,
+            metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
+            help="Input signal to search. NAME alone: with the spec's range, or between the FMU's min and "
+            "max. NAME=VALUE: keep it constant. Repeatable.",
+        ),
+        click.option(
+            "--param",
+            "parameters",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="Parameter or start value to set. NAME=LOW:HIGH: search it. Repeatable.",
+        ),
+        click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
+        click.option(
+            "--output-interval",
+            type=float,
+            metavar="SECONDS",
+            help="Step of the output grid on which the requirement is monitored.",
+        ),
+    )
+
+
 def problem_source(options: dict[str, Any]) -> ProblemSource:
-    """Take the problem's options out of a command's keyword arguments."""
+    """Take the values of problem_options out of a command's keyword arguments."""
     varied = ("inputs", "parameters", "stop_time", "output_interval", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
     stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization")}
     return ProblemSource(**stated, changes=changes)
 
 
-def llm_options(command: F) -> F:
-    """Add everything that says which language model is asked, and how."""
-    for decorate in reversed(
-        (
-            click.option(
-                "--llm",
-                metavar="NAME",
-                help="Language model, e.g. openai/gpt-5-mini, ollama_chat/gpt-oss:20b.",
-            ),
-            click.option(
-                "--effort", type=click.Choice(["low", "medium", "high"]), help="Its reasoning effort."
-            ),
-            click.option("--variant", metavar="MP1..", help="Prompt variant."),
-            asking_options,
-        )
-    ):
-        command = decorate(command)
-    return command
+def engine_option(*, multiple: bool = False) -> Decorator:
+    return click.option(
+        "--engine",
+        "engines" if multiple else "engine",
+        multiple=multiple,
+        metavar="NAME",
+        help=_repeatable(
+            f"Search engine: {', '.join(ENGINES)}. Default: {DEFAULT_ENGINE}, or the language model if "
+            "--llm is given.",
+            multiple=multiple,
+        ),
+    )
 
 
-def asking_options(command: F) -> F:
-    """Add how language models are asked, whichever they are."""
-    for decorate in reversed(
-        (
-            click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
-            click.option(
-                "--llm-option",
-                "llm_options",
-                multiple=True,
-                metavar="NAME=VALUE",
-                help="Passed to the provider as it is, e.g. max_tokens=4000. Repeatable.",
-            ),
-            click.option(
-                "--price",
-                metavar="SENT:RECEIVED",
-                help="US dollars for 1000 tokens, where the price is not known.",
-            ),
-            click.option("--anonymous", is_flag=True, help="Tell the LLM neutral names only."),
-            click.option("--fallback", metavar="ENGINE", help="Engine that goes on when the LLM gives up."),
-            click.option("--no-cache", is_flag=True, help="Ask anew where the reply is already on disk."),
-        )
-    ):
-        command = decorate(command)
-    return command
+def llm_option(*, multiple: bool = False) -> Decorator:
+    text = "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b."
+    return click.option(
+        "--llm",
+        "llms" if multiple else "llm",
+        multiple=multiple,
+        metavar="NAME[@EFFORT]" if multiple else "NAME",
+        help=f"{text} @EFFORT overrides --effort. Repeatable." if multiple else text,
+    )
+
+
+def effort_option(command: Function) -> Function:
+    return click.option(
+        "--effort", type=click.Choice(get_args(Effort)), help="Reasoning effort of the language model."
+    )(command)
+
+
+def variant_option(*, multiple: bool = False) -> Decorator:
+    return click.option(
+        "--variant",
+        "variants" if multiple else "variant",
+        multiple=multiple,
+        metavar="MP1..MP5",
+        help=_repeatable(f"Prompt variant; default: {DEFAULT_VARIANT}.", multiple=multiple),
+    )
+
+
+def api_base_option(command: Function) -> Function:
+    return click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")(command)
+
+
+def anonymous_option(command: Function) -> Function:
+    return click.option("--anonymous", is_flag=True, help="Use neutral names in prompts.")(command)
+
+
+def asking_options(command: Function) -> Function:
+    """Add how to ask a language model, whichever it is."""
+    return _add(
+        command,
+        api_base_option,
+        click.option(
+            "--llm-option",
+            "llm_options",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="Option passed to the provider unchanged, e.g. max_tokens=4000. Repeatable.",
+        ),
+        click.option(
+            "--price",
+            metavar="SENT:RECEIVED",
+            help="US dollars per 1000 tokens sent and received, if the price is not known.",
+        ),
+        anonymous_option,
+        click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
+        click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
+    )
+
+
+def llm_options(command: Function) -> Function:
+    """Add which language model to ask, and how."""
+    return _add(command, llm_option(), effort_option, variant_option(), asking_options)
 
 
 def llm_settings(options: dict[str, Any]) -> LLMSettings | None:
-    """Take the LLM's options out of a command's keyword arguments; None where no LLM is named."""
+    """Take the values of llm_options out of a command's keyword arguments; None if no LLM is named."""
     name = options.pop("llm")
     asked = {key: options.pop(key) for key in ("effort", "variant")}
     asked |= asking(options, named=name is not None)
@@ -129,7 +189,7 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
     """Take the values of asking_options out of a command's keyword arguments, as fields of LLMSettings.
 
     Raises:
-        click.UsageError: where one cannot be read, or one is given and no model is named.
+        click.UsageError: if a value is invalid, or one is given although no language model is named.
     """
     given = {key: options.pop(key) for key in ("api_base", "fallback", "anonymous")}
     price, pairs = options.pop("price"), options.pop("llm_options")
@@ -142,7 +202,10 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
 def _refuse_without_llm(given: dict[str, Any]) -> None:
     stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value and key != "cache"]
     if stray:
-        raise click.UsageError(f"{', '.join(stray)}: only a language model takes this; you need --llm NAME")
+        raise click.UsageError(
+            f"{', '.join(stray)}: applies to language models only; add --llm NAME, or drop "
+            f"{'it' if len(stray) == 1 else 'them'}"
+        )
 
 
 def _price(text: str | None) -> tuple[float, float] | None:
@@ -159,45 +222,120 @@ def _llm_option(text: str) -> tuple[str, str | float]:
     name, equals, value = text.partition("=")
     if not equals or not name:
         raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
-    if is_secret_option(name):  # options stand in the run's manifest
-        raise click.UsageError(f"--llm-option {name}: keys are read from the environment only")
+    if is_secret_option(name):  # options are written to the run's manifest
+        raise click.UsageError(
+            f"--llm-option {name}: keys are read from the environment only; set the provider's variable"
+        )
     try:
         return name, int(value) if value.isdigit() else float(value)
     except ValueError:
         return name, value
 
 
-def out_option(command: F) -> F:
-    """Add --out."""
+def budget_option(default: int, *, note: str = "") -> Decorator:
     return click.option(
-        "--out",
-        type=click.Path(path_type=Path),
-        metavar="DIR",
-        help="Run directory; default: runs/NAME-TIME.",
+        "--budget",
+        type=int,
+        default=default,
+        show_default=True,
+        help=f"Maximum number of simulations{note}.",
+    )
+
+
+def limit_options(*, note: str = "") -> Decorator:
+    """Limits of a run in addition to --budget."""
+    return lambda command: _add(
+        command,
+        click.option("--seconds", type=float, help=f"Maximum wall-clock time in seconds{note}."),
+        click.option("--max-tokens", type=int, help=f"Maximum number of language-model tokens{note}."),
+        click.option(
+            "--max-cost", type=float, help=f"Maximum cost of the language model in US dollars{note}."
+        ),
+    )
+
+
+def total_options(command: Function) -> Function:
+    """Add the limits of a campaign."""
+    return _add(
+        command,
+        click.option("--total-budget", type=int, help="Maximum number of simulations of all runs together."),
+        click.option(
+            "--total-seconds", type=float, help="Maximum wall-clock time in seconds, counted from this start."
+        ),
+        click.option(
+            "--total-tokens", type=int, help="Maximum number of language-model tokens of all runs together."
+        ),
+        click.option(
+            "--total-cost",
+            type=float,
+            help="Maximum cost of the language models in US dollars of all runs together.",
+        ),
+    )
+
+
+def seed_option(text: str = "Random seed.") -> Decorator:
+    return click.option("--seed", type=int, default=0, show_default=True, help=text)
+
+
+def jobs_option(what: str) -> Decorator:
+    return click.option(
+        "--jobs", type=int, default=1, show_default=True, help=f"Number of {what} at a time on this machine."
+    )
+
+
+def executor_option(command: Function) -> Function:
+    return click.option(
+        "--executor",
+        metavar="dask:tcp://HOST:PORT",
+        help="Run on a Dask cluster instead of this machine. Workers without access to DIR notice the "
+        "--total-... limits only between runs.",
     )(command)
 
 
-def json_option(command: F) -> F:
-    """Add --json."""
+def run_argument(command: Function) -> Function:
+    return click.argument("run", metavar="RUN", type=click.Path(path_type=Path))(command)
+
+
+def directory_argument(command: Function) -> Function:
+    return click.argument("directory", type=click.Path(path_type=Path))(command)
+
+
+def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
+    return click.option("-o", "--out", type=click.Path(path_type=Path), metavar=metavar, help=text)
+
+
+def store_option(command: Function) -> Function:
+    return click.option(
+        "--store",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        help="Also store the counterexample in this folder of counterexamples.",
+    )(command)
+
+
+def json_option(command: Function) -> Function:
     return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")(
         command
     )
 
 
-def quiet_option(command: F) -> F:
-    """Add --quiet."""
+def quiet_option(command: Function) -> Function:
     return click.option(
         "--quiet",
         is_flag=True,
         callback=lambda context, _option, quiet: _silence(context, quiet=quiet),
-        help="No progress.",
+        help="Do not show progress.",
     )(command)
 
 
 def _silence(context: click.Context, *, quiet: bool) -> bool:
-    """Have simulating processes keep to themselves that they compile, as long as the command runs."""
+    """Suppress notes of the simulating processes, such as that code is compiled, until the command ends."""
     if quiet:
         logger = logging.getLogger("falsifier.fmu")
         context.call_on_close(partial(logger.setLevel, logger.level))
         logger.setLevel(logging.ERROR)
     return quiet
+
+
+def _repeatable(text: str, *, multiple: bool) -> str:
+    return f"{text} Repeatable." if multiple else text

@@ -7,28 +7,29 @@ import click
 
 from falsifier.campaigns.archcomp import BUDGET, Finding, export, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
-from falsifier.cli.options import json_option
+from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
+from falsifier.core.words import counted
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.terminal import warn
 
 
 @click.command()
-@click.argument("directory", type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="Page to write; default: in DIRECTORY.")
-@click.option("--markdown", is_flag=True, help="Markdown instead of a page; on stdout without --out.")
-@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Write JUnit XML as well.")
+@directory_argument
+@out_option("Report to write; default: report.html in DIRECTORY.")
+@click.option("--markdown", is_flag=True, help="Markdown instead of HTML; printed on stdout without --out.")
+@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Also write JUnit XML.")
 @click.option(
     "--arch-comp",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Write the competition's CSV as well.",
+    help="Also write a CSV file in the ARCH-COMP validation format.",
 )
 def report(
     *, directory: Path, out: Path | None, markdown: bool, junit: Path | None, arch_comp: Path | None
 ) -> None:
-    """Report on the run or campaign in DIRECTORY: one page that needs nothing else."""
+    """Report on the run or campaign in DIRECTORY: one self-contained HTML page."""
     if junit is not None:
         junit.write_text(junit_report(directory), encoding="utf-8")
         warn(f"{junit} written")
@@ -45,29 +46,28 @@ def report(
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
-@click.option("--budget", type=int, default=BUDGET, show_default=True, help="Most simulations a run.")
+@budget_option(BUDGET, note=" per run; claims that used more are rejected")
 @json_option
 def validate(*, file: Path, budget: int, as_json: bool) -> None:
-    """Re-simulate the counterexamples of FILE, ours or another tool's, and say which hold.
+    """Re-simulate the counterexamples in FILE and report which of them are reproduced.
 
-    FILE is in the validation format of the ARCH-COMP falsification category. Exit code 0: all hold; 1: some
-    do not.
+    FILE is a CSV file in the validation format of the ARCH-COMP falsification category, written by any tool.
+
+    Exit codes: 0 all accepted, 1 some rejected, 2 wrong usage or file.
     """
     findings = check_rows(read_rows(file), budget=budget)
     if as_json:
         text = json.dumps([_finding_json(f) for f in findings], indent=2)
     else:
-        lines = map(_finding_line, findings)
-        text = "\n".join(
-            [*lines, f"{sum(f.holds for f in findings)} of {len(findings)} counterexamples hold"]
-        )
+        accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
+        text = "\n".join([*map(_finding_line, findings), accepted])
     conclude(text, 0 if all(f.holds for f in findings) else 1)
 
 
 def _finding_line(f: Finding) -> str:
+    rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
     robustness = "" if f.robustness is None else f", robustness {f.robustness:+.6g}"
-    verdict = "holds" if f.holds else "does not hold"
-    return one_line(f"row {f.row.number}: {f.row.requirement}: {verdict}: {f.reason}{robustness}")
+    return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
 
 
 def _finding_json(finding: Finding) -> dict[str, object]:

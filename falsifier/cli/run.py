@@ -8,16 +8,24 @@ from typing import Any, NoReturn
 import click
 
 from falsifier.campaigns.directory import is_campaign
-from falsifier.cli.campaign import executor_option, jobs_option, resume_campaign
+from falsifier.cli.campaign import resume_campaign
 from falsifier.cli.files import write_counterexample
 from falsifier.cli.options import (
+    budget_option,
+    directory_argument,
+    engine_option,
+    executor_option,
+    jobs_option,
     json_option,
+    limit_options,
     llm_options,
     llm_settings,
     out_option,
     problem_options,
     problem_source,
     quiet_option,
+    seed_option,
+    total_options,
 )
 from falsifier.cli.output import conclude
 from falsifier.core.files import file_name
@@ -32,23 +40,21 @@ from falsifier.views.progress import make_display
 from falsifier.views.terminal import warn
 from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 
-# Where several requirements end differently, the first of these that occurs.
+# If several requirements end differently, the first of these that occurs decides.
 _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}
 
 
 @click.command()
 @problem_options
-@click.option("--engine", metavar="NAME", help="Search engine; see the README for the list.")
+@engine_option()
 @llm_options
-@click.option("--budget", type=int, default=100, show_default=True, help="Most simulations.")
-@click.option("--seconds", type=float, help="Most wall-clock seconds.")
-@click.option("--max-tokens", type=int, help="Most tokens of the language model.")
-@click.option("--max-cost", type=float, help="Most US dollars for the language model.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the engine.")
-@click.option("--jobs", type=int, default=1, show_default=True, help="Simulations at a time.")
-@click.option("--all", "together", is_flag=True, help="All requirements of the spec in one search.")
+@budget_option(100)
+@limit_options()
+@seed_option()
+@jobs_option("simulations")
+@click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
 @quiet_option
-@out_option
+@out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @json_option
 def run(
     *,
@@ -68,6 +74,9 @@ def run(
     """Search for inputs that violate a requirement.
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl.
+
+    The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
+    spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     source, llm = problem_source(options), llm_settings(options)
     sources = _all_of(source) if together else (source,)
@@ -86,13 +95,10 @@ def run(
 
 
 @click.command()
-@click.argument("directory", type=click.Path(path_type=Path))
-@jobs_option
+@directory_argument
+@jobs_option("runs")
 @executor_option
-@click.option("--total-budget", type=int, help="Campaign: most simulations of all runs together.")
-@click.option("--total-seconds", type=float, help="Campaign: most wall-clock seconds from now on.")
-@click.option("--total-tokens", type=int, help="Campaign: most tokens of all runs together.")
-@click.option("--total-cost", type=float, help="Campaign: most US dollars of all runs together.")
+@total_options
 @quiet_option
 @json_option
 def resume(
@@ -107,10 +113,10 @@ def resume(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Continue the run or campaign in DIRECTORY; nothing that it holds is simulated or asked again.
+    """Continue the run or campaign in DIRECTORY; nothing that is recorded is simulated or asked again.
 
-    --jobs, --executor and the limits are for campaigns; the limits on simulations, tokens and
-    money count what was spent before, too.
+    --jobs, --executor and the limits apply to campaigns. The limits on simulations, tokens and cost include
+    what was spent before.
     """
     if is_campaign(directory):
         given = (total_budget, total_seconds, total_tokens, total_cost)
@@ -155,12 +161,12 @@ def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
     """Sources of all requirements of a spec.
 
     Raises:
-        SpecError: when the target is no spec, or names one requirement.
+        SpecError: if the target is not a spec, or names one requirement.
     """
     if source.parts.kind in ("fmu", "python") or source.stl is not None:
-        raise SpecError(f"{source.target}: only a spec has several requirements")
+        raise SpecError(f"{source.target}: --all needs a spec with several requirements; drop --all")
     if find_spec(source.target)[1] is not None:
-        raise SpecError(f"{source.target}: name the spec without a requirement to falsify all of them")
+        raise SpecError(f"{source.target}: --all needs the spec's name without a requirement")
     return tuple(sources_of(source))
 
 

@@ -163,7 +163,7 @@ def counterexample_file(path: Path) -> Path:
     """
     directory = path if path.is_dir() else path.parent
     if not path.is_file():
-        keep_recorded(directory)
+        keep_recorded(directory)  # the counterexample may be in the journal only
     if not path.is_dir():
         if not path.is_file():
             raise SpecError(
@@ -179,7 +179,7 @@ def counterexample_file(path: Path) -> Path:
         )
     if not found:
         raise SpecError(
-            "this run found no confirmed counterexample; expected a run that falsified its requirement",
+            "contains no confirmed counterexample; expected the directory of a run that found one",
             file=str(path),
         )
     return found[0]

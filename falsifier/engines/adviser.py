@@ -1,4 +1,4 @@
-"""What the hybrid engine asks of a language model."""
+"""The interface between the hybrid engine and a language model."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from falsifier.llm.tools import WhatIf
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What one question brought.
+    """Answer to one question.
 
     Attributes:
-        candidates: at least one, as many as were asked for at most.
-        foresaw: whether the LLM asked for predictions, and got some, before it answered.
+        candidates: at least one, at most as many as requested.
+        foresaw: whether the LLM requested and received predictions before it answered.
     """
 
     candidates: list[Candidate]
@@ -25,19 +25,19 @@ class Advice:
 
 
 class Adviser(Protocol):
-    """The language model's side."""
+    """A language model that advises a numerical engine."""
 
     @property
     def name(self) -> str:
-        """What its candidates bear as origin."""
+        """Origin of its candidates."""
         ...
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """See AsksLLM.attach."""
+        """Connect to a run that counts, records and replays the exchanges, as ``AsksLLM.attach``."""
         ...
 
     def describe(self, candidate: Candidate) -> str:
-        """A candidate in a few words and by the names that the LLM knows, for notes."""
+        """Return a candidate in one line, with the names that the LLM knows, for notes."""
         ...
 
     def propose(
@@ -48,20 +48,21 @@ class Adviser(Protocol):
         what_if: WhatIf | None = None,
         dispensable: bool = False,
     ) -> Advice:
-        """Return up to ``count`` candidates, at least one, after a single question.
+        """Ask one question; return at least one and at most ``count`` candidates.
 
         Args:
-            count: how many are wanted.
-            notes: lines that the question carries beside problem and history.
-            what_if: leave to ask for predictions in between; an LLM that takes no tools goes without.
-            dispensable: the search goes on where no answer comes. That none came is put on record then, so
-                that a resumed run goes on in the same way.
+            count: number of candidates to request.
+            notes: lines to add to the question, after problem and history.
+            what_if: permission to request predictions before answering; ignored if the LLM does not support
+                tools.
+            dispensable: whether the search continues without an answer. A missing answer is then recorded, so
+                that a resumed run continues in the same way.
 
         Raises:
-            ChatError: when no valid answer can be had.
+            ChatError: if there is no valid answer.
         """
         ...
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """Learn from evaluations, whoever proposed their candidates."""
+        """Learn from evaluations, including those of other engines' candidates."""
         ...

@@ -1,7 +1,8 @@
-"""Simulated annealing: scipy's dual annealing, turned inside out so that it can be asked and told.
+"""Simulated annealing: scipy's dual annealing behind ``ask`` and ``tell``.
 
-scipy calls the function that it minimises. Here that function runs in a thread of its own, hands each point
-over and waits until it is told the cost; the two threads take turns, so nothing depends on timing.
+scipy calls the function that it minimises. To invert the control, dual annealing runs in a separate thread,
+and its function passes each point to the engine and waits for the cost. The two threads alternate, so the
+result does not depend on timing.
 """
 
 import weakref
@@ -14,13 +15,14 @@ from scipy.optimize import dual_annealing
 from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.problem.problem import Problem
 
+# Limits of iterations and evaluations that are never reached: the loop's budget ends the search.
 _NEVER = 10**9
 
 
 class Annealing(BoxEngine):
     """Dual annealing without its local search, whose finite differences would cost d + 1 simulations each.
 
-    It goes one step at a time: further candidates asked for meanwhile are uniform random ones.
+    Annealing is sequential: further candidates requested during a step are uniform random.
     """
 
     name = "annealing"
@@ -34,13 +36,14 @@ class Annealing(BoxEngine):
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         if self._awaited is not None:
-            return Proposal(rng.random(self.box.dimension), "uniform random while annealing waits")
+            return Proposal(rng.random(self.box.dimension), "uniform random, while annealing waits")
         self._awaited = self._walk.next_point()
         return Proposal(self._awaited, "a step of simulated annealing")
 
     def _learn(self, point: Vector, cost: float | None) -> None:
         if cost is not None:
             self._worst = max(self._worst, cost)
+        # A failed simulation counts as the worst cost so far: annealing needs a number for every point.
         if self._awaited is not None and np.allclose(point, self._awaited, rtol=0, atol=1e-9):
             self._awaited = None
             self._walk.answer(self._worst if cost is None else cost)
@@ -56,11 +59,11 @@ class _Walk:
         thread.start()
 
     def next_point(self) -> Vector:
-        """Point whose cost the annealing waits for."""
+        """Return the point whose cost annealing waits for."""
         return self._points.get()
 
     def answer(self, cost: float) -> None:
-        """Let the annealing go on with this cost."""
+        """Let annealing continue with this cost."""
         self._costs.put(cost)
 
     def stop(self) -> None:
@@ -91,4 +94,4 @@ class _Walk:
 
 
 class _Stopped(Exception):
-    """The engine is gone."""
+    """The engine has been deleted."""

@@ -1,4 +1,4 @@
-"""Bayesian optimisation: a Gaussian process of the robustness, and where it expects most improvement."""
+"""Bayesian optimisation: a Gaussian process of the robustness, maximising the expected improvement."""
 
 from abc import abstractmethod
 
@@ -11,14 +11,16 @@ from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
 from falsifier.problem.problem import Problem
 
-# Cost of the process grows with the cube of its points: these are the best and the latest ones.
-_MOST_POINTS = 200
+# Maximum number of points of the process, whose cost grows with their cube: half the best, half the latest.
+_MAX_POINTS = 200
+# Variance of the observation noise, relative to that of the standardised costs; keeps the covariance regular.
 _NOISE = 1e-4
+# Starts of the local optimisation, chosen from random samples.
 _STARTS = 3
 _SAMPLES = 512
 
 
-class ModelBased(BoxEngine):
+class GaussianProcessEngine(BoxEngine):
     """Sobol points first, then the most promising point of a Gaussian process of the costs so far."""
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
@@ -33,7 +35,7 @@ class ModelBased(BoxEngine):
         if self._asked < self._start or len(self._costs) < 2:
             point = rng.random(self.box.dimension)
             point[: self._sequence.d] = self._sequence.random(1)[0]
-            return Proposal(point, "a Sobol point, before the Gaussian process knows enough")
+            return Proposal(point, "a Sobol point: too few evaluations for a Gaussian process yet")
         points, costs = self._kept()
         return self._most_promising(points, standardised(costs), rng)
 
@@ -48,21 +50,22 @@ class ModelBased(BoxEngine):
 
     def _kept(self) -> tuple[Vector, Vector]:
         points, costs = np.array(self._points), np.array(self._costs)
-        if len(costs) <= _MOST_POINTS:
+        if len(costs) <= _MAX_POINTS:
             return points, costs
-        order = np.argsort(costs, kind="stable")[: _MOST_POINTS // 2]
-        latest = np.arange(len(costs) - _MOST_POINTS // 2, len(costs))
+        order = np.argsort(costs, kind="stable")[: _MAX_POINTS // 2]
+        latest = np.arange(len(costs) - _MAX_POINTS // 2, len(costs))
         keep = np.unique(np.concatenate([order, latest]))
         return points[keep], costs[keep]
 
 
-class Bayesian(ModelBased):
-    """Maxima of the logarithm of the expected improvement of a Gaussian process."""
+class Bayesian(GaussianProcessEngine):
+    """Proposes the maximum of the logarithm of a Gaussian process's expected improvement."""
 
     name = "bayesian"
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
+        # Distances in the unit box grow with the square root of its dimension, and so must length scales.
         self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
 
     def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
@@ -75,7 +78,7 @@ class Bayesian(ModelBased):
 def _most_promising(
     process: GaussianProcess, targets: Vector, rng: np.random.Generator
 ) -> tuple[Vector, float]:
-    """Point of largest log expected improvement below the best target, and that value."""
+    """Return the point with the largest log expected improvement below the best target, and that value."""
     best = float(targets.min())
     d = process.points.shape[1]
     incumbent = process.points[int(np.argmin(targets))]
@@ -101,12 +104,16 @@ def _most_promising(
 
 
 def log_improvement(mean: Vector, deviation: Vector, best: float) -> Vector:
-    """Logarithm of the expected improvement below ``best``; finite far above it, where the plain one is 0."""
+    """Return the logarithm of the expected improvement below ``best``.
+
+    It is finite even if the mean is so far above ``best`` that the expected improvement underflows to 0;
+    without that, the optimiser would have no gradient there.
+    """
     z = (best - mean) / deviation
     log_density = -0.5 * z * z - 0.5 * np.log(2 * np.pi)
     plain = np.exp(log_density) + z * ndtr(z)
     with np.errstate(divide="ignore", invalid="ignore"):
-        # phi(z) + z Phi(z) cancels for z << 0, where it tends to phi(z) / z^2.
+        # For z << 0, phi(z) + z Phi(z) suffers from cancellation and tends to phi(z) / z^2.
         ratio = 1.0 + z * np.exp(log_ndtr(z) - log_density)
         tail = log_density + np.where(z < -20.0, -2.0 * np.log(np.abs(z)), np.log(np.maximum(ratio, 1e-300)))
         inside = np.log(plain)

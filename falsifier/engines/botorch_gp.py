@@ -1,4 +1,4 @@
-"""Bayesian optimisation by the package ``botorch``: its Gaussian process, acquisition and optimiser."""
+"""Bayesian optimisation with the Gaussian process, acquisition function and optimiser of ``botorch``."""
 
 import warnings
 from collections.abc import Iterator
@@ -15,19 +15,19 @@ from botorch.sampling import SobolQMCNormalSampler
 from botorch.utils.sampling import manual_seed
 from gpytorch.mlls import ExactMarginalLogLikelihood
 
-from falsifier.engines.bayesian import ModelBased
+from falsifier.engines.bayesian import GaussianProcessEngine
 from falsifier.engines.box import Proposal, Vector
 from falsifier.problem.problem import Problem
 
-# Starts of the optimiser of the acquisition, and the Sobol points that they are chosen from.
+# Starts of the acquisition's optimisation, and the number of Sobol points from which they are chosen.
 _RESTARTS = 4
 _RAW_SAMPLES = 128
-# Draws that the expected improvement is averaged over.
+# Samples over which the expected improvement is averaged.
 _DRAWS = 128
 
 
-class BoTorch(ModelBased):
-    """Maxima of the logarithm of the expected improvement, beyond the points that are being simulated."""
+class BoTorch(GaussianProcessEngine):
+    """Proposes the maximum of the log expected improvement, taking into account points being simulated."""
 
     name = "botorch"
 
@@ -47,11 +47,11 @@ class BoTorch(ModelBased):
     def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
         seed = int(rng.integers(2**31))
         with warnings.catch_warnings(), manual_seed(seed), _one_thread():
-            warnings.simplefilter("ignore")  # of data that were scaled otherwise, of retried fits
+            warnings.simplefilter("ignore")  # about our scaling of the data and about repeated fits
             try:
                 return self._maximum(points, targets, seed)
             except ModelFittingError:
-                return Proposal(rng.random(self.box.dimension), "random: the Gaussian process did not fit")
+                return Proposal(rng.random(self.box.dimension), "random: fitting the Gaussian process failed")
 
     def _maximum(self, points: Vector, targets: Vector, seed: int) -> Proposal:
         inputs, gains = torch.as_tensor(points), torch.as_tensor(-targets)[:, None]
@@ -74,7 +74,7 @@ class BoTorch(ModelBased):
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Keep torch to one thread: matrices this small gain nothing by more, and lose where others compute."""
+    """Restrict torch to one thread: more do not help with small matrices, and slow down parallel runs."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

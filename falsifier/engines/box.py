@@ -1,4 +1,4 @@
-"""What engines share that search the box of the fixed parameterization as vectors in [0, 1]^d."""
+"""Base of engines that search the fixed parameterization, as vectors in [0, 1]^d."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from falsifier.core.space import SearchSpace
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
-# Single precision where dynamics are rolled out, double elsewhere.
+# Single precision in the rollout of learnt dynamics, double precision elsewhere.
 Array = NDArray[np.floating[Any]]
 Vector = Array
 
@@ -23,8 +23,8 @@ class Proposal:
     """A point with the reason why it was chosen.
 
     Attributes:
-        point: in [0, 1]^d.
-        rationale: in words.
+        point: the point in [0, 1]^d.
+        rationale: the reason, in words.
     """
 
     point: Vector
@@ -52,16 +52,16 @@ class UnitBox:
         return [np.flatnonzero([n == name for n in names]) for name in self.space.names]
 
     def candidate(self, point: Vector, *, origin: str, rationale: str) -> Candidate:
-        """Candidate of a point, clipped to the box."""
+        """Return the candidate for a point, clipped to the box."""
         vector = self.low + self.span * np.clip(point, 0.0, 1.0)
         return self.space.decode(vector, origin=origin, rationale=rationale)
 
     def represents(self, candidate: Candidate) -> bool:
-        """Whether all signals have the fixed parameterization, so that a point stands for the candidate."""
+        """Whether all signals have the fixed parameterization, so that a point represents the candidate."""
         return all(self.space.is_fixed(r, candidate.signals[r.name]) for r in self.space.inputs)
 
     def point(self, candidate: Candidate) -> Vector:
-        """Point of a candidate; a free signal is read at the fixed control points."""
+        """Return the point for a candidate; a free signal is sampled at the fixed control points."""
         span = np.where(self.span > 0, self.span, 1.0)
         return np.clip((self.space.encode(candidate) - self.low) / span, 0.0, 1.0)
 
@@ -69,7 +69,8 @@ class UnitBox:
 class BoxEngine(ABC):
     """An engine on the unit box: subclasses propose points and learn costs.
 
-    The cost is the robustness; a failed evaluation has none and is passed on as None.
+    The cost is the robustness; for a failed evaluation it is None. Evaluations of candidates that the box
+    cannot represent are ignored.
     """
 
     name: ClassVar[str]
@@ -80,7 +81,7 @@ class BoxEngine(ABC):
         self._asked = 0
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Engine.ask."""
+        """Return the candidates for n proposed points; the generator for each depends only on its number."""
         candidates = []
         for _ in range(max(n, 1)):
             proposal = self._propose(np.random.default_rng([self.seed, self._asked]))
@@ -91,14 +92,14 @@ class BoxEngine(ABC):
         return candidates
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Engine.tell."""
+        """Learn from the evaluations whose candidates have the fixed parameterization."""
         for evaluation in evaluations:
             if self.box.represents(evaluation.candidate):
                 self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
 
     @abstractmethod
     def _propose(self, rng: np.random.Generator) -> Proposal:
-        """Return the next point, drawn with this generator."""
+        """Return the next point; ``rng`` is the only source of randomness to use."""
 
     def _learn(self, point: Vector, cost: float | None) -> None:  # noqa: B027 - most engines do not learn
-        """Take note of one evaluation."""
+        """Learn the cost of a point; None if its evaluation failed."""

@@ -1,4 +1,4 @@
-"""Covariance matrix adaptation: the evolution strategy of the package ``cma``."""
+"""CMA-ES, the evolution strategy with covariance matrix adaptation, from the package ``cma``."""
 
 import numpy as np
 from cma import CMAEvolutionStrategy
@@ -6,15 +6,15 @@ from cma import CMAEvolutionStrategy
 from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.problem.problem import Problem
 
-# First standard deviation, as a share of the ranges: the usual third of the box.
+# Initial standard deviation as a share of the ranges: the authors recommend about a third.
 _FIRST_STEP = 0.3
 
 
 class CMA(BoxEngine):
-    """CMA-ES from random starts; restarts where it has converged.
+    """CMA-ES from a random start, restarted after it has converged.
 
-    A generation is complete when all its points were told; further candidates asked for before that are
-    uniform random ones.
+    A generation ends when all its points have been told; further candidates requested before that are uniform
+    random.
     """
 
     name = "cma"
@@ -29,7 +29,7 @@ class CMA(BoxEngine):
         self._next = 0
 
     def _start(self) -> CMAEvolutionStrategy:
-        # The package does not search along a line: a single coordinate gets an idle second one.
+        # The package requires two dimensions: a single coordinate is complemented by an unused second one.
         dimension = max(2, self.box.dimension)
         return CMAEvolutionStrategy(
             self._rng.random(dimension),
@@ -37,7 +37,7 @@ class CMA(BoxEngine):
             {
                 "bounds": [0, 1],
                 "verbose": -9,
-                "seed": np.nan,  # leave numpy's global generator alone
+                "seed": np.nan,  # do not seed numpy's global generator
                 "randn": lambda *shape: self._rng.standard_normal(shape),
             },
         )
@@ -50,7 +50,7 @@ class CMA(BoxEngine):
             self._costs = [None] * len(self._generation)
             self._next = 0
         if self._next == len(self._generation):
-            return Proposal(rng.random(self.box.dimension), "uniform random while a generation is simulated")
+            return Proposal(rng.random(self.box.dimension), "uniform random, while a generation is simulated")
         point = self._generation[self._next][: self.box.dimension]
         self._next += 1
         return Proposal(point, f"generation {self._strategy.countiter + 1} of the evolution strategy")
@@ -58,6 +58,7 @@ class CMA(BoxEngine):
     def _learn(self, point: Vector, cost: float | None) -> None:
         if cost is not None:
             self._worst = max(self._worst, cost)
+        # A failed simulation counts as the worst cost so far: the strategy needs a number for every point.
         for i in range(self._next):
             own = self._generation[i][: self.box.dimension]
             if self._costs[i] is None and np.allclose(point, own, rtol=0, atol=1e-9):

@@ -1,4 +1,4 @@
-"""In which order corners are tried: where every input is constant at one end of its range."""
+"""The order in which corners are tried: points at which every input is constant at a bound of its range."""
 
 from math import inf
 
@@ -8,11 +8,11 @@ Levels = tuple[int, ...]
 
 
 class CornerWalk:
-    """Walks through the corners of a box whose coordinates are whole inputs and parameters.
+    """Walks through the corners of a box with one coordinate per input and parameter.
 
-    The first corner is random. Then one level of the best corner so far is flipped, that of the input
-    whose effect was looked at least often: where effects add up, the best corner is reached after one
-    simulation per input, and an input without effect costs one simulation and not half of all corners.
+    The first corner is random. Each of the next ones flips one level of the best corner so far, that of the
+    input flipped least often. If the effects of the inputs are additive, this reaches the best corner after
+    one simulation per input; an input without effect costs one simulation instead of half of all corners.
     """
 
     def __init__(self, groups: int) -> None:
@@ -21,7 +21,7 @@ class CornerWalk:
         self._flips = np.zeros(groups, dtype=int)
 
     def next(self, rng: np.random.Generator) -> Levels | None:
-        """Levels (0 low, 1 high) of the next corner, which counts as tried; None when all were tried."""
+        """Return the next corner's levels (0 low, 1 high) and count it as tried; None if all have been."""
         if not self._costs:
             levels: Levels = tuple(int(v) for v in rng.integers(0, 2, self.groups))
             self._costs[levels] = inf
@@ -37,12 +37,12 @@ class CornerWalk:
         return None
 
     def learn(self, levels: Levels, cost: float | None) -> None:
-        """Take note of what a corner costs; None where its simulation failed."""
+        """Learn the cost of a corner; None if its simulation failed."""
         self._costs[levels] = inf if cost is None else cost
 
     @property
     def settled(self) -> bool:
-        """Whether flipping any one level of the best corner was tried and made nothing better."""
+        """Whether every single flip of the best corner has been tried, without an improvement."""
         if not self._costs:
             return False
         best = min(self._costs, key=lambda levels: self._costs[levels])

@@ -1,4 +1,4 @@
-"""Constant extremes first: many requirements are tightest where inputs stay at an end of their range."""
+"""Constant extremes first: many requirements have their lowest robustness with inputs at their bounds."""
 
 import numpy as np
 

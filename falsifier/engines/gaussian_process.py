@@ -1,4 +1,4 @@
-"""A Gaussian process with a Matern-5/2 kernel on the unit box: Cholesky factors, no framework."""
+"""A Gaussian process with a Matern-5/2 kernel on the unit box, with numpy and scipy only."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,13 @@ from falsifier.engines.box import Array
 
 
 def matern(distance: Array) -> Array:
-    """Matern-5/2 correlation at distances in length scales."""
+    """Return the Matern-5/2 correlation at distances in units of the length scale."""
     d = np.sqrt(5.0) * distance
     return np.asarray((1.0 + d + d * d / 3.0) * np.exp(-d))
 
 
 def distances(x: Array, z: Array) -> Array:
-    """Euclidean distances of the rows of x, shape (n, d), to those of z, shape (m, d): shape (n, m)."""
+    """Return the Euclidean distances between the rows of x, (n, d), and those of z, (m, d), shape (n, m)."""
     squared = (x**2).sum(1)[:, None] + (z**2).sum(1)[None] - 2.0 * x @ z.T
     return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
 
@@ -25,11 +25,11 @@ class GaussianProcess:
     """A process of zero mean and unit variance, conditioned on data.
 
     Attributes:
-        points: shape (n, d).
+        points: points of the data, shape (n, d).
         lengths: length scale of each coordinate, shape (d,).
         factor: lower Cholesky factor of the covariance, shape (n, n).
         weights: covariance^-1 targets, shape (n,).
-        evidence: log marginal likelihood, but for a constant.
+        evidence: log marginal likelihood, up to a constant.
     """
 
     points: Array
@@ -40,7 +40,7 @@ class GaussianProcess:
 
     @classmethod
     def fit(cls, points: Array, targets: Array, lengths: Array, *, noise: float) -> "GaussianProcess":
-        """Condition on targets, shape (n,), with a noise variance."""
+        """Condition on targets, shape (n,), observed at points, shape (n, d), with this noise variance."""
         scaled = points / lengths
         covariance = matern(distances(scaled, scaled)) + noise * np.eye(len(points))
         factor = np.tril(cho_factor(covariance, lower=True)[0])
@@ -49,7 +49,7 @@ class GaussianProcess:
         return cls(points, lengths, factor, weights, evidence)
 
     def predict(self, points: Array) -> tuple[Array, Array]:
-        """Mean and standard deviation at points, shape (m, d): shapes (m,)."""
+        """Return mean and standard deviation, shape (m,) each, at points, shape (m, d)."""
         cross = matern(distances(points / self.lengths, self.points / self.lengths))
         explained = solve_triangular(self.factor, cross.T, lower=True)
         variance = 1.0 - (explained**2).sum(axis=0)
@@ -59,7 +59,7 @@ class GaussianProcess:
 def fit_lengths(
     points: Array, targets: Array, start: Array, rng: np.random.Generator, *, noise: float
 ) -> GaussianProcess:
-    """Fit with the most likely of some length scales near ``start``: scaled as a whole and one by one."""
+    """Fit with the most likely of several length scales near ``start``, scaled jointly and individually."""
     tried = [start * factor for factor in (1.0, 0.5, 0.8, 1.25, 2.0)]
     tried += [np.clip(start * np.exp(0.4 * rng.standard_normal(len(start))), 0.1, 20.0) for _ in range(12)]
     processes = [GaussianProcess.fit(points, targets, lengths, noise=noise) for lengths in tried]
@@ -67,9 +67,9 @@ def fit_lengths(
 
 
 def standardised(costs: Array) -> Array:
-    """Costs as targets: half their z-scores, half normal scores of their ranks.
+    """Return costs as targets of a process: half their z-scores plus half the normal scores of their ranks.
 
-    Ranks keep one huge cost from hiding all differences among the small ones.
+    Because of the ranks, one very large cost cannot hide the differences among the small ones.
     """
     from scipy.special import ndtri
 

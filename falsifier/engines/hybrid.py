@@ -1,10 +1,11 @@
-"""A language model and the surrogate engine on one history.
+"""A language model and the surrogate engine, sharing one history.
 
-The LLM opens, because its first guess is worth more than any corner. Later it is asked for several
-candidates at a time; the surrogate ranks them before one is simulated, and breeds from them. The LLM may
-call the surrogate for predictions in its turn; one that does not hears them afterwards and may answer them
-once. When its candidates stop helping, the surrogate goes on alone, near the critical time; when the
-surrogate stops helping or errs, the LLM is asked again and told why.
+The LLM proposes the first candidates, because its first guess is better than any corner. Later it is asked
+for several candidates at a time; the surrogate ranks them by predicted robustness before any is simulated,
+and uses them as starts of its own search. Before it answers, the LLM may request predictions from the
+surrogate; if it does not, it is told them afterwards and may revise its candidates once. If its candidates do
+not improve the result, the surrogate continues alone, with changes near the critical time. If the surrogate
+does not improve the result or its predictions fail, the LLM is asked again and told why.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,25 +24,28 @@ from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 
-# The LLM's first inputs stand for the constants; one switching or stepping input still teaches more.
+# The LLM's first candidates replace the constant extremes; one switching or stepping input is still
+# informative.
 ADVISED = SurrogateSettings(constants=0, bangs=1, probes=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """When the LLM is asked and how its answers are used.
+    """When the LLM is asked, and how its answers are used.
 
     Attributes:
-        opening: candidates of the first answer, simulated as they come.
-        count: candidates of a later answer.
-        tries: how many of a later answer are simulated at most, the best ranked first.
-        patience: simulations without a new best after which the other side gets its turn.
-        patience_growth: factor of the patience after each answer that helped nothing, so that an LLM that
+        opening: number of candidates of the first answer, all simulated.
+        count: number of candidates requested later.
+        tries: maximum number of candidates of a later answer that are simulated, best predicted first.
+        patience: number of simulations without improvement after which the LLM is asked.
+        patience_growth: factor of the patience after each answer without improvement, so that an LLM that
             does not help costs little.
-        misses: predicted violations in a row that did not happen after which the LLM is told so.
-        what_if: whether the LLM hears predictions of its candidates before one is simulated.
-        what_if_calls: how often it may call for them in a turn. Each call sends the whole conversation once
-            more, so a turn costs four requests, rejected replies apart: enough to compare, correct and check.
+        misses: number of successive predicted violations that did not occur after which predictions are no
+            longer trusted and the LLM is told so.
+        what_if: whether the LLM gets predictions of its candidates before any is simulated.
+        what_if_calls: maximum number of requests for predictions per question. Each sends the whole
+            conversation again, so three cost up to four requests plus rejected replies: enough to compare,
+            correct and check.
     """
 
     opening: int = 2
@@ -56,7 +60,7 @@ class Settings:
 
 @dataclass(slots=True)
 class _Turn:
-    """Candidates of one answer: those that wait to be asked for, and those that wait to be told."""
+    """Candidates of one answer: those still to be returned by ``ask``, and those whose evaluation is due."""
 
     queue: list[Candidate]
     best_before: float
@@ -88,19 +92,19 @@ class Hybrid:
         self._numeric: Candidate | None = None
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """Have the language model's side report to a run."""
+        """Connect the adviser, which has the chat, to a run."""
         self.adviser.attach(on_exchange, wrap)
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Engine.ask.
+        """Return n candidates of the LLM or the surrogate, whichever has its turn.
 
         Raises:
-            ChatError: when the first answer cannot be had; later the surrogate goes on without.
+            ChatError: if the first question is not answered; later the surrogate continues without the LLM.
         """
         return [self._ask_one() for _ in range(max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Engine.tell."""
+        """Tell both sides the evaluations, and note improvements, which decide who has the next turn."""
         self.surrogate.tell(evaluations)
         self.adviser.tell(evaluations)
         for evaluation in evaluations:
@@ -128,7 +132,7 @@ class Hybrid:
         return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
 
     def _reason_to_ask(self) -> str:
-        """Why the LLM should be asked now, as it is told; empty when it should not."""
+        """Return why the LLM should be asked now, in the words it is told; empty if it should not."""
         if self._since_best < self._patience:
             return ""
         if self.surrogate.misses >= self.settings.misses:
@@ -158,7 +162,7 @@ class Hybrid:
                 candidates = [*candidates, *revised.candidates]
                 predictions = self._trusted_predictions(candidates)
         except ChatError:
-            # The search need not end because advice is not to be had; it is asked for again much later.
+            # The search does not need advice to continue; the LLM is asked again much later.
             self._grow_patience()
             return
         self.surrogate.suggest(candidates)
@@ -182,33 +186,33 @@ class Hybrid:
 
     @property
     def _is_trusted(self) -> bool:
-        """Whether predictions were good of late."""
+        """Whether recent predictions were good."""
         return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
 
     def _offer(self) -> WhatIf | None:
-        """Leave to call for predictions, where they are worth it."""
+        """Return the permission to request predictions; None if they are disabled or not trusted."""
         settings = self.settings
         if not (settings.what_if and settings.what_if_calls and self._is_trusted):
             return None
         return WhatIf(self.surrogate, settings.what_if_calls)
 
     def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[float] | None:
-        """Predicted robustness of candidates, or None where predictions were bad of late."""
+        """Return the predicted robustness of candidates; None if recent predictions were poor."""
         if not self._is_trusted:
             return None
         return [verdict.robustness for verdict in self.surrogate.foresee(candidates)] or None
 
     def _prediction_notes(self) -> list[str]:
-        """What the surrogate would simulate next, for the LLM."""
+        """Return what the surrogate would simulate next, and its prediction, in words for the LLM."""
         self._numeric = self._numeric or self.surrogate.ask(1)[0]
         predictions = self._trusted_predictions([self._numeric])
         if predictions is None:
-            return ["The numerical model's predictions were bad of late; judge by the trajectories alone."]
+            return ["The numerical model's recent predictions were poor; rely on the trajectories only."]
         told = self.adviser.describe(self._numeric)
         return [f"The numerical model expects robustness {predictions[0]:.4g} of its own best input: {told}."]
 
     def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
-        """Predictions of the LLM's candidates, one line each."""
+        """Return the predictions of the LLM's candidates, one line each, in words for the LLM."""
         lines = [
             f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; its predicted robustness is "
             f"{p:.4g}."

@@ -30,7 +30,7 @@ from falsifier.problem.problem import Problem
 
 T = TypeVar("T")
 
-# Trajectories of older evaluations are let go, except for the best ones: prompts tell of few old samples.
+# Number of latest and best evaluations whose trajectories are kept in memory; prompts show few older samples.
 _KEPT_RECENT = 40
 _KEPT_BEST = 10
 
@@ -39,15 +39,15 @@ class LLMEngine:
     """Asks a language model for the next candidates.
 
     Args:
-        view: the problem, without what simulates it.
-        chat: the LLM.
-        variant: what its prompts tell.
-        on_exchange: called with every question and answer, until a run attaches itself.
-        sample: which of several runs with equal questions this is.
-        prompt_tokens: most tokens of a prompt, by estimate.
-        anonymous: whether the LLM is told neutral names only.
-        fallback: who goes on when the LLM cannot be reached or gives no valid reply; None: the error ends
-            the run.
+        view: the problem without its model.
+        chat: the chat with the LLM.
+        variant: the prompt variant, which determines what prompts contain.
+        on_exchange: called with every exchange until ``attach`` replaces it.
+        sample: number that distinguishes runs with equal questions, so that cached replies are not shared.
+        prompt_tokens: maximum number of tokens of a prompt, estimated.
+        anonymous: whether the LLM gets neutral names instead of real ones.
+        fallback: engine to switch to if the LLM cannot be reached or gives no valid reply; None: the error
+            ends the run.
     """
 
     def __init__(
@@ -76,24 +76,24 @@ class LLMEngine:
 
     @property
     def name(self) -> str:
-        """Model and prompt variant."""
+        """Name of the LLM and of the prompt variant, the origin of its candidates."""
         return f"{self._chat.llm} {self._variant.name}"
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """Report to a run, and ask the chat that it wraps around this engine's own."""
+        """Report exchanges to a run, and use its wrapper around this engine's chat from now on."""
         self._on_exchange = on_exchange
         self._chat = wrap(self._chat)
 
     @property
     def handed_over(self) -> bool:
-        """Whether the fallback has taken over for good."""
+        """Whether the engine has permanently switched to the fallback."""
         return self._handed_over
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n new candidates.
 
         Raises:
-            ChatError: when the LLM cannot be reached or gives no valid reply, and there is no fallback.
+            ChatError: if the LLM cannot be reached or gives no valid reply, and there is no fallback.
         """
         candidates: list[Candidate] = []
         while len(candidates) < n:
@@ -118,10 +118,10 @@ class LLMEngine:
         what_if: WhatIf | None = None,
         dispensable: bool = False,
     ) -> Advice:
-        """Return up to ``count`` new candidates, at least one, of a single question; see Adviser.propose.
+        """Ask one question, as ``Adviser.propose``; return at least one and at most ``count`` new candidates.
 
         Raises:
-            ChatError: when the LLM cannot be reached or gives no valid reply.
+            ChatError: if the LLM cannot be reached or gives no valid reply.
         """
         tool = None if what_if is None else self._tool(what_if)
         found = self._ask_once(count, notes, tool, dispensable=dispensable)
@@ -130,14 +130,14 @@ class LLMEngine:
         return Advice(revealed, foresaw=tool is not None and tool.answered > 0)
 
     def describe(self, candidate: Candidate) -> str:
-        """See Adviser.describe."""
+        """Return a candidate in one line; as a point if the prompt variant shows no names."""
         shown = self._disguise.hidden_candidate(candidate) if self._disguise else candidate
         if not self._variant.has("names"):
             return "; ".join(choices.as_point(self._view, shown))
         return in_one_line(shown)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """Add evaluations to the history, whoever proposed their candidates."""
+        """Add evaluations to the history, including those of other engines' candidates."""
         if self._fallback is not None:
             self._fallback.tell(evaluations)
         told = [self._disguise.hidden(e) for e in evaluations] if self._disguise else evaluations
@@ -185,15 +185,15 @@ class LLMEngine:
         except NoValidReplyError:
             raise
         except ChatError as error:
-            if dispensable:  # so that a resumed run goes without at the same place
+            if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
                 self._on_exchange(_unanswered(self._chat, request, error))
             raise
 
     def _new(self, candidates: list[Candidate]) -> list[Candidate]:
-        """Candidates that were not seen before.
+        """Return the candidates that are neither evaluated nor pending.
 
         Raises:
-            RejectedReplyError: when there is none.
+            RejectedReplyError: if there is none.
         """
         seen = {e.candidate.key: f"sample {i}" for i, e in enumerate(self._evaluations, start=1)}
         seen |= {c.key: "one that was proposed already" for c in self._pending}
@@ -214,10 +214,20 @@ def make_llm_engine(
     anonymous: bool = False,
     fallback: Engine | None = None,
 ) -> LLMEngine:
-    """Make the engine for a problem; variant None means the default one. See LLMEngine.
+    """Create the engine for a problem; for the arguments see LLMEngine.
+
+    Args:
+        problem: the problem to search.
+        chat: the chat with the LLM.
+        variant: name of the prompt variant; None: the default one.
+        on_exchange: called with every exchange until ``attach`` replaces it.
+        sample: number that distinguishes runs with equal questions.
+        prompt_tokens: maximum number of tokens of a prompt, estimated.
+        anonymous: whether the LLM gets neutral names instead of real ones.
+        fallback: engine to switch to if the LLM fails.
 
     Raises:
-        SpecError: for an unknown variant.
+        SpecError: if the variant is unknown.
     """
     return LLMEngine(
         View.of(problem),
@@ -240,7 +250,7 @@ def preview(
     prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
     anonymous: bool = False,
 ) -> tuple[Message, ...]:
-    """Messages that would be sent next; sends nothing."""
+    """Return the messages that would be sent next, without sending them."""
     view = View.of(problem)
     if anonymous:
         disguise = Disguise.of(view)
@@ -252,7 +262,7 @@ def preview(
 def preview_tool(
     problem: Problem, *, calls: int, variant: str | None = None, anonymous: bool = False
 ) -> Tool:
-    """Tool that a question with leave to ask for predictions would offer; sends nothing."""
+    """Return the tool that a question with permission to request predictions would offer; sends nothing."""
     view = View.of(problem)
     shown = Disguise.of(view).view if anonymous else view
     form = _form(shown, variant_named(variant), count=MOST_CANDIDATES, reasoned=False)
@@ -284,7 +294,7 @@ def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
 
 
 def _thinned(evaluations: list[Evaluation]) -> list[Evaluation]:
-    """Return the same evaluations without those trajectories that no prompt will tell."""
+    """Return the same evaluations without the trajectories that no prompt will show."""
     if len(evaluations) <= _KEPT_RECENT:
         return evaluations
     judged = sorted((e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None)

@@ -1,4 +1,4 @@
-"""Tree-structured Parzen estimators: the sampler of the package ``optuna``."""
+"""The tree-structured Parzen estimator (TPE) of the package ``optuna``."""
 
 import warnings
 
@@ -10,10 +10,10 @@ from falsifier.problem.problem import Problem
 
 
 class TPE(BoxEngine):
-    """Optuna's TPE over all coordinates jointly, on a study that is kept in memory.
+    """Optuna's multivariate TPE, with a study in memory.
 
-    Points that nobody has judged yet count as bad ones, so that a batch spreads. Evaluations of others'
-    candidates are added as finished trials.
+    Points not yet evaluated count as bad ones ("constant liar"), which spreads a batch. Evaluations of other
+    engines' candidates are added as finished trials.
     """
 
     name = "optuna"
@@ -50,7 +50,7 @@ class TPE(BoxEngine):
 
 
 def _quiet_study(seed: int) -> optuna.Study:
-    """Study in memory, made without an announcement and without warnings of what older versions call new."""
+    """Create a study in memory, without its log message and without warnings about experimental options."""
     verbosity = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:

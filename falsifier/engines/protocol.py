@@ -1,4 +1,4 @@
-"""What every search engine is: ask for candidates, tell it evaluations."""
+"""The protocol of all search engines: ask for candidates, tell evaluations."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
@@ -13,32 +13,36 @@ class Engine(Protocol):
     """Suggests the next candidates.
 
     An engine sees the search space, the requirement and evaluations, never the model. It is deterministic:
-    the same seed and the same sequence of calls give the same candidates, which is how runs resume.
+    the same seed and the same sequence of calls give the same candidates. Resuming a run depends on that.
+    ``falsifier.testing.EngineContract`` tests these rules.
     """
 
     @property
     def name(self) -> str:
-        """What its candidates bear as origin."""
+        """Origin of its candidates."""
         ...
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """Return n candidates (at least one) to simulate next, whether or not earlier ones were answered."""
+        """Return n candidates (at least one) to simulate next.
+
+        May be called again before the evaluations of earlier candidates have been told.
+        """
         ...
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """Learn from evaluations, also failed ones and ones of candidates that it never proposed."""
+        """Learn from evaluations, including failed ones and those of candidates that it did not propose."""
         ...
 
 
 @runtime_checkable
 class AsksLLM(Protocol):
-    """An engine that asks a language model: the loop counts, records and replays what it is answered."""
+    """An engine that asks a language model; a run counts, records and replays its exchanges."""
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """Report every question and answer from now on, and ask the wrapped chat; called before a run.
+        """Connect the engine to a run, before its first ``ask``: report every exchange, use the wrapped chat.
 
         Args:
-            on_exchange: called with every exchange, rejected replies included; may raise ChatError.
-            wrap: makes the chat to ask of the engine's own.
+            on_exchange: called with every exchange, including rejected replies; may raise ChatError.
+            wrap: returns the chat to use instead of the engine's own, which it is given.
         """
         ...

@@ -1,4 +1,4 @@
-"""Engines by name; an engine's module is imported when the engine is first made."""
+"""Engines by name; an engine's module is imported when the engine is first created."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,8 +17,9 @@ class Registered:
 
     Attributes:
         target: ``module:class``; the class is called as ``class(problem, seed=seed, **options)``.
-        summary: what it does, in one line for ``--help``.
-        extra: of this project, which brings the package that the engine needs and is named after.
+        summary: one line for ``--help``.
+        extra: extra of this project that installs the package which the engine needs; it has the engine's
+            name.
     """
 
     target: str
@@ -29,7 +30,7 @@ class Registered:
         """Import the engine's class.
 
         Raises:
-            SpecError: when the package that it needs is not installed.
+            SpecError: if the package that it needs is not installed.
         """
         module, _, name = self.target.partition(":")
         try:
@@ -38,31 +39,31 @@ class Registered:
             if not self.extra:
                 raise
             raise SpecError(
-                f"the engine {self.extra!r} needs a package that is not installed ({error}): "
-                f"pip install 'falsifier[{self.extra}]'"
+                f"the engine {self.extra!r} needs a package that is not installed ({error}); "
+                f"install it with pip install 'falsifier[{self.extra}]'"
             ) from None
 
 
 ENGINES: Mapping[str, Registered] = MappingProxyType(
     {
         "surrogate": Registered(
-            "falsifier.engines.surrogate:Surrogate", "learns the dynamics and searches on what it learnt"
+            "falsifier.engines.surrogate:Surrogate", "learns the dynamics and searches on its predictions"
         ),
-        "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points of the box"),
-        "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence over the box"),
+        "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points"),
+        "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence"),
         "corners": Registered("falsifier.engines.corners:Corners", "constant extremes first, then random"),
         "annealing": Registered("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
         "cma": Registered("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(
-            "falsifier.engines.bayesian:Bayesian", "Gaussian process and expected improvement"
+            "falsifier.engines.bayesian:Bayesian", "Gaussian process with expected improvement"
         ),
         "optuna": Registered(
-            "falsifier.engines.optuna_tpe:TPE", "optuna's tree-structured Parzen estimators", extra="optuna"
+            "falsifier.engines.optuna_tpe:TPE", "optuna's tree-structured Parzen estimator", extra="optuna"
         ),
         "botorch": Registered(
             "falsifier.engines.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
         ),
-        "hybrid": Registered("falsifier.engines.hybrid:Hybrid", "a language model and the surrogate"),
+        "hybrid": Registered("falsifier.engines.hybrid:Hybrid", "a language model with the surrogate"),
     }
 )
 
@@ -70,30 +71,30 @@ DEFAULT_ENGINE = "surrogate"
 
 
 def check_engine(name: str) -> None:
-    """Refuse a name that is no engine's.
+    """Check that an engine of this name exists.
 
     Raises:
-        SpecError: with the names there are.
+        SpecError: if there is none; lists the known names.
     """
     if name not in ENGINES:
         raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
 
 
 def make_engine(name: str, problem: Problem, *, seed: int, **options: Any) -> Engine:
-    """Make the engine of this name for a problem.
+    """Create the engine with this name for a problem.
 
     Args:
         name: one of ENGINES.
-        problem: what is searched.
+        problem: the problem to search.
         seed: the same seed and the same sequence of calls give the same candidates.
-        options: what the engine takes beside that; ``hybrid`` needs the language model's side.
+        options: further arguments of the engine; ``hybrid`` requires ``adviser``.
 
     Raises:
-        SpecError: for an unknown name, an engine whose package is not installed, or a problem in which
-            nothing may be varied.
+        SpecError: if the name is unknown, the engine's package is not installed, or the problem has nothing
+            to search.
     """
     check_engine(name)
     if not problem.space.names:
-        raise SpecError("nothing may be varied: give at least one input or parameter a range")
+        raise SpecError("nothing to search; give at least one input or parameter a range")
     engine: Engine = ENGINES[name].load()(problem, seed=seed, **options)
     return engine

@@ -1,4 +1,4 @@
-"""Quasi-random search: a scrambled Sobol sequence covers the box more evenly than random points."""
+"""Quasi-random search: a scrambled Sobol sequence covers the box more evenly than random points do."""
 
 import numpy as np
 from scipy.stats import qmc
@@ -6,8 +6,8 @@ from scipy.stats import qmc
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.problem.problem import Problem
 
-# scipy's table of direction numbers ends here; more coordinates are drawn at random.
-_MOST_DIMENSIONS = qmc.Sobol.MAXDIM
+# Number of coordinates for which scipy has direction numbers; further ones are drawn at random.
+_MAX_DIMENSIONS = qmc.Sobol.MAXDIM
 
 
 class Sobol(BoxEngine):
@@ -18,10 +18,10 @@ class Sobol(BoxEngine):
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
         self._sequence = qmc.Sobol(
-            min(self.box.dimension, _MOST_DIMENSIONS), scramble=True, seed=np.random.default_rng(seed)
+            min(self.box.dimension, _MAX_DIMENSIONS), scramble=True, seed=np.random.default_rng(seed)
         )
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         point = rng.random(self.box.dimension)
-        point[:_MOST_DIMENSIONS] = self._sequence.random(1)[0]
+        point[:_MAX_DIMENSIONS] = self._sequence.random(1)[0]
         return Proposal(point, f"point {self._asked + 1} of a Sobol sequence")

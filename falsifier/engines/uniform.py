@@ -1,4 +1,4 @@
-"""Uniform random search: the yardstick of every other engine."""
+"""Uniform random search: the baseline for all other engines."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from falsifier.engines.box import BoxEngine, Proposal
 
 
 class Uniform(BoxEngine):
-    """Points drawn uniformly from the box."""
+    """Points drawn uniformly at random from the box."""
 
     name = "uniform"
 

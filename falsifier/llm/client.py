@@ -64,7 +64,7 @@ class LiteLLMChat:
                 messages=[sent_message(m) for m in request.messages],
                 api_base=self.api_base,
                 timeout=self.timeout,
-                drop_params=True,
+                drop_params=True,  # what the LLM does not accept is omitted; _effective() reports it
                 **{"api_key": key, **arguments},
             )
             return self._reply(request, response, arguments, perf_counter() - started)

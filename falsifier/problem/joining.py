@@ -95,7 +95,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
         ModelError: if the FMU cannot be read.
     """
     if not fmu.is_file():
-        raise SpecError(f"no such FMU: {fmu}; give the path of an .fmu file")
+        raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
     info = read_info(fmu)
     stop_time = changes.stop_time or info.stop_time
     if stop_time is None:

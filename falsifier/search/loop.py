@@ -208,6 +208,7 @@ class _Loop:
             turn = standing[turns % len(standing)]
             turns += 1
             told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
+            # One by one, as they finish: what an interruption leaves of a batch is counted and recorded.
             for evaluation in self.steps.evaluate(turn.problem, self.ask(turn, batch)):
                 judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
                 self.note(turn, evaluation, judged)

@@ -55,6 +55,7 @@ class Replayed:
         if not self.asked:
             return self.live.ask(engine, wanted)
         record = self.asked.pop(0)
+        # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
         candidates = engine.ask(record.n)
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
             raise JournalError(

@@ -1,1 +1,1 @@
-"""What people see: text, progress, notebooks, pictures, pages."""
+"""Everything shown to users: text, progress, notebooks, figures, reports."""

@@ -1,4 +1,4 @@
-"""What people see of a running campaign, on stderr: a live table on a terminal, plain lines elsewhere."""
+"""The display of a running campaign on stderr: a live table on a terminal, plain lines otherwise."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from falsifier.campaigns import Progress, RunProgress
 from falsifier.core.literals import one_line
+from falsifier.core.words import counted
 from falsifier.views.terminal import error_console, moving, unbroken
 
 if TYPE_CHECKING:
@@ -14,15 +15,15 @@ if TYPE_CHECKING:
 
 Show = Callable[[Progress], None]
 
-# Simulations per second are taken over the last looks within this time in s.
+# Time in s over which simulations per second are averaged.
 _RATE_WINDOW = 10.0
-# Shortest time in s between two plain lines on how far all is.
+# Minimum time in s between two plain lines with the overall progress.
 _LINE_PERIOD = 30.0
 
 
 @contextmanager
 def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
-    """Show how far a campaign is, for as long as the context lasts."""
+    """Show a campaign's progress while the context lasts."""
     if quiet:
         yield lambda progress: None
         return
@@ -42,13 +43,13 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
 
 
 class Rate:
-    """Simulations per second, from the numbers of the last looks."""
+    """Simulations per second, averaged over the last few seconds."""
 
     def __init__(self) -> None:
         self._seen: list[tuple[float, int]] = []
 
     def __call__(self, progress: Progress, now: float | None = None) -> float | None:
-        """Rate at this moment in 1/s; None at the first look."""
+        """Return the current rate in 1/s; None at the first call."""
         time = monotonic() if now is None else now
         self._seen.append((time, progress.spent.simulations))
         while self._seen[0][0] < time - _RATE_WINDOW:
@@ -58,7 +59,7 @@ class Rate:
 
 
 class PlainScoreboard:
-    """One line for each run that ends, and one on the whole now and then."""
+    """Writes one line per run that ends, and now and then one line with the overall progress."""
 
     def __init__(self, write: Callable[[str], None]) -> None:
         self._write = write
@@ -68,11 +69,11 @@ class PlainScoreboard:
         self._written = 0.0
 
     def __call__(self, progress: Progress) -> None:
-        """Write what is new."""
+        """Write a line per run that ended since the last call."""
         ended = {r.name: str(r.status) for r in progress.runs if r.status not in ("waiting", "running")}
-        if not self._begun:
+        if not self._begun:  # runs that ended before this start get no line
             self._begun, self._ended = True, ended
-            self._write(f"{len(progress.runs)} runs, {progress.finished} of them finished before")
+            self._write(f"{counted(len(progress.runs), 'run')}, {progress.finished} already finished")
         for run in progress.runs:
             if run.name in ended and self._ended.get(run.name) != run.status:
                 self._ended[run.name] = run.status
@@ -84,22 +85,22 @@ class PlainScoreboard:
 
 
 def run_line(run: RunProgress) -> str:
-    """One run in a line."""
+    """Describe an ended run in one line."""
     best = "" if run.best is None else f", best robustness {run.best:+.4g}"
-    count = f"{run.spent.simulations} simulation{'' if run.spent.simulations == 1 else 's'}"
+    count = counted(run.spent.simulations, "simulation")
     reason = f": {run.reason}" if run.status == "failed" else ""
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
 
 
 def overall_line(progress: Progress, rate: float | None, *, stopped: bool = False) -> str:
-    """A whole campaign in a line; stopped: nobody works on it any more."""
+    """Describe a campaign's progress in one line; stopped: no process works on it any more."""
     counts, spent = progress.counts, progress.spent
     parts = [
-        f"{progress.finished}/{len(progress.runs)} runs finished",
+        f"{progress.finished}/{counted(len(progress.runs), 'run')} finished",
         f"{counts['falsified']} falsified",
         *([f"{counts['failed']} failed"] if counts["failed"] else []),
         *([] if stopped else [f"{counts['running']} running"]),
-        f"{spent.simulations} simulations" + ("" if rate is None else f" ({rate:.0f}/s)"),
+        counted(spent.simulations, "simulation") + ("" if rate is None else f" ({rate:.0f}/s)"),
     ]
     if spent.calls:
         cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
@@ -108,7 +109,7 @@ def overall_line(progress: Progress, rate: float | None, *, stopped: bool = Fals
 
 
 def _fitting(progress: Progress, rate: float | None, console: "Console") -> "RenderableType":
-    """The live table: requirements that run first, as many as the terminal has lines for."""
+    """The live table: as many requirements as fit on the terminal, preferring those that are running."""
     from rich.markup import escape
     from rich.table import Table
 

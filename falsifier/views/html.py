@@ -1,4 +1,4 @@
-"""HTML and SVG as text that is escaped unless it was made here."""
+"""HTML and SVG markup; plain text is escaped automatically."""
 
 from html import escape
 
@@ -9,18 +9,18 @@ _SELF_CLOSING = frozenset({"circle", "line", "path", "rect"})
 
 
 class Html(str):
-    """Text that is markup already."""
+    """Text that is markup already and is not escaped again."""
 
     __slots__ = ()
 
 
 def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
-    """Element with children; texts that are not Html are escaped, attributes always.
+    """Make an element; children that are not Html are escaped, attributes always.
 
     Args:
         tag: name of the element.
         children: content.
-        attributes: ``class_`` stands for ``class``, other underscores for hyphens; None leaves one out.
+        attributes: ``class_`` stands for ``class``, other underscores for hyphens; None omits an attribute.
 
     >>> el("p", "1 < 2", class_="a")
     '<p class="a">1 &lt; 2</p>'
@@ -39,7 +39,7 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
 
 
 def join(*parts: str) -> Html:
-    """Parts one after another; those that are not Html are escaped."""
+    """Concatenate parts; those that are not Html are escaped."""
     return Html("".join(part if isinstance(part, Html) else _escaped(part) for part in parts))
 
 

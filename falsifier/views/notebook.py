@@ -1,7 +1,7 @@
-"""How problems, trajectories, verdicts and results look in notebooks, and progress that moves there.
+"""How problems, trajectories, verdicts and results look in notebooks.
 
-The values know nothing of this: their formatters are registered with IPython by name, and made when one is
-first shown. The markup is plain tables and PNG pictures, so that a code host shows it, too::
+The values do not depend on this module: their formatters are registered with IPython by type name. The markup
+consists of plain tables and PNG images, so that code hosts display it too::
 
     result = falsify("AT1", listeners=[progress()])
     result
@@ -14,7 +14,7 @@ from typing import Any
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import choices
+from falsifier.core.words import choices, counted
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
@@ -23,18 +23,18 @@ from falsifier.stl.verdict import Verdict
 from falsifier.views.html import Html, el, join
 from falsifier.views.text import seconds_text
 
-# Pictures are kept in the notebook's file: this makes some 20 kB each.
+# Images are stored in the notebook file; at this resolution about 20 kB each.
 _DPI = 80
-# Front ends align cells of tables to the right.
+# Notebook front ends align table cells to the right by default.
 _LEFT = "text-align: left"
-# Signals whose course is drawn; all are in the table.
+# Maximum number of signals in a trajectory's figure; the table lists all.
 _DRAWN_SIGNALS = 6
 
 Fact = tuple[str, str]
 
 
 def register() -> None:
-    """Have IPython show problems, verdicts, evaluations, trajectories and results; elsewhere do nothing."""
+    """Let IPython show problems, verdicts, evaluations, trajectories and results; outside it do nothing."""
     from IPython.core import getipython
 
     shell: Any = getipython.get_ipython()
@@ -46,7 +46,7 @@ def register() -> None:
 
 
 def problem_html(problem: Problem) -> str:
-    """Requirement in signs and words, the model, and what is searched."""
+    """The requirement as a formula and in words, the model, and the search space."""
     requirement, experiment = problem.requirement, problem.experiment
     facts: list[Fact] = [
         ("requirement", el("code", str(requirement.formula))),
@@ -67,7 +67,7 @@ def verdict_html(verdict: Verdict) -> str:
 
 
 def evaluation_html(evaluation: Evaluation) -> str:
-    """Verdict and candidate, or why there is no verdict."""
+    """Verdict and candidate; without a verdict, the reason."""
     verdict = evaluation.verdict
     facts = [("status", f"{evaluation.status}: {evaluation.reason}")] if verdict is None else []
     facts += _verdict_facts(verdict) if verdict is not None else []
@@ -75,7 +75,7 @@ def evaluation_html(evaluation: Evaluation) -> str:
 
 
 def trajectory_html(trajectory: Trajectory) -> str:
-    """Range of each signal, and a picture of the first few."""
+    """Range of each signal, and a figure of the first few."""
     from falsifier.views.plotting import plot_trajectory, png
 
     header = ("signal", "unit", "first", "smallest", "largest", "last")
@@ -84,7 +84,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
         for name, c in trajectory.columns.items()
     ]
     end = trajectory.times[-1]
-    about = f"{len(trajectory)} samples from 0 to {end:g} s, every {trajectory.step:g} s"
+    about = f"{counted(len(trajectory), 'sample')} from 0 to {end:g} s, every {trajectory.step:g} s"
     parts = [el("p", about), _table(header, rows)]
     if trajectory.names:
         drawn = plot_trajectory(trajectory, trajectory.names[:_DRAWN_SIGNALS])
@@ -93,18 +93,18 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
 
 def result_html(result: Result) -> str:
-    """How the run ended, with a picture of the counterexample or of the best evaluation."""
+    """How the run ended, with a figure of the counterexample or of the best evaluation."""
     from falsifier.views.plotting import plot_evaluation, png
 
     found, spent = result.counterexample, result.spent
     shown = found.evaluation if found else result.best
-    title = f"{result.problem.name}: {result.status} after {spent.simulations} simulation"
+    title = f"{result.problem.name}: {result.status} after {counted(spent.simulations, 'simulation')}"
     facts: list[Fact] = [("confirmed" if found else "reason", found.reason if found else result.reason)]
     if shown is not None:
         facts += _verdict_facts(shown.verdict) if shown.verdict else []
         facts += _candidate_facts(shown.candidate)
     facts.append(("time", seconds_text(spent)))
-    parts = [el("b", title + ("" if spent.simulations == 1 else "s")), _facts(facts)]
+    parts = [el("b", title), _facts(facts)]
     if shown is not None and shown.trajectory is not None:
         drawn = plot_evaluation(result.problem, shown)
         parts.append(_picture(png(drawn, dpi=_DPI), "counterexample" if found else "best evaluation"))
@@ -121,13 +121,13 @@ _FORMATTERS: Mapping[type, Callable[[Any], str]] = {
 
 
 def _verdict_facts(verdict: Verdict) -> list[Fact]:
-    sign = "violated" if verdict.violated else "holds"
+    sign = "violated" if verdict.violated else "satisfied"
     values = ", ".join(f"{name} = {value:g}" for name, value in verdict.values.items())
     return [
         ("robustness", f"{verdict.robustness:+.6g} ({sign})"),
         ("critical time", f"{verdict.critical_time:g} s"),
         ("decided by", el("code", verdict.predicate)),
-        ("values there", values),
+        ("values then", values),
     ]
 
 
@@ -143,7 +143,7 @@ def _space(space: SearchSpace) -> Html:
         for r in space.inputs
     ]
     rows += [
-        (p.name, p.unit, f"{p.low:g} to {p.high:g}", "one number", p.description) for p in space.parameters
+        (p.name, p.unit, f"{p.low:g} to {p.high:g}", "one value", p.description) for p in space.parameters
     ]
     return _table(("searched", "unit", "range", "control points", "description"), rows)
 
@@ -159,7 +159,7 @@ def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Html:
 
 
 def _picture(content: bytes, description: str) -> Html:
-    """A PNG picture inside the markup."""
+    """A PNG image embedded in the markup."""
     return Html(f'<img src="data:image/png;base64,{b64encode(content).decode()}" alt="{description}">')
 
 

@@ -1,6 +1,6 @@
-"""What there is to draw of one simulation, as values: compared quantities with their bounds, then inputs.
+"""What to draw of one simulation, as values: compared quantities with their bounds, then inputs.
 
-The pictures of matplotlib and the drawings of reports are made from the same panels.
+Both the matplotlib figures and the charts in reports are drawn from these panels.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,7 +24,7 @@ _LARGEST_DRAWN = 1e300
 
 
 class Range(Protocol):
-    """Name, limits and unit of a searched input."""
+    """Name, bounds and unit of a searched input."""
 
     @property
     def name(self) -> str:
@@ -43,18 +43,18 @@ class Range(Protocol):
 
     @property
     def unit(self) -> str:
-        """Unit, empty where unknown."""
+        """Unit; empty if unknown."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bound:
-    """What a quantity is compared with, where the comparison counts.
+    """The bound that a predicate sets on a quantity, and the time window in which the formula evaluates it.
 
     Attributes:
-        predicate: text of the comparison.
-        start: earliest time in s at which it counts.
-        end: latest time in s at which it counts.
+        predicate: text of the predicate.
+        start: earliest time in s at which it is evaluated.
+        end: latest time in s at which it is evaluated.
         values: the bound at the panel's times, shape (n,).
     """
 
@@ -69,11 +69,11 @@ class Panel:
     """One quantity over time.
 
     Attributes:
-        title: name of the quantity, with its unit where known.
+        title: name of the quantity, with its unit if known.
         times: in s, shape (n,).
-        values: shape (n,).
-        bounds: what it is compared with; none for inputs.
-        critical: time in s that decided the verdict, where this quantity did.
+        values: values at these times, shape (n,).
+        bounds: what it is compared with; empty for inputs.
+        critical: critical time in s if this quantity decided the verdict, otherwise None.
         points: control points (time, value) of an input.
         limits: range of an input.
         steps: whether values are held until the next sample.
@@ -96,7 +96,7 @@ def panels(
     inputs: Iterable[Range],
     verdict: Verdict | None,
 ) -> list[Panel]:
-    """Panels of one simulation: each compared quantity once, then each searched input."""
+    """Make the panels of one simulation: one per compared quantity, then one per searched input."""
     quantities = [_quantity(trajectory, predicates, verdict) for predicates in _compared(formula).values()]
     return quantities + [_input(r, trajectory, candidate) for r in inputs]
 
@@ -104,9 +104,9 @@ def panels(
 def judged_windows(
     formula: Formula, start: float = 0.0, end: float = 0.0
 ) -> Iterator[tuple[Predicate, tuple[float, float]]]:
-    """Yield each predicate with the earliest and latest time in s at which its value counts.
+    """Yield each predicate with the earliest and latest time in s at which it is evaluated.
 
-    Operators without a bound reach to infinity.
+    Unbounded operators extend to infinity.
     """
     if isinstance(formula, Predicate):
         yield formula, (start, end)
@@ -114,7 +114,7 @@ def judged_windows(
     if isinstance(formula, Always | Eventually | Until):
         window = formula.window
         begin, finish = (window.start, window.end) if window else (0.0, np.inf)
-        # The left operand of until counts from the operator's own time on.
+        # Until evaluates its left operand from its own time on, not only inside its window.
         start, end = (start if isinstance(formula, Until) else start + begin), end + finish
     for child in formula.children:
         yield from judged_windows(child, start, end)
@@ -170,7 +170,7 @@ def _drawable(values: ArrayLike) -> Array:
 
 
 def _sides(predicate: Predicate) -> tuple[Expression, Expression]:
-    """Varying side, then the side that it is compared with."""
+    """The quantity, then the side that it is compared with."""
     if isinstance(predicate.left, Number):
         return predicate.right, predicate.left
     return predicate.left, predicate.right

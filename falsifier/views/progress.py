@@ -1,10 +1,11 @@
-"""What people see of a running search: live on a terminal or in a notebook, plain lines elsewhere."""
+"""The display of a running search: live on a terminal or in a notebook, plain lines otherwise."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
+from falsifier.core.words import counted
 from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
@@ -15,12 +16,12 @@ if TYPE_CHECKING:
 
 @contextmanager
 def make_display(*, quiet: bool = False) -> Iterator[Listener]:
-    """Listener that shows progress: live on a terminal or in a notebook, plain lines on stderr elsewhere."""
+    """Make a listener that shows progress: live on a terminal or in a notebook, otherwise lines on stderr."""
     if quiet:
         yield lambda event: None
         return
     console = error_console()
-    if console.is_jupyter:  # there rich's own live line needs widgets
+    if console.is_jupyter:  # rich's own live display would need widgets there
         yield NotebookLine()
         return
     if not console.is_terminal:
@@ -47,11 +48,9 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                 case Evaluated():
                     progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
-                    progress.update(task, note=f"LLM answered, {event.spent.tokens} tokens so far")
+                    progress.update(task, note=f"LLM replied, {event.spent.tokens} tokens so far")
                 case Confirmed():
-                    c = event.confirmation
-                    text = one_line(f"violation {c.outcome}: {c.reason}")
-                    progress.console.print(text, highlight=False, markup=False)
+                    progress.console.print(one_line(_confirmed(event)), highlight=False, markup=False)
                 case _:
                     pass
 
@@ -59,7 +58,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
 
 
 def progress() -> Listener:
-    """Listener that shows how far a search is: one moving line in a notebook, else lines on stderr.
+    """Make a listener that shows the progress of a search: one live line in a notebook, else lines on stderr.
 
     >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
     """
@@ -68,27 +67,29 @@ def progress() -> Listener:
 
 
 class PlainDisplay:
-    """One line at the start, at each improvement, at each failure and at each confirmation."""
+    """Prints one line at the start, and per improvement, failure and confirmation."""
 
     def __init__(self, console: "Console") -> None:
         self._console = console
 
     def __call__(self, event: Event) -> None:
-        """Print what is worth a line."""
+        """Print a line if the event deserves one."""
         match event:
             case RunStarted():
-                replayed = f", {event.replayed} evaluations from the journal" if event.replayed else ""
+                known = counted(event.replayed, "evaluation")
+                replayed = f", {known} from the journal" if event.replayed else ""
                 for problem in event.problems:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
-                self._line(f"simulation {event.index + 1}: {evaluation.status}: {evaluation.reason}")
+                how = "timed out" if evaluation.status == "timeout" else evaluation.status
+                self._line(f"simulation {event.index + 1} {how}: {evaluation.reason}")
             case Evaluated(evaluation=evaluation, best=best) if (
                 best is not None and best.candidate is evaluation.candidate
             ):
                 self._line(f"simulation {event.index + 1}: {note(event)}")
             case Confirmed():
-                self._line(f"violation {event.confirmation.outcome}: {event.confirmation.reason}")
+                self._line(_confirmed(event))
             case _:
                 pass
 
@@ -105,9 +106,9 @@ def note(event: Evaluated) -> str:
 
 
 class NotebookLine:
-    """A run as one line below the cell, written over while the run goes on.
+    """Shows a run as one line below the cell and updates it in place.
 
-    It takes IPython alone: no widgets, so that every front end shows it and the last line stays in the file.
+    It needs only IPython and no widgets, so every front end shows it and the last line is stored in the file.
     """
 
     def __init__(self) -> None:
@@ -116,7 +117,7 @@ class NotebookLine:
         self._total: int | None = None
 
     def __call__(self, event: Event) -> None:
-        """Show what an event tells."""
+        """Update the line."""
         match event:
             case RunStarted():
                 self._name = _title(event)
@@ -126,7 +127,7 @@ class NotebookLine:
                 self._note = note(event)
                 self._show(event.spent.simulations)
             case Exchanged():
-                self._note = f"LLM answered, {event.spent.tokens} tokens so far"
+                self._note = f"LLM replied, {event.spent.tokens} tokens so far"
                 self._show(event.spent.simulations)
             case Confirmed():
                 self._note = f"violation {event.confirmation.outcome}"
@@ -138,8 +139,10 @@ class NotebookLine:
         from IPython.display import HTML, display
 
         bar = el("progress", value=done, max=self._total) if self._total else ""
-        count = f" {done}" + (f" of {self._total}" if self._total else "")
-        text = join(el("code", self._name), " ", bar, count, " simulations. ", self._note)
+        count = (
+            f"{done} of {counted(self._total, 'simulation')}" if self._total else counted(done, "simulation")
+        )
+        text = join(el("code", self._name), " ", bar, f" {count}. ", self._note)
         line = HTML(text)  # type: ignore[no-untyped-call]
         if self._handle is None:
             self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
@@ -147,6 +150,12 @@ class NotebookLine:
             self._handle.update(line)
 
 
+def _confirmed(event: Confirmed) -> str:
+    """What came of a violation; several requirements may share the search, so it is named."""
+    found = event.confirmation
+    return f"{found.problem.name}: violation {found.outcome}: {found.reason}"
+
+
 def _title(event: RunStarted) -> str:
-    """What is searched, and by whom."""
+    """The requirements and the engine."""
     return one_line(f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}")

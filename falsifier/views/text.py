@@ -1,4 +1,4 @@
-"""What people see of a finished run: the result as text or JSON."""
+"""The result of a run as text or JSON."""
 
 import shlex
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines
+from falsifier.core.words import candidate_lines, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search import manifest
@@ -15,33 +15,32 @@ from falsifier.search.result import Result
 
 
 def result_text(result: Result) -> str:
-    """Result for people."""
-    name, count = result.problem.name, result.spent.simulations
-    simulations = f"{count} simulation{'' if count == 1 else 's'}"
-    lines = [f"{name}: {result.status} after {simulations} ({seconds_text(result.spent)})"]
+    """Format one result as text."""
+    simulations = counted(result.spent.simulations, "simulation")
+    lines = [f"{result.problem.name}: {result.status} after {simulations} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
         lines.append(f"  confirmed      {result.counterexample.reason}")
     else:
         lines.append(f"  reason         {result.reason}")
-        if result.status in ("interrupted", "failed") and result.directory is not None and result.evaluations:
-            lines.append(f"  go on with     falsifier resume {shlex.quote(str(result.directory))}")
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += _evaluation_lines(result, shown)
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     if result.spent.calls:
-        lines.append(f"  language model {_model_use(result.spent)}")
+        lines.append(f"  language model {_llm_use(result.spent)}")
     if result.directory is not None:
         lines.append(f"  files          {result.directory}")
         if result.counterexample is not None:
             lines.append(f"  picture        {_picture(result)}")
+        if _can_continue(result):
+            lines.append(_continue_line(result.directory))
     return "\n".join(map(one_line, lines))
 
 
 def results_text(results: Sequence[Result]) -> str:
-    """Results of several requirements for people, a line each."""
+    """Format the results of several requirements as text, one line each."""
     width = max(len(result.problem.name) for result in results)
     lines = []
     for result in results:
@@ -49,24 +48,26 @@ def results_text(results: Sequence[Result]) -> str:
         robustness = "" if shown is None else f", robustness {shown.robustness:+.6g}"
         where = "" if result.counterexample is None else f", {_picture(result)}"
         lines.append(
-            f"{result.problem.name:{width}}  {result.status} after {result.spent.simulations} "
-            f"simulations{robustness}{where}"
+            f"{result.problem.name:{width}}  {result.status} after "
+            f"{counted(result.spent.simulations, 'simulation')}{robustness}{where}"
         )
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
-    return "\n".join(
-        [*map(one_line, lines), f"{falsified} of {len(results)} falsified ({seconds_text(total)})"]
-    )
+    lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
+    directories = {result.directory for result in results}
+    if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
+        lines.append(_continue_line(results[0].directory))
+    return "\n".join(map(one_line, lines))
 
 
 def counterexample_name(result: Result) -> str:
-    """File name of a result's counterexample; several results in one directory have one each."""
+    """File name of a result's counterexample; results that share a directory have one each."""
     shared = result.directory is not None and manifest.read(result.directory).shared
     return file_of(result.problem.name if shared else "")
 
 
 def result_json(result: Result) -> dict[str, Any]:
-    """Result for machines: a value that becomes one JSON object."""
+    """Convert a result to a value that can be dumped as one JSON object."""
     spent: dict[str, Any] = {field: getattr(result.spent, field) for field in Spent.__dataclass_fields__}
     return {
         "requirement": result.problem.name,
@@ -92,8 +93,8 @@ def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
             for name, value in verdict.values.items()
         )
         lines.append(f"  robustness     {verdict.robustness:+.6g}")
-        lines.append(f"  critical time  {verdict.critical_time:.6g} s, at {verdict.predicate}")
-        lines.append(f"  values there   {values}")
+        lines.append(f"  critical time  {verdict.critical_time:.6g} s, decided by {verdict.predicate}")
+        lines.append(f"  values then    {values}")
     lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, result.problem.space)]
     if evaluation.candidate.rationale:
         lines.append(f"  rationale      {evaluation.candidate.rationale}")
@@ -115,18 +116,26 @@ def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
+def _can_continue(result: Result) -> bool:
+    return result.status in ("interrupted", "failed") and bool(result.evaluations)
+
+
+def _continue_line(directory: Path) -> str:
+    return f"to continue: falsifier resume {shlex.quote(str(directory))}"
+
+
 def _picture(result: Result) -> Path:
     return (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
 
 
-def _model_use(spent: Spent) -> str:
-    cost = "price unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
-    reasoning = f" ({spent.reasoning_tokens} of them reasoning)" if spent.reasoning_tokens else ""
-    return f"{spent.calls} calls, {spent.tokens} tokens{reasoning}, {cost}"
+def _llm_use(spent: Spent) -> str:
+    cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
+    reasoning = f" ({spent.reasoning_tokens} for reasoning)" if spent.reasoning_tokens else ""
+    return f"{counted(spent.calls, 'call')}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
 
 
 def seconds_text(spent: Spent) -> str:
-    """Seconds of a run and where they went."""
+    """Wall-clock time of a run, and the parts spent in the simulator and the engine."""
     return (
         f"{spent.seconds:.1f} s; simulator {spent.simulation_seconds:.2f} s, "
         f"engine {spent.engine_seconds:.2f} s"

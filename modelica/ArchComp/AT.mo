@@ -1,6 +1,6 @@
 within ArchComp;
 model AT "Car with an engine, a torque converter and a four-speed automatic transmission: the driver's throttle and
-brake act on engine speed, vehicle speed and the gear, which a shift schedule chooses every 0.04 s"
+brake determine engine speed, vehicle speed and gear; a shift schedule selects the gear every 0.04 s"
   import ArchComp.Tables.linear;
   import ArchComp.Tables.bilinear;
 
@@ -18,7 +18,7 @@ brake act on engine speed, vehicle speed and the gear, which a shift schedule ch
   parameter Real wheelRadius(unit = "ft", min = 0.1) = 1.0 "Radius of the wheels";
   parameter Real rollingLoad(unit = "ft.lbf", min = 0) = 40.0 "Load torque that does not depend on speed";
   parameter Real airLoad(unit = "ft.lbf/mph2", min = 0) = 0.02 "Load torque per square of the vehicle speed";
-  parameter Integer waitTicks(min = 0) = 2 "Ticks of 0.04 s for which a threshold has to stay crossed before a shift";
+  parameter Integer waitTicks(min = 0) = 2 "Number of 0.04 s ticks for which a threshold must stay crossed before a shift";
 
 protected
   constant Real pi = 3.141592653589793;
@@ -60,14 +60,14 @@ protected
   Real slip(unit = "1") "Speed ratio of the torque converter";
   Real impeller(unit = "ft.lbf") "Torque that the torque converter takes from the engine";
   Real drive(unit = "ft.lbf") "Torque of the transmission";
-  Real load(unit = "ft.lbf") "Torque against the motion at the wheels";
-  Real surplus(unit = "rev/min/s") "Change of engine speed where no limit is reached";
+  Real load(unit = "ft.lbf") "Load torque at the wheels, opposing the motion";
+  Real surplus(unit = "rev/min/s") "Rate of change of engine speed while no limit is reached";
   Real ratio(unit = "1") "Ratio of the gear";
-  Integer region(start = 0) "Shift chart: 0 steady, 1 wants to shift up, 2 wants to shift down";
-  Integer ticks(start = 0) "Ticks since the chart has changed its region";
-  Boolean started(start = false) "The chart is entered in the first tick and acts from the second one on";
-  Real up(unit = "mph", start = 0) "Speed above which a higher gear is wanted";
-  Real down(unit = "mph", start = 0) "Speed below which a lower gear is wanted";
+  Integer region(start = 0) "Shift chart: 0 steady, 1 waiting to shift up, 2 waiting to shift down";
+  Integer ticks(start = 0) "Ticks since the last change of region";
+  Boolean started(start = false) "The chart is entered at the first tick and active from the second one";
+  Real up(unit = "mph", start = 0) "Speed above which a higher gear is selected";
+  Real down(unit = "mph", start = 0) "Speed below which a lower gear is selected";
 equation
   speed = 2 * pi * wheelRadius * 60 / 5280 * wheel;
   rpm = engine;

@@ -26,7 +26,7 @@ equation
   y3 = car3.y;
   y4 = car4.y;
   y5 = car5.y;
-  // Between events the cars move at constant acceleration or nearly so: a step of 0.01 s is exact to rounding.
+  // Between events the accelerations are (nearly) constant, so the error of a step of 0.01 s is a rounding error.
   annotation(
     experiment(StopTime = 100, Interval = 0.01, Tolerance = 1e-6),
     __falsifier_solver(method = "fixed", step = 0.01));

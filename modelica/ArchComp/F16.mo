@@ -35,8 +35,8 @@ protected
   constant Real im(unit = "1/slug") = 1.57e-3 "Inverse mass";
   constant Real heng(unit = "slug.ft2/s") = 160 "Angular momentum of the engine";
   constant Real g(unit = "ft/s2") = 32.17 "Acceleration of gravity";
-  constant Real xa(unit = "ft") = 15 "Distance of the pilot ahead of the centre of gravity";
-  constant Real c1 = -0.770 "c1 to c9: moments of inertia combined, as in Stevens and Lewis";
+  constant Real xa(unit = "ft") = 15 "Distance of the pilot in front of the centre of gravity";
+  constant Real c1 = -0.770 "c1 to c9: combinations of moments of inertia, as in Stevens and Lewis";
   constant Real c2 = 0.02755;
   constant Real c3 = 1.055e-4;
   constant Real c4 = 1.642e-6;
@@ -51,13 +51,13 @@ protected
   constant Real throttle = 0.1395;
   // Autopilot
   constant Real samplePeriod(unit = "s") = 1 / 30;
-  constant Integer pullTicksMin = 60 "Samples of the shortest pull, 2 s";
+  constant Integer pullTicksMin = 60 "Minimum duration of a pull in samples, 2 s";
   constant Real levelRoll(unit = "rad") = 5 * rad "The wings are level below this roll angle";
   constant Real levelRate(unit = "rad/s") = 10 * rad "and this roll rate";
   constant Real pullLoad = 5 "Load factor of the pull";
-  constant Real floorAltitude(unit = "ft") = 1000 "Below it the autopilot starts again while the aircraft descends";
+  constant Real floorAltitude(unit = "ft") = 1000 "Below this the autopilot starts again if the aircraft descends";
 
-  function wrap "Angle to the nearest full turn"
+  function wrap "Angle relative to the nearest full turn"
     input Real angle(unit = "rad");
     output Real y(unit = "rad");
   algorithm
@@ -75,11 +75,11 @@ protected
   Real pn(unit = "ft", start = 0, fixed = true) "Position north";
   Real pe(unit = "ft", start = 0, fixed = true) "Position east";
   Real power(unit = "1", start = 9, fixed = true) "Engine power in percent";
-  Real intNz(start = 0, fixed = true) "Integral of the error of the load factor";
-  Real intPs(start = 0, fixed = true) "Integral of the error of the stability roll rate";
+  Real intNz(start = 0, fixed = true) "Integral of the load factor's error";
+  Real intPs(start = 0, fixed = true) "Integral of the stability roll rate's error";
   Real intNyr(start = 0, fixed = true) "Integral of the error of side force and yaw rate";
-  Real NzRef "Load factor that the autopilot asks for";
-  Real psRef(unit = "rad/s") "Stability roll rate that the autopilot asks for";
+  Real NzRef "Load factor requested by the autopilot";
+  Real psRef(unit = "rad/s") "Stability roll rate requested by the autopilot";
   Real elevator(unit = "rad");
   Real aileron(unit = "rad");
   Real rudder(unit = "rad");
@@ -89,7 +89,7 @@ protected
   Real pHat "Normalised roll rate";
   Real qHat "Normalised pitch rate";
   Real rHat "Normalised yaw rate";
-  Real ax(unit = "ft/s2") "Acceleration by aerodynamics and thrust along the body's x axis";
+  Real ax(unit = "ft/s2") "Acceleration due to aerodynamics and thrust along the body's x axis";
   Real ay(unit = "ft/s2");
   Real az(unit = "ft/s2");
   Real Cl "Coefficient of the rolling moment";
@@ -97,18 +97,18 @@ protected
   Real u(unit = "ft/s") "Velocity along the body's x axis";
   Real v(unit = "ft/s");
   Real w(unit = "ft/s");
-  Real du(unit = "ft/s2") "Rate of change of u, by the equation of motion";
+  Real du(unit = "ft/s2") "Rate of change of u, from the equations of motion";
   Real dv(unit = "ft/s2");
   Real dw(unit = "ft/s2");
   Real ps(unit = "rad/s") "Stability roll rate";
   Real Ny(unit = "1") "Side force felt by the pilot";
-  Real rollError(unit = "rad") "Roll angle to the nearest level attitude";
+  Real rollError(unit = "rad") "Roll angle relative to the nearest level attitude";
   Boolean climbing "Flight path points upwards";
   Boolean level "Wings are level and the roll has stopped";
   Integer pullTicks(start = 0, fixed = true) "Samples since the pull began";
 equation
-  // Autopilot: its mode changes at samples only, 30 a second. The sampling is the benchmark: with an exactly located
-  // event in its place the aircraft never comes below 8.8 ft, from no attitude in the box.
+  // Autopilot: its mode changes only at samples, 30 per second. This sampling is essential to the benchmark: with
+  // exactly located events instead, the altitude stays above 8.8 ft for every initial attitude in the box.
   rollError = wrap(phi);
   when sample(0, samplePeriod) then
     climbing = wrap(theta - alpha) > 0;
@@ -129,7 +129,7 @@ equation
   der(intNz) = Nz - NzRef;
   der(intPs) = ps - psRef;
   der(intNyr) = Ny + r;
-  // The trim angle is subtracted here although it should not be; the original does, and its figures depend on it.
+  // The trim angle should not be subtracted here, but the original does so and its results depend on it.
   ps = p * cos(alpha - alphaTrim) + r * sin(alpha - alphaTrim);
   Nz = (xa * der(q) - az) / g - 1;
   Ny = (ay + xa * der(r)) / g;

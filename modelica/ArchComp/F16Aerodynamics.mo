@@ -1,10 +1,10 @@
 within ArchComp;
 package F16Aerodynamics "Force and moment coefficients of the F-16: Morelli's
 polynomials (1998), with the damping table of Stevens and Lewis added on top"
-  // The polynomials hold the damping already; adding the table counts it twice. The benchmark does so, and its
-  // figures depend on it. Angles and surface deflections in rad; pHat, qHat, rHat are body rates normalised by
+  // The polynomials already contain the damping; adding the table counts it twice. The benchmark does so, and its
+  // results depend on it. Angles and surface deflections are in rad; pHat, qHat, rHat are body rates normalised by
   // span or chord over twice the speed.
-  // Each letter is the coefficient vector of the same letter in Morelli's paper.
+  // Each letter is the coefficient vector with the same letter in Morelli's paper.
   constant Real a[7] = {-0.01943367, 0.2136104, -0.2903457, -0.003348641, -0.2060504, 0.6988016, -0.9035381} "CX";
   constant Real b[5] = {0.4833383, 8.644627, 11.31098, -74.22961, 60.75776} "CX of the pitch rate";
   constant Real c[3] = {-1.145916, 0.06016057, 0.1642479} "CY";
@@ -31,7 +31,7 @@ polynomials (1998), with the damping table of Stevens and Lewis added on top"
     -0.5199526} "Cn of the ailerons";
   constant Real s[6] = {-0.08115894, -0.0115658, 0.02514167, 0.2038748, -0.3337476, 0.1004297} "Cn of the rudder";
   constant Real degPerRad = 180 / 3.141592653589793;
-  // Damping derivatives over the angle of attack in deg
+  // Damping derivatives as functions of the angle of attack in deg
   constant Real attack[12] = {-10, -5, 0, 5, 10, 15, 20, 25, 30, 35, 40, 45};
   constant Real CXq[12] = {-0.267, -0.11, 0.308, 1.34, 2.08, 2.91, 2.76, 2.05, 1.5, 1.49, 1.83, 1.21};
   constant Real CYr[12] = {0.882, 0.852, 0.876, 0.958, 0.962, 0.974, 0.819, 0.483, 0.59, 1.21, -0.493, -1.04};

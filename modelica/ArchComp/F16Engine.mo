@@ -1,6 +1,6 @@
 within ArchComp;
 package F16Engine "Thrust and power lag of the F-16's engine (Stevens
-and Lewis); power runs from 0 to 100 percent, 50 is military power"
+and Lewis); power is 0 to 100 percent, with military power at 50"
   constant Real machs[6] = {0, 0.2, 0.4, 0.6, 0.8, 1};
   constant Real altitudes[6](each unit = "ft") = {0, 10000, 20000, 30000, 40000, 50000};
   // Thrust in lbf; rows: Mach number, columns: altitude
@@ -26,13 +26,13 @@ and Lewis); power runs from 0 to 100 percent, 50 is military power"
     {26070, 21075, 15975, 11115, 6860, 3950},
     {28886, 23319, 18300, 13484, 8642, 5057}};
 
-  function thrust "Thrust at a power, an altitude and a Mach number"
+  function thrust "Thrust as a function of power, altitude and Mach number"
     input Real power(unit = "1") "Engine power in percent";
     input Real altitude(unit = "ft");
     input Real mach "Mach number";
     output Real y(unit = "lbf");
   protected
-    Real above(unit = "ft") "Altitude within the tables";
+    Real above(unit = "ft") "Altitude, at least 0.01 ft";
     Real mil(unit = "lbf") "Thrust at military power";
   algorithm
     above := max(altitude, 0.01);
@@ -44,14 +44,14 @@ and Lewis); power runs from 0 to 100 percent, 50 is military power"
     end if;
   end thrust;
 
-  function commandedPower "Power that a throttle position asks for"
+  function commandedPower "Power commanded by a throttle position"
     input Real throttle "Throttle position, 0 to 1";
     output Real y "Power in percent";
   algorithm
     y := if throttle <= 0.77 then 64.94 * throttle else 217.38 * throttle - 117.38;
   end commandedPower;
 
-  function powerRate "Rate at which the power follows the commanded power; crossing 50 percent takes a way of its own"
+  function powerRate "Rate at which power follows the commanded power, with special targets for crossing 50 percent"
     input Real power "Power in percent";
     input Real commanded "Commanded power in percent";
     output Real y "Percent per second";
@@ -62,8 +62,8 @@ and Lewis); power runs from 0 to 100 percent, 50 is military power"
     y := (if power >= 50 then 5 else inverseLag(target - power)) * (target - power);
   end powerRate;
 
-  function inverseLag "Inverse time constant by the distance from the target"
-    input Real distance "Percent of power still to go";
+  function inverseLag "Inverse time constant as a function of the distance from the target"
+    input Real distance "Difference between target and power in percent";
     output Real y(unit = "1/s");
   algorithm
     y := if distance <= 25 then 1 elseif distance >= 50 then 0.1 else 1.9 - 0.036 * distance;

@@ -1,27 +1,27 @@
 within ArchComp;
-model NN "Magnetic levitation: a ball of position Pos floats above an electromagnet whose
-current a sampled neural controller (NARMA-L2) sets every 10 ms so that Pos follows the
-reference Ref; the current swings between its limits, so Pos ripples around Ref"
-  input Real Ref(start = 2, min = 0.5, max = 4, unit = "1") "Reference: wanted position of the ball";
+model NN "Magnetic levitation: a ball at position Pos floats above an electromagnet. A sampled
+neural controller (NARMA-L2) sets the current every 10 ms so that Pos follows the reference
+Ref; the current switches between its limits, so Pos ripples around Ref"
+  input Real Ref(start = 2, min = 0.5, max = 4, unit = "1") "Reference: desired position of the ball";
   output Real Pos(unit = "1", start = 0.5, fixed = true) "Position of the ball above the magnet";
   discrete output Real NNPos(unit = "1", start = 0, fixed = true)
-    "Position that the controller's network predicts, in its own units";
+    "Position predicted by the controller's network, in the network's units";
   parameter Real Ts(unit = "s") = 0.01 "Sample time of the controller";
-  parameter Real currentMin(unit = "A") = -1 "Smallest coil current";
-  parameter Real currentMax(unit = "A") = 4 "Largest coil current";
+  parameter Real currentMin(unit = "A") = -1 "Minimum coil current";
+  parameter Real currentMax(unit = "A") = 4 "Maximum coil current";
   parameter Real magnet = 5 "Magnet strength per mass";
   parameter Real gravity(unit = "m/s2") = 9.8 "Acceleration of gravity";
   parameter Real friction(unit = "1/s") = 4 "Viscous friction per mass";
   Real velocity(unit = "1/s", start = 0, fixed = true) "Velocity of the ball";
   discrete Real current(unit = "A", start = 0, fixed = true) "Coil current, held between samples";
 protected
-  constant Real minPosition = 0.0012713472471279201 "Position that is -1 for the network";
-  constant Real maxPosition = 3.9954019738068034 "Position that is +1 for the network";
-  constant Real minCurrent = -0.97682887932966278 "Current that is -1 for the network";
-  constant Real maxCurrent = 3.9954019738068034 "Current that is +1 for the network";
-  constant Real fGain = 0.9921675075327889 "Gain of the layer behind f";
+  constant Real minPosition = 0.0012713472471279201 "Position normalised to -1 for the network";
+  constant Real maxPosition = 3.9954019738068034 "Position normalised to +1 for the network";
+  constant Real minCurrent = -0.97682887932966278 "Current normalised to -1 for the network";
+  constant Real maxCurrent = 3.9954019738068034 "Current normalised to +1 for the network";
+  constant Real fGain = 0.9921675075327889 "Gain of the layer after f";
   constant Real gGain = 0.0004116938262844689 * 0.5996797859290577 * (-0.8613021600806045)
-    "Gains of the three layers behind g";
+    "Product of the gains of the three layers after g";
   constant Real fBias = 0.9079050764793414;
   constant Real gBias = 0.8636776698074995;
   constant Real fIn[9, 4] = {
@@ -59,9 +59,9 @@ protected
     1.179622915707438, 1.4349048600431937, -0.8972572979998953, -2.338627041684287, -0.09669294243932744,
     -0.6343859921507877, -2.737919464469502, 3.0145214892072625, 2.1741978843496215};
 
-  function hiddenLayer "Weighted sum of nine tanh units over the regressor"
+  function hiddenLayer "Weighted sum of nine tanh units whose input is the regressor"
     input Real x[4] "Regressor";
-    input Real weights[9, 4] "Input weights, one row a unit";
+    input Real weights[9, 4] "Input weights, one row per unit";
     input Real offset[9] "Offset of each unit";
     input Real out[9] "Output weights";
     output Real y;
@@ -89,13 +89,13 @@ protected
 
   discrete Real y(start = 0, fixed = true) "Normalised position at this sample";
   discrete Real u(start = 0, fixed = true) "Normalised current of this sample";
-  discrete Real uBefore(start = 0, fixed = true) "Normalised current of the sample before";
+  discrete Real uBefore(start = 0, fixed = true) "Normalised current of the previous sample";
   discrete Real f(start = 0, fixed = true) "Predicted position without the new current";
   discrete Real g(start = 1, fixed = true) "Effect of the new current on the prediction";
 equation
   der(Pos) = velocity;
   der(velocity) = magnet * current * abs(current) / Pos - gravity - friction * velocity;
-  // The controller acts at its sample on the position of that very instant: no delay between Pos and current.
+  // At each sample the controller uses the position at that instant, without a delay between Pos and current.
   // The delay lines start at 0 in normalised units, which is not the physical zero.
   when sample(0, Ts) then
     y = normalise(Pos, minPosition, maxPosition);
@@ -107,7 +107,7 @@ equation
     u = normalise(current, minCurrent, maxCurrent);
     uBefore = pre(u);
   end when;
-  // A sample at the end of a communication step is repeated with the inputs that follow: it sees Ref without delay.
+  // A sample at the end of a communication step is repeated with the next step's inputs, so it uses Ref without delay.
   annotation(
     experiment(StopTime = 40, Interval = 0.01, Tolerance = 1e-6),
     __falsifier_solver(method = "fixed", step = 0.005, repeatTicks = "always"));

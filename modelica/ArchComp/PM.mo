@@ -1,7 +1,7 @@
 within ArchComp;
-model PM "Pacemaker in mode AOO: paces the heart at the lower rate limit whatever
-the heart does, one pulse a cycle; PACE_COUNT counts the pulses since the start"
-  constant Real tick(unit = "s") = 0.001 "Sample time of the controller; all times below are in ticks of 1 ms";
+model PM "Pacemaker in mode AOO: paces the heart at the lower rate limit, regardless of
+its own activity, one pulse per cycle; PACE_COUNT counts the pulses since the start"
+  constant Real tick(unit = "s") = 0.001 "Sample time of the controller; the counters below count ticks of 1 ms";
   constant Integer Off = 0 "Not yet started";
   constant Integer Ready = 1 "Started, outputs cleared";
   constant Integer Charge = 2 "Charges the pulse";
@@ -9,12 +9,12 @@ the heart does, one pulse a cycle; PACE_COUNT counts the pulses since the start"
   parameter Integer pulseWidth(min = 1, max = 10) = 2 "Length of a pulse in ms";
   input Real LRL_input(start = 60, min = 30, max = 175, unit = "1/min") "Lower rate limit: heart beats per minute";
   discrete output Real Period(unit = "ms", start = 0, fixed = true) "Length of a heart cycle, rounded down";
-  output Integer LRL(start = 0, fixed = true) "Lower rate limit in use in beats per minute, rounded down";
+  output Integer LRL(start = 0, fixed = true) "Lower rate limit in use, in beats per minute, rounded down";
   output Integer PACE_COUNT(start = 0, fixed = true) "Number of pulses since the start";
 protected
   Integer phase(start = Off, fixed = true) "Off, Ready, Charge or Pace";
   Integer elapsed(start = 0, fixed = true) "Ticks since the phase was entered";
-  Integer chargeTicks(start = 0, fixed = true) "Ticks to charge for, by the present rate limit";
+  Integer chargeTicks(start = 0, fixed = true) "Duration of charging in ticks, for the current rate limit";
 equation
   when sample(0, tick) then
     LRL = integer(LRL_input);
@@ -27,7 +27,7 @@ equation
     elapsed = if phase == pre(phase) then pre(elapsed) + 1 else 0;
     PACE_COUNT = if phase == Pace and pre(phase) == Charge then pre(PACE_COUNT) + 1 else pre(PACE_COUNT);
   end when;
-  // A tick at the end of a communication step is repeated with the inputs that follow: it sees them without delay.
+  // A tick at the end of a communication step is repeated with the next step's inputs, so it uses them without delay.
   annotation(
     experiment(StopTime = 10, Interval = 0.001),
     __falsifier_solver(repeatTicks = "always"));

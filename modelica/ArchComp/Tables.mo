@@ -1,9 +1,9 @@
 within ArchComp;
-package Tables "Look-up tables that go on linearly outside of their range"
-  function segment "Number of the table segment that a value belongs to; the outermost segments have no outer end"
+package Tables "Lookup tables with linear extrapolation"
+  function segment "Number of the table segment that contains a value; the outermost segments extend to infinity"
     input Real x "Value";
     input Real axis[:] "Increasing break points";
-    output Integer k "axis[k] <= x < axis[k + 1] wherever that is possible";
+    output Integer k "axis[k] <= x < axis[k + 1] if x is within the table";
   protected
     Integer high;
     Integer middle;
@@ -42,7 +42,7 @@ package Tables "Look-up tables that go on linearly outside of their range"
   protected
     Integer i;
     Integer j;
-    Real here "Share of the way to the next column";
+    Real here "Position between two columns, from 0 to 1 within the table";
     Real left;
     Real right;
   algorithm

@@ -1,1 +1,1 @@
-"""Turns a Modelica model into an FMU: parse, flatten, sort, print C, link with the FMI runtime, pack."""
+"""Exports a Modelica model as an FMU: parse, flatten, sort, print C, compile with the FMI runtime, pack."""

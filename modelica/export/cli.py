@@ -26,14 +26,14 @@ SYSTEMS = HERE / "systems.toml"
 
 
 def translate(source: Path, name: str) -> tuple[System, str]:
-    """From Modelica text to the text of model.c.
+    """Translate a Modelica model to the text of model.c.
 
     Args:
         source: package directory or .mo file.
         name: full name of the model.
 
     Raises:
-        ExportError: with file and line of what is wrong or not supported.
+        ExportError: with the file and line of what is wrong or not supported.
     """
     root = load(source)
     model = flatten(root, name)
@@ -45,17 +45,17 @@ def translate(source: Path, name: str) -> tuple[System, str]:
 
 
 def export(source: Path, name: str, target: Path, *, version: int, platforms: tuple[str, ...]) -> None:
-    """Turn one Modelica model into one FMU.
+    """Export one Modelica model as an FMU.
 
     Args:
         source: package directory or .mo file.
         name: full name of the model.
         target: the .fmu file to write.
-        version: of FMI, 2 or 3.
-        platforms: which binaries to make.
+        version: FMI version, 2 or 3.
+        platforms: platforms to build binaries for.
 
     Raises:
-        ExportError: with file and line of what is wrong or not supported.
+        ExportError: with the file and line of what is wrong or not supported.
     """
     system, code = translate(source, name)
     description = fmi2(system, c_files(2)) if version == 2 else fmi3(system)
@@ -76,7 +76,7 @@ def export_all(folder: Path, names: list[str], platforms: tuple[str, ...]) -> No
 
 
 def write_sums(folder: Path) -> None:
-    """List the hashes of all FMUs of a folder in SHA256SUMS."""
+    """Write the hashes of all FMUs in a folder to SHA256SUMS."""
     lines = [
         f"{hashlib.sha256(f.read_bytes()).hexdigest()}  {f.name}\n" for f in sorted(folder.glob("*.fmu"))
     ]
@@ -84,20 +84,28 @@ def write_sums(folder: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Parse the command line and run."""
-    parser = argparse.ArgumentParser(prog="export_fmu.py", description="Turn Modelica models into FMUs.")
-    parser.add_argument("model", nargs="?", help="full name of a model, e.g. ArchComp.AT")
+    """Run the command line; return its exit code."""
+    parser = argparse.ArgumentParser(prog="export_fmu.py", description="Export Modelica models as FMUs.")
+    parser.add_argument("model", nargs="?", help="full name of the model, e.g. ArchComp.AT")
     parser.add_argument(
         "--source", type=Path, default=HERE.parent / "ArchComp", help="package directory or .mo file"
     )
     parser.add_argument("--output", type=Path, help="the .fmu file to write (default: the model's name)")
-    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI")
-    parser.add_argument("--platform", action="append", choices=sorted(PLATFORMS), help="default: all")
+    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="FMI version (default: 2)")
     parser.add_argument(
-        "--all", type=Path, metavar="FOLDER", help="build what systems.toml lists into FOLDER"
+        "--platform",
+        action="append",
+        choices=sorted(PLATFORMS),
+        help="build for this platform only; repeatable",
     )
     parser.add_argument(
-        "--only", action="append", default=[], help="with --all: only this entry of systems.toml"
+        "--all", type=Path, metavar="FOLDER", help="build all FMUs listed in systems.toml into FOLDER"
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        help="with --all: build only this entry of systems.toml; repeatable",
     )
     given = parser.parse_args(arguments)
     platforms = tuple(given.platform or PLATFORMS)
@@ -108,7 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
             target = given.output or Path(given.model.rsplit(".", 1)[-1] + ".fmu")
             export(given.source, given.model, target, version=given.fmi, platforms=platforms)
         else:
-            parser.error("give a model or --all FOLDER")
+            parser.error("specify a model or --all FOLDER")
     except ExportError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -44,11 +44,7 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
         ('S,HARD,1,"[0 1]",[],yes,3,1,1,-0.4,10', True, "reproduced"),
         ('S,HARD,1,"[0 1; 5 1; 10 1]",[],true,3,1,1,-0.4,', True, "reproduced"),
         ('S,HARD,1,"[0 -1; 10 -1]",[],yes,3,1,1,-0.4,10', False, "not reproduced"),
-        (
-            'S,HARD,1,"[0 1]",[],yes,1501,1,1,-0.4,10',
-            False,
-            "used 1501 simulations, more than the limit of 1500",
-        ),
+        ('S,HARD,1,"[0 1]",[],yes,1501,1,1,-0.4,10', False, "1501 simulations, more than the limit of 1500"),
         ('S,HARD,1,"[0 1.5]",[],yes,3,1,1,-0.4,10', False, "1.5 is outside its range [-1, 1]"),
         ('S,HARD,1,"[0 1 1]",[],yes,3,1,1,-0.4,10', False, "2 inputs and 0 parameters, expected 1 and 0"),
         ('S,HARD,1,"[0 1; 0 1]",[],yes,3,1,1,-0.4,10', False, "must increase strictly from 0"),

@@ -129,11 +129,11 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["bench"], "give requirements or specs, or --suite"),
-        (["bench", HARD, "--suite", "arch-comp"], "give requirements or specs, or --suite"),
-        (["bench", HARD, "--instance", "2"], "--instance belongs to --suite"),
-        (["bench", HARD, "--variant", "MP1"], "--variant and --effort need --llm"),
-        (["bench", HARD, "--anonymous"], "--anonymous: only a language model takes this"),
+        (["bench"], "expected either TARGETS (requirements or specs)"),
+        (["bench", HARD, "--suite", "arch-comp"], "expected either TARGETS (requirements or specs)"),
+        (["bench", HARD, "--instance", "2"], "--instance requires --suite"),
+        (["bench", HARD, "--variant", "MP1"], "--variant and --effort require --llm"),
+        (["bench", HARD, "--anonymous"], "--anonymous: applies to language models only"),
     ],
 )
 def test_wrong_usage_is_said(command: Any, arguments: list[str], message: str) -> None:
@@ -159,7 +159,7 @@ def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:
         result = command(*arguments)
         assert "2/4 runs finished" in result.stdout
         assert "running" not in result.stdout
-        assert "stopped; falsifier resume c goes on" in result.stdout
+        assert "stopped; to continue: falsifier resume c" in result.stdout
     with locked(tmp_path / "c"):
         result = command("watch", "c", "--once")
         assert "2 running" in result.stdout
@@ -176,7 +176,7 @@ def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> N
     assert command("report", "c", "--markdown").stdout.startswith("# Falsification report: c")
     run = next((tmp_path / "c" / "runs").iterdir())
     command("report", str(run), "-o", "one.html")
-    assert "1 requirements, 1 runs" in (tmp_path / "one.html").read_text()
+    assert "1 requirement, 1 run," in (tmp_path / "one.html").read_text()
 
 
 def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:
@@ -187,9 +187,9 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
     )
     result = command("validate", "v.csv")
     assert result.exit_code == 1
-    assert "row 1: AT2: holds: violates again" in result.stdout
-    assert "row 2: AT2: does not hold: does not violate" in result.stdout
-    assert "1 of 2 counterexamples hold" in result.stdout
+    assert "row 1, AT2: reproduced, robustness -" in result.stdout
+    assert "row 2, AT2: not reproduced, robustness +" in result.stdout
+    assert "1 of 2 counterexamples accepted" in result.stdout
     (found, other) = json.loads(command("validate", "v.csv", "--json").stdout)
     assert (found["holds"], other["holds"]) == (True, False)
 

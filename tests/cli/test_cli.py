@@ -64,12 +64,12 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
         (["run", "AT1", "--input", "throtle=0:100:7"], "did you mean 'throttle'"),
         (["run", "AT1", "--budget", "0"], "simulations must be positive"),
         (["run", "AT1", "--budget", "many"], "many"),
-        (["run", "AT1", "--effort", "low"], "need --llm"),
+        (["run", "AT1", "--effort", "low"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),
-        (["run", "gone.fmu", "--stl", "G (x >= 0)"], "there is no file gone.fmu"),
+        (["run", "gone.fmu", "--stl", "G (x >= 0)"], "gone.fmu: no such file"),
         (["run", "gone.fmu"], "--stl"),
         (["resume", "nowhere"], "not a run directory"),
-        (["info", "gone.fmu"], "there is no file gone.fmu"),
+        (["info", "gone.fmu"], "gone.fmu: no such file"),
         (["rn", "AT1"], "did you mean 'run'"),
         (
             ["run", "AT9"],
@@ -147,7 +147,7 @@ def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
 def test_info_says_what_cannot_be_simulated(tmp_path: Path) -> None:
     fixtures = ROOT / "tests" / "fixtures" / "fmus"
     clocked = falsifier("info", str(fixtures / "Clocked_3.fmu"), cwd=tmp_path)
-    assert "cannot be simulated: its clocks tick would have to be ticked from outside" in clocked.out
+    assert "cannot be simulated: its input clocks (tick) need external ticks" in clocked.out
     scheduled = falsifier("info", str(fixtures / "Scheduled_3.fmu"), cwd=tmp_path)
     assert "scheduled execution is not supported" in scheduled.out
 

@@ -59,7 +59,7 @@ def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
 def test_explain_names_what_it_takes(folder: Path) -> None:
     done = run(folder, "explain", "run")
     assert done.code == 0, done.err
-    for part in ("AT1 demands: The speed stays below 120 mph", "at 20 s", "It takes throttle", "brake"):
+    for part in ("AT1 requires: The speed stays below 120 mph", "at 20 s", "Throttle is necessary", "Brake"):
         assert part in done.out
     effects = run(folder, "explain", "run", "--json").json["effects"]
     assert {e["name"]: e["needed"] for e in effects} == {"throttle": True, "brake": True}
@@ -69,9 +69,9 @@ def test_a_language_models_words_are_marked_as_its_own(folder: Path) -> None:
     with serving(Step(content="Full throttle for 20 s.")) as server:
         done = run(folder, "explain", "run", "--llm", "openai/any", "--api-base", server.url)
     assert done.code == 0, done.err
-    assert "It takes throttle" in done.out
+    assert "Throttle is necessary" in done.out
     assert done.out.endswith("In the words of openai/any, which may be wrong:\nFull throttle for 20 s.\n")
-    assert "It takes throttle" in server.received[0].texts[-1]
+    assert "Throttle is necessary" in server.received[0].texts[-1]
 
 
 def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
@@ -104,16 +104,16 @@ def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
     (tmp_path / "my.toml").write_text(f"{spec}\n[parameters]\nfinalDrive = 3.0\n")
     done = run(tmp_path, "replay", "run/counterexample.json")
     assert done.code == 0, done.err
-    assert done.out.startswith("AT1 does not violate: robustness +")
+    assert done.out.startswith("AT1: no longer violated, robustness +")
     refused = run(tmp_path, "shrink", "run")
-    assert (refused.code, "does not violate any more" in refused.err) == (2, True)
+    assert (refused.code, "no longer violates" in refused.err) == (2, True)
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["replay", "gone.json"], "no such file"),
-        (["shrink", "."], "has found no confirmed counterexample"),
+        (["shrink", "."], "contains no confirmed counterexample"),
         (["explain", "broken.json"], "not a counterexample file"),
     ],
 )
@@ -142,7 +142,7 @@ def test_of_several_counterexamples_one_must_be_named(together: Path) -> None:
     assert "run/counterexample-AT1.json, run/counterexample-AT2.json" in done.err
     for name in ("AT1", "AT2"):
         done = run(together, "replay", f"run/counterexample-{name}.json")
-        assert (done.code, done.out.partition(":")[0]) == (1, f"{name} violates")
+        assert (done.code, done.out.partition(",")[0]) == (1, f"{name}: still violated")
 
 
 def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:

@@ -119,7 +119,7 @@ def test_but_not_where_they_have_been_seen_already(build: Build) -> None:
 
 
 def test_events_without_end_are_an_error(build: Build) -> None:
-    assert "events follow each other without end" in said_on_failure(build("Chatter"), ("x",))
+    assert "the events never end" in said_on_failure(build("Chatter"), ("x",))
 
 
 def test_values_of_the_initial_system_can_be_read_and_starts_set_again(build: Build) -> None:

@@ -33,7 +33,7 @@ def test_plain_lines_say_each_end_once() -> None:
     for progress in (BEFORE, AFTER, AFTER):
         board(progress)
     assert lines == [
-        "3 runs, 0 of them finished before",
+        "3 runs, 0 already finished",
         overall_line(BEFORE, None),
         "[1/3] A uniform seed 0: falsified after 7 simulations, best robustness -0.5",
         "[2/3] B uniform seed 0: failed after 1 simulation: ",

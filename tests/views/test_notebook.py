@@ -55,7 +55,7 @@ def test_a_violating_result_shows_its_robustness_and_a_picture(notebook: Noteboo
 def test_a_result_without_a_violation_shows_the_best_and_why_it_ended(notebook: Notebook) -> None:
     html = notebook.html(falsify(impossible(), "corners", budget=3))
     assert "the budget of 3 simulations is used up" in html
-    assert "(holds)" in html
+    assert "(satisfied)" in html
 
 
 def test_a_trajectory_shows_each_signal(notebook: Notebook) -> None:

@@ -146,10 +146,10 @@ _NUMBERS = (
     "cost $",
 )
 _LEGEND = (
-    "FR: falsified runs / finished runs. S: number of simulations over the falsified runs; std is the sample "
-    "standard deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and "
-    "cost are means per run. Rank: position among the published columns shown, by FR, then by mean S; ties "
-    "share a rank. Published cells: FR / S."
+    "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
+    "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
+    "means per run. Rank: position among the published columns shown, by FR, then by mean S; ties share a "
+    "rank. Published cells: falsified runs / mean S."
 )
 
 
@@ -196,7 +196,9 @@ def _cell(cell: Score | None) -> str:
 
 
 def _sources(published: Published) -> tuple[str, ...]:
-    return tuple(f"{COLUMNS[name]}: {source}." for name, source in published.sources.items() if source)
+    return tuple(
+        f"Source of {COLUMNS[name]}: {source}." for name, source in published.sources.items() if source
+    )
 
 
 def _by_column(runs: Iterable[Run], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
@@ -224,7 +226,7 @@ def _side_by_side(
     return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))
 
 
-_LEGEND_SIDE = "FR / S: falsified runs / finished runs / mean number of simulations over the falsified runs."
+_LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
 
 
 def _share_cell(cell: Score | None) -> str:

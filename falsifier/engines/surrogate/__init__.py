@@ -1,4 +1,4 @@
-"""The default engine: learns the dynamics from trajectories and searches on what it learnt."""
+"""The default engine: learns the dynamics from trajectories and searches on their predictions."""
 
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.surrogate import Surrogate

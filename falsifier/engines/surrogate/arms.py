@@ -1,21 +1,21 @@
-"""Who proposes next: every arm is judged by how its latest proposals rank among all costs."""
+"""Choice of the arm that proposes next, based on how its latest proposals rank among all costs."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-# How much a better rank raises an arm's probability: a quarter of the ranks is worth everything.
+# Increase of an arm's probability per unit of quality: a quality 0.25 above the mean adds 0.5.
 _SLOPE = 2.0
 
 
 def quality(arm: str, arms: Sequence[str], costs: Sequence[float], *, window: int) -> float:
-    """Mean share of all costs that an arm's last proposals were better than; 0.5 without any.
+    """Return the mean share of all costs that an arm's last proposals improve on; 0.5 if it has none.
 
     Args:
-        arm: which one.
-        arms: who proposed each simulation.
-        costs: of each simulation.
-        window: how many of its last proposals count.
+        arm: name of the arm.
+        arms: name of the arm that proposed each simulation.
+        costs: cost of each simulation.
+        window: number of the arm's last proposals that count.
     """
     own = [i for i, engine in enumerate(arms) if engine == arm][-window:]
     if not own:
@@ -26,7 +26,7 @@ def quality(arm: str, arms: Sequence[str], costs: Sequence[float], *, window: in
 
 
 def choose_arm(qualities: Mapping[str, float], rng: np.random.Generator, *, least: float) -> str:
-    """Draw an arm, the better ones more often, none with a probability below ``least`` or so."""
+    """Draw an arm; better ones are more likely, and each has a probability of about ``least`` or more."""
     names = list(qualities)
     values = np.array([qualities[name] for name in names])
     share = np.maximum(1 / len(names) + _SLOPE * (values - values.mean()), least)

@@ -1,9 +1,9 @@
 """Robustness of many predicted traces at once, on a coarse grid and with scaled margins.
 
-A formula is brought into negation normal form over *leaves*, signed margins of its predicates. On a coarse
-grid a sample is not enough: a peak between two samples decides an ``always``. So a leaf may be an envelope:
-its value at index k is the smallest (below an always) or largest (below an eventually) margin in the cell
-from t_k to t_(k+1).
+A trace is a trajectory on the grid (``grid.Trace``). A formula is converted to negation normal form over
+*leaves*, the signed margins of its predicates. On a coarse grid, samples are not sufficient, because a peak
+between two samples may decide an ``always``. A leaf may therefore be an envelope: its value at index k is the
+smallest (below an always) or largest (below an eventually) margin in the cell from t_k to t_(k+1).
 """
 
 from abc import ABC, abstractmethod
@@ -33,19 +33,19 @@ from falsifier.stl.formula import (
 Envelope = Literal["sample", "low", "high"]
 Extreme = Callable[[Array, Array], Array]
 
-# A window bound that is this close to a grid point, in cells, counts as on it.
+# Maximum distance in cells of a window bound from a grid point at which it counts as that point.
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A predicate's margin as the normal form needs it.
+    """A predicate's margin in the normal form.
 
     Attributes:
-        predicate: the comparison.
-        sign: -1 where the normal form negates it.
-        envelope: what the value of a cell is.
-        discrete: whether it compares only signals with few values, so that its margin has no slope.
+        predicate: the predicate.
+        sign: -1 if the normal form negates it, else 1.
+        envelope: whether the value is that of a sample, or the lowest or highest in a cell.
+        discrete: whether it only compares signals with few values, so that its margin has no slope.
     """
 
     predicate: Predicate
@@ -54,26 +54,26 @@ class Leaf:
     discrete: bool
 
     def margin(self, columns: Mapping[str, Any]) -> Array:
-        """Signed margin over columns of any shape; clipped to [-0.5, 0.5] where it is discrete."""
+        """Return the signed margin for columns of any shape; a discrete one is clipped to [-0.5, 0.5]."""
         value = self.sign * margin(self.predicate, columns)
         return np.clip(value, -0.5, 0.5) if self.discrete else value
 
 
 class Node(ABC):
-    """A form of the normal form; values have shape (traces, grid points)."""
+    """A node of the normal form; values have shape (traces, grid points)."""
 
     @abstractmethod
     def value(self, margins: Sequence[Array]) -> Array:
-        """Robustness at every grid point from the leaves' margins."""
+        """Return the robustness at every grid point, computed from the leaves' margins."""
 
     @property
     def needs_several(self) -> bool:
-        """Whether a violation needs several things at once: there is a disjunction somewhere."""
+        """Whether a violation requires several conditions at once: the formula contains a disjunction."""
         return False
 
     @property
     def cellwise(self) -> bool:
-        """Whether the value at k speaks of the whole cell behind t_k and not of t_k alone."""
+        """Whether the value at k applies to the whole cell after t_k, not only to t_k."""
         return False
 
 
@@ -131,7 +131,7 @@ class _Until(Node):
     negated: bool
 
     def value(self, margins: Sequence[Array]) -> Array:
-        # The release of negated operands is the negated until.
+        # In normal form the operands of a negated until are negated: undo that, and negate the result.
         sign = -1.0 if self.negated else 1.0
         left, right = sign * self.left.value(margins), sign * self.right.value(margins)
         best: Array = np.full_like(right, -np.inf)
@@ -149,10 +149,10 @@ class _Until(Node):
 
 @dataclass(frozen=True, slots=True)
 class CoarseFormula:
-    """A formula that judges traces on a grid.
+    """A formula compiled for traces on a grid.
 
     Attributes:
-        leaves: margins that ``robustness`` needs, in this order.
+        leaves: margins that ``robustness`` requires, in this order.
         root: the normal form.
     """
 
@@ -160,14 +160,14 @@ class CoarseFormula:
     root: Node
 
     def robustness(self, margins: Sequence[Array]) -> Array:
-        """Robustness at time 0 of each trace, shape (m,), from one margin array (m, n) for each leaf."""
+        """Return the robustness at time 0 of m traces, shape (m,), from one margin array (m, n) per leaf."""
         return self.root.value(margins)[:, 0]
 
     def deciding(self, margins: Sequence[Array]) -> list[tuple[int, int]]:
-        """Leaf and grid index that decide the robustness of each trace.
+        """Return the leaf and the grid index that decide the robustness of each trace.
 
-        Only minima and maxima are taken, so the robustness is one of the margins. Equal margins are told
-        apart by increments of their own, far too small to matter.
+        The normal form takes only minima and maxima, so the robustness equals one of the margins. A
+        different, negligible increment on each margin distinguishes equal ones.
         """
         stacked = np.stack(margins, axis=1).astype(np.float64)
         traces, _, points = stacked.shape
@@ -185,9 +185,9 @@ def coarse_formula(
 
     Args:
         formula: the requirement.
-        step: of the grid in s.
-        discrete: names of signals that take only a few values.
-        stretch: factor of the end of every always window below another temporal operator.
+        step: step of the grid in s.
+        discrete: names of signals that have only a few values.
+        stretch: factor for the end of every always window below another temporal operator.
     """
     builder = _Builder(step, discrete, stretch, sampled=_has_short_window(formula, step))
     root = builder.build(formula, sign=1, above=None)
@@ -248,9 +248,10 @@ class _Builder:
 
     def _indices(self, window: Window | None, stretch: float, *, cellwise: bool) -> tuple[int, int]:
         if window is None:
-            return 0, 10**6
+            return 0, 10**6  # to the end of any grid
         start, end = window.start / self.step, window.end * stretch / self.step
         if window.end < self.step and window.end > 0:
+            # A window shorter than a cell is approximated by the next grid point.
             return 1, 1
         first = int(np.ceil(start - _ROUNDING))
         last = int(np.floor(end + _ROUNDING))
@@ -258,7 +259,7 @@ class _Builder:
 
 
 def margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
-    """Robustness of a predicate over columns of any shape."""
+    """Return the robustness of a predicate for columns of any shape."""
     left, right = predicate.left.evaluate(columns), predicate.right.evaluate(columns)
     match predicate.operator:
         case "<" | "<=":
@@ -272,7 +273,10 @@ def margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
 
 
 def sliding(values: Array, first: int, last: int, extreme: Extreme) -> Array:
-    """Extreme of values[:, k + first ... k + last] for each k; beyond the end the last value stays."""
+    """Return the extreme of values[:, k + first ... k + last] for each k, with the last value extended.
+
+    Windows of doubling width are combined, so the cost grows with the logarithm of the window's width.
+    """
     count = values.shape[1]
     first, last = min(first, count - 1), min(last, count - 1)
     width = last - first + 1
@@ -286,12 +290,12 @@ def sliding(values: Array, first: int, last: int, extreme: Extreme) -> Array:
 
 
 def shifted(values: Array, shift: int) -> Array:
-    """Values ``shift`` grid points later; beyond the end the last value stays."""
+    """Return the values ``shift`` grid points later; the last value is repeated at the end."""
     return sliding(values, shift, shift, np.minimum)
 
 
 def inner_windows(formula: Formula, *, nested: bool = False) -> list[float]:
-    """Lengths in s of the windows that stand below another temporal operator."""
+    """Return the lengths in s of the windows below another temporal operator."""
     lengths = []
     if isinstance(formula, (Always, Eventually, Until)):
         if nested and formula.window is not None:

@@ -1,8 +1,9 @@
-"""What the learnt dynamics predict: the outputs, or their differences where only those matter.
+"""What the learnt dynamics predict: the outputs, or their differences if only those matter.
 
-Positions of vehicles, levels of tanks, voltages against ground: a formula that compares such outputs only
-with each other does not care about a common shift, and neither does their dynamics, as a rule. Differences
-stay bounded where the positions run away, and one step of a trace then looks like any other.
+Examples are positions of vehicles, levels of tanks, voltages against ground. If a formula compares such
+outputs only with each other, a common shift does not change its robustness, and usually not their dynamics
+either. Differences stay bounded while the positions grow, and steps at different times of a trace become
+similar.
 """
 
 import re
@@ -18,7 +19,7 @@ from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import margin
 from falsifier.stl.formula import Formula
 
-# A shift of this many standard deviations must leave every margin as it is, but for rounding.
+# A shift by this many standard deviations must not change any margin, except for rounding.
 _TRIAL_SHIFT = 3.0
 _SAME = 1e-9
 
@@ -29,8 +30,8 @@ class Coordinates:
 
     Attributes:
         outputs: names of the recorded outputs.
-        families: groups of indices into outputs that are replaced by differences of neighbours; the first
-            of a family is the reference of its shift and is not predicted.
+        families: groups of indices into outputs that are replaced with differences of neighbours; the first
+            output of a family is the reference of its shift and is not predicted.
     """
 
     outputs: tuple[str, ...]
@@ -51,12 +52,12 @@ class Coordinates:
         return np.delete(matrix, [family[0] for family in self.families], axis=0)
 
     def of(self, trajectory: Trajectory) -> NDArray[np.float64]:
-        """Coordinates of a trajectory, shape (samples, dimension)."""
+        """Return the coordinates of a trajectory, shape (samples, dimension)."""
         stacked = np.stack([trajectory[name] for name in self.outputs], axis=1)
         return np.asarray(stacked @ self._differences.T)
 
     def columns(self, values: Array) -> dict[str, Array]:
-        """Output columns of coordinates, shape (..., dimension); the reference of a family is set to 0."""
+        """Return the output columns for coordinates, shape (..., dimension), with each reference set to 0."""
         inverse = np.linalg.pinv(self._differences)
         for family in self.families:
             inverse[list(family)] -= inverse[family[0]]
@@ -69,13 +70,14 @@ def choose_coordinates(
 ) -> Coordinates:
     """Find the families of outputs that the formula compares only with each other.
 
-    A family are outputs of one unit whose names differ in digits alone, such as ``y1`` ... ``y5``.
+    A family consists of outputs with the same unit whose names differ only in digits, such as ``y1`` ...
+    ``y5``.
 
     Args:
         formula: the requirement.
         outputs: names of the recorded outputs.
-        units: units by name, where known.
-        trajectory: any one, to see whether a common shift changes a margin.
+        units: known units by name.
+        trajectory: any trajectory, to test whether a common shift changes a margin.
     """
     families: dict[tuple[str, str], list[int]] = {}
     for i, name in enumerate(outputs):

@@ -1,8 +1,9 @@
-"""Dynamics learnt from whole trajectories.
+"""Dynamics learnt from whole trajectories: one nonlinear and one linear kind.
 
-Both predict, cell by cell, the next state and the excess of each leaf's envelope from the present state and
-input (see ``grid.Trace``). The nonlinear one knows no history; the linear one follows deviations from the
-best trajectory with a few lags, which takes start transients and hidden states into account.
+Both predict, cell by cell, the next state and the excess of each leaf's envelope (see ``grid.Trace``) from
+the current state and input. The nonlinear dynamics use no earlier states. The linear dynamics predict
+deviations from the best trajectory and use a few earlier cells, which accounts for initial transients and
+hidden states.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from falsifier.engines.box import Array
 from falsifier.engines.surrogate.grid import Trace
 from falsifier.engines.surrogate.settings import Settings
 
-# Predictions stay within what was seen, widened by this share of its range on both sides.
+# Predicted states are limited to the range of the simulated ones, widened by this share of it on both sides.
 _WIDENING = 0.5
 
 
@@ -24,8 +25,8 @@ class Prediction:
     """Predicted traces.
 
     Attributes:
-        states: shape (m, cells + 1, dimension).
-        excess: shape (m, cells, leaves).
+        states: coordinates at the grid points, shape (m, cells + 1, dimension).
+        excess: excess of each leaf's envelope, shape (m, cells, leaves).
     """
 
     states: Array
@@ -36,12 +37,17 @@ class Dynamics(Protocol):
     """Fitted dynamics."""
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
-        """Predict traces from inputs, shape (m, cells, inputs), and start states, shape (m, dimension)."""
+        """Predict m traces.
+
+        Args:
+            inputs: scaled inputs and parameters, shape (m, cells, inputs).
+            start: initial states, shape (m, dimension).
+        """
         ...
 
 
 class StartState:
-    """The first state as a linear function of the first inputs and the parameters."""
+    """The initial state as a linear function of the first inputs and the parameters."""
 
     def __init__(self, traces: Sequence[Trace]) -> None:
         first = np.stack([t.states[0] for t in traces])
@@ -55,17 +61,17 @@ class StartState:
             self._weights = np.linalg.solve(gram, z.T @ (first - self._mean))
 
     def predict(self, inputs: Array) -> Array:
-        """First states, shape (m, dimension), of inputs, shape (m, cells, inputs)."""
+        """Return the initial states, shape (m, dimension), for inputs, shape (m, cells, inputs)."""
         if self._weights is None:
             return np.repeat(self._mean[None], len(inputs), axis=0)
         return np.asarray(self._mean + (inputs[:, 0] - self._centre) @ self._weights)
 
 
 class FourierDynamics:
-    """Increments by ridge regression on random Fourier features and linear terms.
+    """Nonlinear dynamics: increments by ridge regression on random Fourier features and linear terms.
 
-    The length scale is redrawn and the rows are reweighted at random in every fit (a bootstrap), so that
-    successive fits differ where the data leave room: Thompson sampling.
+    Each fit draws a new length scale and new random weights of the rows (a bootstrap). Successive fits then
+    differ in regions that the data do not determine, which amounts to Thompson sampling.
     """
 
     def __init__(
@@ -99,7 +105,7 @@ class FourierDynamics:
         solution = _ridge(
             phi, (target - centre) / unit, weights * rng.exponential(size=len(z)), settings.ridge
         )
-        # Everything that does not depend on the step is folded into four single-precision matrices.
+        # For fast rollouts, all scalings are folded into a few single-precision matrices.
         solution = solution * unit
         raw = frequencies / spread[:, None]
         self._frequencies = raw.astype(np.float32)
@@ -111,14 +117,14 @@ class FourierDynamics:
         self._low, self._high = _seen_range(traces)
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
-        """See Dynamics.predict."""
+        """Predict m traces, cell by cell, in single precision; arguments as in ``Dynamics.predict``."""
         count, cells, _ = inputs.shape
         by_cell = np.ascontiguousarray(inputs.transpose(1, 0, 2), dtype=np.float32)
         n = self._states
         states = np.empty((cells + 1, count, n), np.float32)
         excess = np.empty((cells, count, self._offset.shape[0] - n), np.float32)
         states[0] = start
-        # The inputs' share of all features, for all cells at once.
+        # The contribution of the inputs to all features, for all cells at once.
         driven = by_cell @ self._frequencies[n:] + self._phases
         direct = by_cell @ self._linear[n:] + self._offset
         for k in range(cells):
@@ -130,7 +136,7 @@ class FourierDynamics:
 
 
 class DeviationDynamics:
-    """Linear dynamics of deviations from the best trajectory, with lags."""
+    """Linear dynamics of deviations from the best trajectory, with several lags."""
 
     def __init__(
         self, traces: Sequence[Trace], best: Sequence[int], settings: Settings, rng: np.random.Generator
@@ -139,7 +145,7 @@ class DeviationDynamics:
         self._lags = settings.lags
         self._state_unit = _spread([t.states - self._base.states for t in traces]) + 1e-12
         self._excess_unit = _spread([t.excess - self._base.excess for t in traces]) + 1e-12
-        # An input that hardly varied so far must not become a huge deviation when it does.
+        # Otherwise an input that has hardly varied so far would become a huge deviation as soon as it does.
         self._input_unit = np.maximum(_spread([t.inputs - self._base.inputs for t in traces]), 0.05)
         rows, targets, weights = [], [], []
         for i, trace in enumerate(traces):
@@ -159,14 +165,14 @@ class DeviationDynamics:
         self._low, self._high = _seen_range(traces)
 
     def _deviations(self, states: Array, inputs: Array) -> tuple[Array, Array]:
-        """Deviations in units of their spread, preceded by zeros for the lags."""
+        """Return deviations in units of their spread, preceded by zeros for the lags."""
         dy = (states - self._base.states[: states.shape[-2]]) / self._state_unit
         du = (inputs - self._base.inputs[: inputs.shape[-2]]) / self._input_unit
         pad = [(0, 0)] * (states.ndim - 2) + [(self._lags - 1, 0), (0, 0)]
         return np.pad(dy, pad), np.pad(du, pad)
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
-        """See Dynamics.predict."""
+        """Predict m traces, cell by cell, as deviations; arguments as in ``Dynamics.predict``."""
         count, cells, _ = inputs.shape
         lags, n = self._lags, start.shape[1]
         initial = np.zeros((count, cells + 1, n))
@@ -174,13 +180,15 @@ class DeviationDynamics:
         dy, du = self._deviations(initial, inputs)
         dy[:, lags:] = 0.0
         excess = np.empty((count, cells, self._weights.shape[1] - n))
-        # The inputs' share of every step, for all cells at once: lags come last to first.
+        # The contribution of the inputs to every step, for all cells at once; the most recent cell comes
+        # first.
         own, driving = self._weights[: lags * n], self._weights[lags * n :]
         driven = np.concatenate([du[:, lags - 1 - i : lags - 1 - i + cells] for i in range(lags)], axis=2)
         driven = driven @ driving
         for k in range(cells):
             past = np.concatenate([dy[:, k + lags - 1 - i] for i in range(lags)], axis=1)
             step = past @ own + driven[:, k]
+            # An unstable fit must not overflow; deviations this large mean nothing anyway.
             dy[:, k + lags] = np.clip(step[:, :n], -30.0, 30.0)
             excess[:, k] = step[:, n:]
         states = self._base.states[: cells + 1] + dy[:, lags - 1 :] * self._state_unit
@@ -190,14 +198,14 @@ class DeviationDynamics:
 
 
 def _lagged(dy: Array, du: Array, lags: int, cells: int) -> Array:
-    """Rows [dy(k) ... dy(k - lags + 1), du(k) ... du(k - lags + 1)] for all cells k."""
+    """Return rows [dy(k) ... dy(k - lags + 1), du(k) ... du(k - lags + 1)] for all cells k."""
     parts = [dy[lags - 1 - i : lags - 1 - i + cells] for i in range(lags)]
     parts += [du[lags - 1 - i : lags - 1 - i + cells] for i in range(lags)]
     return np.concatenate(parts, axis=1)
 
 
 def _ridge(x: Array, target: Array, weights: Array, strength: float) -> Array:
-    """Weighted ridge regression; the strength is relative to the mean eigenvalue."""
+    """Solve a weighted ridge regression; the strength is relative to the mean eigenvalue."""
     weighted = x * weights[:, None]
     gram = x.T @ weighted
     gram[np.diag_indices_from(gram)] += strength * np.trace(gram) / len(gram) + 1e-12

@@ -1,4 +1,4 @@
-"""Both learnt dynamics together: which of them to plan on, and what their errors teach."""
+"""Both kinds of learnt dynamics: choice of the one to plan on, and correction by their past errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ _KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forecast:
-    """What the dynamics predicted of one point.
+    """Predictions for one point, made before its simulation.
 
     Attributes:
-        values: of the objective's leaves, by name of the dynamics.
-        chosen: name of the dynamics that was planned on.
-        cost: scaled robustness that it predicted.
+        values: predicted values of the objective's leaves, by name of the dynamics.
+        chosen: name of the dynamics used for planning.
+        cost: scaled robustness predicted by these.
     """
 
     values: dict[str, LeafValues]
@@ -41,9 +41,9 @@ class Forecast:
 
 
 class Ensemble:
-    """Fits both dynamics, prefers the ones that erred less recently, and corrects each leaf by its errors.
+    """Fits both kinds of dynamics, prefers the one with smaller recent errors, and corrects its leaves.
 
-    The errors are honest ones: each prediction was made before the simulation.
+    The errors are those of predictions made before the simulation, not of the fit.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -57,18 +57,18 @@ class Ensemble:
 
     @property
     def is_trusted(self) -> bool:
-        """Whether the better dynamics' recent predictions were good."""
+        """Whether recent predictions of the better dynamics were good."""
         errors = self._recent_errors()
         return bool(errors) and min(errors.values()) < self._settings.trusted_error
 
     @property
     def recent_error(self) -> float:
-        """Recent error of the dynamics chosen last, as a share of the margins' spread; inf: unknown."""
+        """Recent error of the dynamics chosen last, as a share of the margins' spread; inf if unknown."""
         return self._recent_errors().get(self.chosen, float("inf"))
 
     @property
     def misses(self) -> int:
-        """How many of the last forecasts in a row foretold a violation that did not happen."""
+        """Number of forecasts, counted back from the last one, of violations that did not occur."""
         count = 0
         for missed in reversed(self._missed):
             if not missed:
@@ -77,7 +77,7 @@ class Ensemble:
         return count
 
     def fit(self, traces: Sequence[Trace], best: Sequence[int], rng: np.random.Generator) -> None:
-        """Fit to traces, of which ``best`` are the least robust, and choose the dynamics to plan on."""
+        """Fit to traces, of which ``best`` have the lowest robustness, and choose the dynamics to plan on."""
         self._fitted = {name: kind(traces, best, self._settings, rng) for name, kind in _KINDS.items()}
         self._start = StartState(traces)
         errors = self._recent_errors()
@@ -87,7 +87,7 @@ class Ensemble:
             self.chosen = str(rng.choice(list(_KINDS)))
 
     def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
-        """Return what maps points, shape (m, d), to the costs that the dynamics predict, shape (m,)."""
+        """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""
         corrected = self._corrected(objective)
 
         def predict(points: Array) -> Array:
@@ -96,18 +96,18 @@ class Ensemble:
         return predict
 
     def verdicts(self, layout: Layout, objective: Objective, points: Array) -> list[Verdict]:
-        """Verdicts in the requirement's own unit that the dynamics predict for points, shape (m, d)."""
+        """Return the verdicts predicted for points, shape (m, d), in the requirement's own unit."""
         corrected = self._corrected(objective).plain()
         return corrected.verdicts(self._values(self.chosen, layout, corrected, points))
 
     def forecast(self, layout: Layout, objective: Objective, point: Array) -> Forecast:
-        """Predictions of both dynamics for one point, to be judged when it was simulated."""
+        """Return both kinds' predictions for one point, to be passed to ``judge`` after its simulation."""
         values = {name: self._values(name, layout, objective, point[None]) for name in _KINDS}
         cost = float(self._corrected(objective).cost(values[self.chosen])[0])
         return Forecast(values, self.chosen, cost)
 
     def judge(self, forecast: Forecast, true: LeafValues, objective: Objective, *, violated: bool) -> None:
-        """Compare a forecast with what the simulation gave."""
+        """Record the errors of a forecast, given the simulated values of the leaves."""
         for name, values in forecast.values.items():
             self._errors[name].append(_error(objective, values, true))
         self._missed.append(forecast.cost < 0 and not violated)
@@ -132,7 +132,7 @@ class Ensemble:
 
 
 def _error(objective: Objective, predicted: LeafValues, true: LeafValues) -> float:
-    """Root mean square error of the scaled leaf values, mean over the leaves."""
+    """Return the root mean square error of the scaled leaf values, averaged over the leaves."""
     errors = [
         np.sqrt(np.mean(((p - t) / scale) ** 2))
         for p, t, scale in zip(predicted, true, objective.scales, strict=True)
@@ -141,7 +141,7 @@ def _error(objective: Objective, predicted: LeafValues, true: LeafValues) -> flo
 
 
 def _deltas(objective: Objective, predicted: LeafValues, true: LeafValues) -> list[float]:
-    """For each leaf, how much larger its true extreme over the horizon is than the predicted one."""
+    """Return for each leaf the true minus the predicted extreme over the horizon."""
     return [
         _extreme(leaf.envelope, t) - _extreme(leaf.envelope, p)
         for leaf, p, t in zip(objective.leaves, predicted, true, strict=True)

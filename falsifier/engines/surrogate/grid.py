@@ -1,4 +1,4 @@
-"""The grid of predictions, and what one simulation looks like on it."""
+"""The time grid of predictions, and simulations on that grid."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from falsifier.engines.box import Array
 from falsifier.engines.surrogate.coarse import Leaf
 from falsifier.engines.surrogate.coordinates import Coordinates
 
-# What happens long after the formula's horizon teaches little about it.
-_MOST_HORIZONS = 20
+# Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
+_MAX_HORIZONS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,9 @@ class Grid:
     """Evenly spaced times from 0 over the formula's horizon, and on to the end of the simulation.
 
     Attributes:
-        step: in s.
+        step: step in s.
         cells: number of cells over the horizon.
-        all_cells: number of whole cells until the end of the simulation, or twenty horizons.
+        all_cells: number of complete cells until the end of the simulation, at most twenty horizons.
     """
 
     step: float
@@ -32,12 +32,12 @@ class Grid:
 
     @classmethod
     def over(cls, horizon: float, stop_time: float, *, cells: int, shortest: float) -> "Grid":
-        """Grid of so many cells over the horizon, fewer where they would be shorter than ``shortest`` s."""
+        """Return a grid of ``cells`` cells over the horizon, fewer if needed for cells of ``shortest`` s."""
         horizon = min(horizon, stop_time) if horizon > 0 else stop_time
         count = max(1, min(cells, round(horizon / shortest)))
         step = horizon / count
         rest = int(stop_time / step + 1e-6)
-        return cls(step, count, max(count, min(rest, _MOST_HORIZONS * count)))
+        return cls(step, count, max(count, min(rest, _MAX_HORIZONS * count)))
 
     @property
     def middles(self) -> Array:
@@ -47,14 +47,14 @@ class Grid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """One simulation on the grid.
+    """The trajectory of one simulation on the grid.
 
     Attributes:
-        inputs: mean of each input in each cell and the parameters, scaled to [0, 1], shape
+        inputs: mean of each input in each cell, and the parameters, scaled to [0, 1], shape
             (all_cells, inputs + parameters).
         states: coordinates at the grid points, shape (all_cells + 1, dimension).
-        excess: by how much each leaf's envelope in a cell lies beyond its margins at the cell's ends,
-            shape (all_cells, leaves); 0 where the leaf is a sample.
+        excess: distance of each leaf's envelope in a cell from the extreme of its margins at the cell's ends,
+            shape (all_cells, leaves); 0 for a leaf that is not an envelope.
     """
 
     inputs: Array
@@ -63,8 +63,8 @@ class Trace:
 
 
 def grid_inputs(space: SearchSpace, grid: Grid, candidate: Candidate) -> Array:
-    """Inputs and parameters of a candidate on all cells, as in Trace.inputs."""
-    # Eight samples a cell see the mean of a smooth signal and the middle of a held one.
+    """Return the inputs and parameters of a candidate in all cells, as in ``Trace.inputs``."""
+    # Eight samples per cell, none at its ends, average a smooth signal and read a held one between switches.
     fine = (np.arange(grid.all_cells * 8) + 0.5) * grid.step / 8
     columns = []
     for r in space.inputs:
@@ -84,7 +84,7 @@ def trace_of(
     candidate: Candidate,
     trajectory: Trajectory,
 ) -> Trace:
-    """Bring a simulation onto the grid."""
+    """Return the trace of a simulation: its trajectory on the grid."""
     points = np.round(np.arange(grid.all_cells + 1) * grid.step / trajectory.step).astype(int)
     points = np.minimum(points, len(trajectory) - 1)
     states = coordinates.of(trajectory)[points]

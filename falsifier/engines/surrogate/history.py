@@ -1,4 +1,4 @@
-"""What was simulated so far, as the dynamics and the planner need it."""
+"""The simulations so far, in the form that learning and planning need."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -15,8 +15,9 @@ from falsifier.engines.surrogate.settings import Settings
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
-# A signal with at most so many values, all whole numbers, has no slope that a search could follow.
-_MOST_LEVELS = 16
+# Maximum number of distinct values, all integers, of a signal that counts as discrete: it has no slope that a
+# search could follow.
+_MAX_LEVELS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,12 +25,12 @@ class Sample:
     """One simulated candidate.
 
     Attributes:
-        point: in the planning layout.
-        trace: on the grid.
-        values: of the objective's leaves, shape (1, cells + 1) each.
-        robustness: of the requirement.
+        point: its point in the planning layout.
+        trace: its trajectory on the grid.
+        values: values of the objective's leaves, shape (1, cells + 1) each.
+        robustness: robustness of the requirement.
         critical: critical time as a share of the horizon.
-        arm: which arm of the engine proposed it, empty for foreign ones.
+        arm: the engine's arm that proposed it; empty for other engines' candidates.
     """
 
     point: Array
@@ -42,7 +43,7 @@ class Sample:
 
 @dataclass
 class History:
-    """Samples of one problem; the first trajectory decides coordinates and which signals are discrete."""
+    """Samples of one problem; the first trajectory determines coordinates and which signals are discrete."""
 
     problem: Problem
     grid: Grid
@@ -54,7 +55,7 @@ class History:
     _scaled: Objective | None = None
 
     def add(self, evaluation: Evaluation, arm: str) -> Sample | None:
-        """Take note of an evaluation; None where it has no trajectory to learn from."""
+        """Add an evaluation; return its sample, or None if it has no trajectory to learn from."""
         trajectory, robustness = evaluation.trajectory, evaluation.robustness
         if trajectory is None or robustness is None:
             return None
@@ -92,7 +93,7 @@ class History:
         )
 
     def scaled_objective(self) -> Objective:
-        """Objective with the scales of all samples."""
+        """Return the objective, scaled by the spread of all samples."""
         assert self.objective is not None
         if self._scaled is None:
             self._scaled = self.objective.rescaled([s.values for s in self.samples])
@@ -104,18 +105,18 @@ class History:
         return np.array([s.point for s in self.samples]).reshape(-1, self.layout.dimension)
 
     def direct_costs(self) -> list[float]:
-        """What the search without dynamics minimises: the robustness, or a relaxation that has a slope."""
+        """Return the costs of all samples for the search without dynamics, see ``direct_cost``."""
         return [self.direct_cost(s) for s in self.samples]
 
     def direct_cost(self, sample: Sample) -> float:
-        """Mean of the relaxed formulas' robustness; the true one where it is negative or has a slope."""
+        """Return the robustness if it is negative or has a slope, else the mean of the relaxed formulas'."""
         if sample.robustness < 0 or self.objective is None or not self.objective.is_relaxed:
             return sample.robustness
         return float(self.scaled_objective().cost(sample.values)[0])
 
 
 def scaled_costs(samples: Sequence[Sample], objective: Objective) -> Array:
-    """Scaled robustness of the simulated traces, shape (samples,)."""
+    """Return the scaled robustness of the simulated traces, shape (samples,)."""
     stacked = [np.concatenate(leaf) for leaf in zip(*(s.values for s in samples), strict=True)]
     return np.asarray(objective.cost(stacked), dtype=np.float64)
 
@@ -126,4 +127,4 @@ def _is_discrete(problem: Problem, name: str, trajectory: Trajectory) -> bool:
         if kind in ("integer", "boolean", "enumeration"):
             return True
     levels = np.unique(trajectory[name])
-    return len(levels) > 1 and len(levels) <= _MOST_LEVELS and bool((levels == np.round(levels)).all())
+    return len(levels) > 1 and len(levels) <= _MAX_LEVELS and bool((levels == np.round(levels)).all())

@@ -1,4 +1,4 @@
-"""How a vector in [0, 1]^d stands for a candidate: the parameterizations that the engine searches in."""
+"""Layouts: the parameterizations in which the engine searches, as vectors in [0, 1]^d."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +20,9 @@ class Coding:
 
     Attributes:
         times: control-point times in s.
-        interpolation: between them.
-        fine: whether neighbours mostly stay equal (many held cells) or every point is set by itself.
+        interpolation: interpolation between them.
+        fine: whether it consists of many held cells, most of them equal to their neighbours, or of a few
+            control points that vary independently.
     """
 
     times: tuple[float, ...]
@@ -31,11 +32,11 @@ class Coding:
 
 @dataclass(frozen=True)
 class Layout:
-    """Codings of all inputs, in the space's order, followed by one coordinate for each parameter.
+    """Codings of all inputs, in the space's order, followed by one coordinate per parameter.
 
     Attributes:
-        space: what is searched.
-        codings: one for each input.
+        space: the search space.
+        codings: one coding per input.
     """
 
     space: SearchSpace
@@ -59,7 +60,7 @@ class Layout:
         return (*(c.fine for c in self.codings), *(False for _ in self.space.parameters))
 
     def inputs(self, points: Array, grid: Grid) -> Array:
-        """Scaled inputs and parameters in the horizon's cells, shape (m, cells, groups), of m points."""
+        """Return scaled inputs and parameters in the horizon's cells for m points, (m, cells, groups)."""
         values = np.empty((len(points), grid.cells, len(self.groups)))
         for j, group in enumerate(self.groups):
             own = points[:, group]
@@ -67,7 +68,7 @@ class Layout:
         return values
 
     def candidate(self, point: Array, *, origin: str, rationale: str) -> Candidate:
-        """Candidate of a point; equal neighbours of held cells become one piece."""
+        """Return the candidate for a point; equal neighbours among held cells are merged into one piece."""
         point = np.clip(point, 0.0, 1.0)
         signals = {}
         for r, coding, group in zip(self.space.inputs, self.codings, self.groups, strict=False):
@@ -87,11 +88,12 @@ class Layout:
         return self.space.admit(Candidate(signals, parameters, origin, rationale))
 
     def point(self, candidate: Candidate) -> Array:
-        """Point whose signals have the candidate's values at this layout's control points."""
+        """Return the point whose signals have the candidate's values at this layout's control points."""
         parts = []
         for r, coding in zip(self.space.inputs, self.codings, strict=True):
             at = np.asarray(coding.times)
             if coding.fine:
+                # A cell is represented by its middle.
                 at = at + 0.5 * (at[1] - at[0] if len(at) > 1 else 0.0)
             signal = candidate.signals[r.name]
             values = np.asarray(
@@ -103,7 +105,7 @@ class Layout:
         return np.asarray(np.clip(np.concatenate(parts), 0.0, 1.0))
 
     def constant(self, levels: Sequence[float]) -> Array:
-        """Point at which each input and parameter is constant at its level in [0, 1]."""
+        """Return the point at which each input and parameter is constant at its level in [0, 1]."""
         point = np.empty(self.dimension)
         for group, level in zip(self.groups, levels, strict=True):
             point[group] = level
@@ -111,7 +113,7 @@ class Layout:
 
 
 def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
-    """Held cells where the parameterization is free, the spec's control points elsewhere."""
+    """Return the layout with held cells for free inputs and the spec's control points for fixed ones."""
     return Layout(
         space,
         tuple(
@@ -124,12 +126,12 @@ def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
 
 
 def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tuple[Layout, ...]:
-    """Layouts of few coordinates for the search without dynamics, to be taken in turn.
+    """Return layouts with few coordinates for the search without dynamics, to be used in turn.
 
     Args:
-        space: what is searched.
-        grid: its horizon is what free inputs are divided over.
-        pieces: numbers of held pieces of the free inputs, one for each layout.
+        space: the search space.
+        grid: the grid over whose horizon the pieces of free inputs are distributed.
+        pieces: number of held pieces of the free inputs in each layout.
     """
     if all(r.free is None for r in space.inputs):
         return (Layout(space, tuple(_fixed(space, r) for r in space.inputs)),)
@@ -156,7 +158,7 @@ def _held(horizon: float, count: int, free: Freedom, *, fine: bool) -> Coding:
 
 
 def _read(coding: Coding, values: Array, at: Array) -> Array:
-    """Values of m signals, shape (m, points), at times in s: shape (m, times)."""
+    """Return the values, shape (m, times), of m signals, given as shape (m, points), at times in s."""
     knots = np.asarray(coding.times)
     if len(knots) == 1:
         return np.repeat(values, len(at), axis=1)

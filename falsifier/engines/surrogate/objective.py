@@ -1,4 +1,4 @@
-"""What the search minimises on predicted traces: robustness with margins in comparable units."""
+"""The cost that planning minimises on predicted traces: robustness with margins in comparable units."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,11 +21,11 @@ class Objective:
     """Robustness of traces on the grid, each leaf shifted by its offset and divided by its scale.
 
     Attributes:
-        space: for the ranges of inputs that the formula names.
-        grid: of the traces.
-        coordinates: what the states of the traces are.
-        formulas: the formula; where it reads discrete signals, relaxed ones too, whose mean has a slope.
-        scales: unit of each leaf.
+        space: the search space, for the ranges of inputs in the formula.
+        grid: the grid of the traces.
+        coordinates: the coordinates that are the states of the traces.
+        formulas: the formula; if it contains discrete signals, also relaxed ones, whose mean has a slope.
+        scales: scale of each leaf.
         offsets: correction of each leaf, in the leaf's own unit.
     """
 
@@ -43,7 +43,7 @@ class Objective:
 
     @property
     def is_relaxed(self) -> bool:
-        """Whether the robustness alone has no slope."""
+        """Whether there are relaxed formulas, because the robustness itself has no slope."""
         return len(self.formulas) > 1
 
     def leaf_values(
@@ -52,11 +52,11 @@ class Objective:
         excess: Array,
         inputs: Array,
     ) -> LeafValues:
-        """Value of each leaf at every grid point of the horizon, shape (m, cells + 1) each.
+        """Return the value of each leaf at every grid point of the horizon, shape (m, cells + 1) each.
 
         Args:
-            states: shape (m, cells + 1, dimension).
-            excess: shape (m, cells, leaves).
+            states: coordinates, shape (m, cells + 1, dimension).
+            excess: excess of each leaf's envelope, shape (m, cells, leaves).
             inputs: scaled inputs, shape (m, cells, inputs).
         """
         columns = self.coordinates.columns(states)
@@ -74,19 +74,19 @@ class Objective:
         return values
 
     def scaled(self, values: LeafValues) -> LeafValues:
-        """Leaf values with offsets and scales applied."""
+        """Return the leaf values after offset and scaling."""
         return [
             (value + offset) / scale
             for value, offset, scale in zip(values, self.offsets, self.scales, strict=True)
         ]
 
     def cost(self, values: LeafValues) -> Array:
-        """Scaled robustness of each trace from its leaf values, shape (m,)."""
+        """Return the scaled robustness of each trace, shape (m,), given its leaf values."""
         scaled = self.scaled(values)
         return np.asarray(np.mean([formula.robustness(scaled) for formula in self.formulas], axis=0))
 
     def verdicts(self, values: LeafValues) -> list[Verdict]:
-        """Verdict of each trace from its leaf values, by this objective's cost and the formula as it is."""
+        """Return the verdict on each trace: this objective's cost, decided as in the unrelaxed formula."""
         deciding = self.formulas[0].deciding(self.scaled(values))
         return [
             Verdict(float(cost), self.grid.step * point, str(self.leaves[leaf].predicate))
@@ -94,7 +94,7 @@ class Objective:
         ]
 
     def rescaled(self, seen: Sequence[LeafValues]) -> "Objective":
-        """Return the objective with each leaf's scale set to the standard deviation of its seen values."""
+        """Return the objective with each leaf scaled by the standard deviation of its simulated values."""
         scales = []
         for i, leaf in enumerate(self.leaves):
             spread = float(np.std(np.concatenate([values[i] for values in seen])))
@@ -102,11 +102,11 @@ class Objective:
         return replace(self, scales=tuple(scales))
 
     def plain(self) -> "Objective":
-        """Return the objective in the requirement's own unit, without relaxation; offsets stay."""
+        """Return the objective in the requirement's own unit, without relaxation but with the offsets."""
         return replace(self, formulas=self.formulas[:1], scales=(1.0,) * len(self.leaves))
 
     def shifted(self, offsets: Sequence[float], *, limit: float) -> "Objective":
-        """Return the objective with offsets, clipped to ``limit`` scales; discrete leaves have none."""
+        """Return the objective with offsets, clipped to ``limit`` scales; those of discrete leaves are 0."""
         clipped = [
             0.0 if leaf.discrete else float(np.clip(offset, -limit * scale, limit * scale))
             for leaf, offset, scale in zip(self.leaves, offsets, self.scales, strict=True)
@@ -123,7 +123,7 @@ def make_objective(
     discrete: frozenset[str],
     stretches: Sequence[float],
 ) -> Objective:
-    """Objective without scales yet."""
+    """Return the objective for a formula, with all scales 1 until ``rescaled``."""
     plain = coarse_formula(formula, grid.step, discrete=discrete)
     formulas = [plain]
     if any(leaf.discrete for leaf in plain.leaves):

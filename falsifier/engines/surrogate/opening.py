@@ -1,4 +1,4 @@
-"""The first simulations: which kinds of input teach most before anything is known."""
+"""The first simulations: the kinds of input that are most informative before anything is known."""
 
 from collections.abc import Sequence
 from itertools import zip_longest
@@ -12,17 +12,17 @@ Kind = Literal["constant", "switching", "stepping"]
 def opening(
     settings: Settings, *, has_inputs: bool, windows: Sequence[float], needs_several: bool
 ) -> tuple[Kind, ...]:
-    """Kinds of the first inputs, in order.
+    """Return the kinds of the first inputs, in order.
 
-    Windows inside of windows are violated by inputs that change a few times in a window, so that switching
-    comes first there. Requirements that one extreme can violate are tried with constant extremes, and where
-    several things must happen at once stepping signals show how the outputs depend on the inputs.
+    Formulas with nested windows are violated by inputs that change a few times per inner window, so switching
+    inputs come first. Requirements that a single extreme can violate start with constant extremes. If a
+    violation requires several conditions at once, stepping inputs show how the outputs depend on the inputs.
 
     Args:
-        settings: how many of each.
-        has_inputs: whether there are input signals and not parameters alone.
+        settings: number of inputs of each kind.
+        has_inputs: whether there are input signals, not only parameters.
         windows: lengths in s of the formula's inner windows.
-        needs_several: whether a violation needs several things at once.
+        needs_several: whether a violation requires several conditions at once.
     """
     if not has_inputs:
         return ()

@@ -1,4 +1,4 @@
-"""Optimising predicted traces: evolution, steps towards bounds, and a liking for extremes."""
+"""Optimisation on predicted traces: evolution, gradient steps towards bounds, preference for extremes."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from falsifier.engines.surrogate.layout import Layout
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import mutations, random_points
 
-# Two points that differ by less than this in every coordinate are the same simulation.
+# Two points that differ by less than this in every coordinate count as the same simulation.
 _SAME_POINT = 1e-3
 
 
@@ -20,9 +20,9 @@ class Plan:
     """A point with its predicted scaled robustness.
 
     Attributes:
-        point: in [0, 1]^d.
-        cost: predicted.
-        is_simple: whether it was preferred for being extreme.
+        point: the point in [0, 1]^d.
+        cost: predicted scaled robustness.
+        is_simple: whether it was preferred because it is extreme.
     """
 
     point: Array
@@ -41,17 +41,17 @@ def plan(
     snap: float,
     rng: np.random.Generator,
 ) -> Plan:
-    """Return the most promising point that was not simulated yet.
+    """Return the most promising point that has not been simulated yet.
 
     Args:
-        predict: cost of points.
-        layout: of the points.
+        predict: returns the predicted costs of points.
+        layout: layout of the points.
         elites: best simulated points, shape (e, d).
         critical: their critical times as shares of the horizon, shape (e,).
-        seen: all simulated or asked points, shape (s, d).
-        settings: sizes.
-        snap: how much worse a simple point may be predicted and still be taken.
-        rng: generator.
+        seen: all simulated or pending points, shape (s, d).
+        settings: sizes of the populations.
+        snap: maximum difference of predicted cost up to which a simple point is preferred to the best one.
+        rng: random generator.
     """
     bred = settings.pool // 3
     children = np.concatenate(
@@ -83,7 +83,7 @@ def plan(
         best = int(np.argmin(simple_costs))
         if simple_costs[best] <= costs[0] + snap:
             return Plan(simple[best], float(simple_costs[best]), is_simple=True)
-    # Only where the whole pool was simulated before are the further points looked at.
+    # The additional points are used only if the whole pool has been simulated before.
     others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
     points = np.concatenate([pool, *others])
     unseen = next((i for i, point in enumerate(points) if not _is_seen(point, seen)), 0)
@@ -96,7 +96,7 @@ def _best(points: Array, costs: Array, count: int) -> tuple[Array, Array]:
 
 
 def _towards_bounds(predict: Callable[[Array], Array], base: Array) -> Array:
-    """Points between the base and the corner that its gradient points to."""
+    """Return points between the base and the corner to which the negative gradient points."""
     step = np.where(base > 0.5, -0.05, 0.05)
     costs = predict(np.concatenate([base[None], base + np.diag(step)]))
     gradient = (costs[1:] - costs[0]) / step
@@ -108,7 +108,7 @@ def _towards_bounds(predict: Callable[[Array], Array], base: Array) -> Array:
 
 
 def _simple_points(layout: Layout, pool: Array) -> Iterator[Array]:
-    """Variants of the best points that are constant or at bounds in some or all inputs."""
+    """Yield variants of the best points in which all inputs are at bounds and nearly constant."""
     if len(layout.groups) <= 4:
         choices: Sequence[tuple[float | None, ...]] = list(
             product((None, 0.0, 1.0), repeat=len(layout.groups))
@@ -128,7 +128,7 @@ def _simple_points(layout: Layout, pool: Array) -> Iterator[Array]:
 
 
 def _is_at_bounds(layout: Layout, point: Array) -> bool:
-    """Whether every coordinate is at a bound and every input constant, but for a hundredth of them."""
+    """Whether nearly all coordinates (99 %) are at a bound and equal to their neighbours."""
     extreme = np.mean((point == 0.0) | (point == 1.0))
     changing = np.mean([np.mean(np.diff(point[g]) != 0) if len(g) > 1 else 0.0 for g in layout.groups])
     return bool(extreme - changing > 0.99)

@@ -1,4 +1,4 @@
-"""All settings of the surrogate engine, with their reasons. They are the same for every system."""
+"""All settings of the surrogate engine, with the reasons for them; they are the same for every model."""
 
 from dataclasses import dataclass
 
@@ -8,50 +8,52 @@ class Settings:
     """How the engine learns, plans and chooses.
 
     Attributes:
-        cells: grid cells over the formula's horizon, on which traces are predicted and free inputs are
-            held; enough for pieces of a hundredth of the horizon, few enough for a rollout in milliseconds.
-        constants: constant extremes among the first simulations; each excites every steady state once.
-        bangs: switching signals among the first simulations of a formula with nested windows.
-        most_bangs: switching signals in all; when so many drawn at random did not violate, more will not.
-        probes: stepping signals instead, where a violation needs several things at once: no extreme alone
-            can bring it about, and knowing the dynamics is worth more than two steady states.
-        probe_pieces: levels that a stepping signal goes through.
-        features: random Fourier features of the nonlinear dynamics; more changed nothing.
+        cells: number of grid cells over the formula's horizon, on which traces are predicted and free inputs
+            are held; enough for pieces of 1 % of the horizon, few enough for a rollout in milliseconds.
+        constants: number of constant extremes among the first simulations; each reaches one steady state.
+        bangs: number of switching signals among the first simulations of a formula with nested windows.
+        most_bangs: maximum number of switching signals in total; if that many random ones did not violate,
+            more will not.
+        probes: number of stepping signals, instead of constant extremes, if a violation requires several
+            conditions at once: no single extreme causes it, and dynamics are worth more than steady states.
+        probe_pieces: number of levels of a stepping signal.
+        features: number of random Fourier features of the nonlinear dynamics; more did not help.
         ridge: relative regularisation of the nonlinear dynamics.
-        lags: of the linear dynamics; hidden states need a few.
+        lags: number of cells that the linear dynamics look back; hidden states need several.
         linear_ridge: relative regularisation of the linear dynamics, small because deviations are small.
-        best_weight: extra weight of the best trajectories in the fits: accuracy is needed near them.
-        best_count: how many trajectories count as the best.
-        most_rows: rows of a regression at most; bounds the time of a proposal.
-        exploration: probability of taking the dynamics with the larger recent error.
-        recent_errors: prediction errors that dynamics are judged by.
-        offset_window: last errors whose median corrects each predicate's margin.
-        offset_limit: largest correction in standard deviations of the margin; without a limit early,
-            wild errors lead the search away.
-        pool: first candidates of a plan.
-        children: further candidates of each generation.
-        parents: survivors of each generation.
-        generations: of a plan.
-        vertex_steps: gradient steps towards bounds after the generations.
-        elites: best simulated inputs that the pool is bred from.
-        snap: scaled robustness that a simple input (constant, or at its bounds) may be predicted worse
-            than the best one and still be taken: extremes generalise better than fitted details.
-        stretches: factors of inner windows that a formula over discrete signals is relaxed with, because
-            its robustness alone has no slope.
-        bandit_window: proposals by which an arm is judged.
-        trial: proposals of the dynamics during which they are preferred, so that they can learn.
+        best_weight: additional weight of the best trajectories in a fit, which must be accurate near them.
+        best_count: number of trajectories that count as the best.
+        most_rows: maximum number of rows of a regression; limits the time per proposal.
+        exploration: probability of choosing the dynamics at random instead of by their recent errors.
+        recent_errors: number of recent prediction errors by which dynamics are compared.
+        offset_window: number of recent errors whose median corrects each predicate's margin.
+        offset_limit: maximum correction in standard deviations of the margin; without it, large early errors
+            mislead the search.
+        pool: number of first candidates of a plan.
+        children: number of new candidates per generation.
+        parents: number of survivors per generation.
+        generations: number of generations of a plan.
+        vertex_steps: number of gradient steps towards bounds after the generations.
+        elites: number of best simulated inputs from which the first candidates are bred.
+        snap: difference in predicted scaled robustness up to which a simple input (constant or at its bounds)
+            is preferred to the best one: extremes generalise better than fitted details.
+        snap_decay: factor of snap after each simple input, so that the preference fades.
+        stretches: factors of inner windows in the relaxations of a formula over discrete signals, whose
+            robustness alone has no slope.
+        bandit_window: number of recent proposals by which an arm is rated.
+        trial: number of proposals during which the dynamics are preferred, so that they can learn.
         trial_share: probability of the dynamics during their trial.
-        trusted_error: recent prediction error in scaled units below which the dynamics are trusted.
-        trusted_share: probability of trusted dynamics that no other arm outranks.
-        least_share: probability below which no arm falls.
-        region_pieces: held pieces of a free input, region by region: most starts are coarse, for those end
-            soon, and what needs more switches has its turn too.
-        region_start: points before the trust region fits its first process.
-        region_points: points that its process keeps at most (cubic cost).
-        region_candidates: points among which it chooses.
-        region_bound_start: probability that a coordinate of a first point lies at a bound.
-        region_bound: probability that a changed coordinate of a candidate is moved to its nearer bound.
-        region_jump: probability that it is redrawn from its whole range.
+        trusted_error: recent prediction error, in scaled units, below which the dynamics are trusted.
+        trusted_share: probability of the dynamics if they are trusted and no other arm is rated higher.
+        least_share: approximate minimum probability of each arm.
+        region_pieces: number of held pieces of a free input in successive trust regions: most are coarse, as
+            those finish soon; violations that need more switches have their turn too.
+        region_start: number of points before the trust region fits its first process.
+        region_points: maximum number of points of its process, whose cost is cubic.
+        region_candidates: number of points among which it chooses.
+        region_bound_start: probability that a coordinate of one of the first points is at a bound.
+        region_bound: probability that a changed coordinate is moved to its nearer bound.
+        region_jump: probability that a changed coordinate is redrawn from its whole range.
     """
 
     cells: int = 100

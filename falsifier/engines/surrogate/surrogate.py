@@ -27,16 +27,16 @@ from falsifier.stl import Verdict
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pending:
-    """What the engine must remember of a candidate until it is told its evaluation.
+    """What the engine remembers about a candidate until it is told its evaluation.
 
     Attributes:
-        arm: which part of the engine proposed it.
-        layout: what the point is of.
-        point: in [0, 1]^d.
+        arm: the engine's arm that proposed it.
+        layout: layout of the point.
+        point: the point in [0, 1]^d.
         why: rationale of the candidate.
-        levels: of a constant extreme.
-        region: which trust region proposed it.
-        forecast: what the dynamics predicted.
+        levels: its levels, for a constant extreme.
+        region: the trust region that proposed it, if any.
+        forecast: predictions of the dynamics, if they proposed it.
     """
 
     arm: str
@@ -49,9 +49,9 @@ class Pending:
 
 
 class Surrogate:
-    """Learns the dynamics from whole trajectories and simulates what it predicts to be least robust.
+    """Learns the dynamics from whole trajectories and proposes inputs with a low predicted robustness.
 
-    Beside the dynamics it searches directly, in a trust region, and gives whoever does better more turns.
+    In addition it searches directly, in a trust region; the arm that does better gets more turns.
     """
 
     name = "surrogate"
@@ -83,11 +83,11 @@ class Surrogate:
         self._suggested: list[Array] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
-        """See Engine.ask."""
+        """Return n candidates, each from the arm that is chosen for it."""
         return [self._ask_one() for _ in range(max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """See Engine.tell."""
+        """Add the evaluations to the history; those of its own candidates also rate arms and forecasts."""
         for evaluation in evaluations:
             told = self.problem.space.admit(evaluation.candidate)
             pending = self._pending.pop(told.key, None)
@@ -96,9 +96,9 @@ class Surrogate:
                 self._settle(pending, sample)
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
-        """Verdicts that the better dynamics predict for candidates, without a simulation.
+        """Return the verdicts that the better dynamics predict for candidates, without simulating them.
 
-        Empty before two simulations are known. The values are in the requirement's own unit.
+        The robustness is in the requirement's own unit. The list is empty until two simulations are known.
         """
         if len(self.history.samples) < 2 or not candidates:
             return []
@@ -109,11 +109,11 @@ class Surrogate:
 
     @property
     def recent_error(self) -> float:
-        """Error of recent predictions, as a share of the spread of the margins; inf while there are none."""
+        """Error of recent predictions, as a share of the margins' spread; inf if there are none."""
         return self.dynamics.recent_error
 
     def suggest(self, candidates: Sequence[Candidate]) -> None:
-        """Let the next plan breed from these candidates, too."""
+        """Add candidates to those from which the next plan is bred."""
         self._suggested = [self.layout.point(c) for c in candidates]
 
     @property
@@ -123,11 +123,11 @@ class Surrogate:
 
     @property
     def misses(self) -> int:
-        """How many of the last planned inputs in a row were predicted to violate and did not."""
+        """Number of planned inputs, counted back from the last one, that did not violate as predicted."""
         return self.dynamics.misses
 
     def _settle(self, pending: Pending, sample: Sample | None) -> None:
-        """Learn from the evaluation of a candidate of its own."""
+        """Learn from the evaluation of one of the engine's own candidates."""
         if pending.levels is not None:
             self._walk.learn(pending.levels, None if sample is None else sample.robustness)
         if pending.region is not None:
@@ -151,7 +151,7 @@ class Surrogate:
     def _propose(self, rng: np.random.Generator) -> Pending:
         kind = self._opening[self._asked] if self._asked < len(self._opening) else ""
         if not self.problem.space.inputs and not self._walk.settled:
-            # Parameters alone: extremes are cheap to try and decide most often.
+            # With parameters only, there are few extremes, and they often violate.
             kind = "constant"
         if kind == "constant" and (levels := self._walk.next(rng)) is not None:
             point = self.layout.constant(levels)
@@ -163,7 +163,7 @@ class Surrogate:
             return Pending("stepping", self.layout, point, "steps through many levels of each input")
         if len(self.history.samples) < 2:
             point = random_points(self.layout, rng, 1)[0]
-            return Pending("random", self.layout, point, "random: too little is known yet")
+            return Pending("random", self.layout, point, "random: too few simulations to learn from yet")
         arm = self._choose_arm(rng)
         if arm == "dynamics":
             return self._plan(rng)
@@ -186,7 +186,7 @@ class Surrogate:
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
-        why = f"inputs switch between their bounds every {dwell:.3g} s, a part of an inner window"
+        why = f"inputs switch between their bounds every {dwell:.3g} s, a fraction of an inner window"
         return Pending("switching", self.layout, switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
@@ -217,7 +217,7 @@ class Surrogate:
         return Pending("dynamics", self.layout, result.point, why, forecast=forecast)
 
     def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
-        """Fit the dynamics; return the indices of the samples, the least robust first."""
+        """Fit the dynamics; return the indices of the samples, those with the lowest robustness first."""
         samples = self.history.samples
         order = np.argsort(scaled_costs(samples, self.history.scaled_objective()), kind="stable")
         best = [int(i) for i in order[: self.settings.best_count]]

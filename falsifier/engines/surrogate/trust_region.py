@@ -1,4 +1,4 @@
-"""Search without dynamics: Bayesian optimisation in a box that follows the best point."""
+"""Search without dynamics: Bayesian optimisation in a box around the best point (a trust region)."""
 
 import numpy as np
 
@@ -6,14 +6,16 @@ from falsifier.engines.box import Array
 from falsifier.engines.gaussian_process import fit_lengths, standardised
 from falsifier.engines.surrogate.settings import Settings
 
+# Side lengths of the box: initial, maximum, and the one below which another region starts. The first two are
+# those of TuRBO (Eriksson et al., "Scalable Global Optimization via Local Bayesian Optimization", 2019).
 _START_LENGTH = 0.8
-_MOST_LENGTH = 1.6
-_LEAST_LENGTH = 0.5**5
+_MAX_LENGTH = 1.6
+_MIN_LENGTH = 0.5**5
 _NOISE = 1e-3
 
 
 class TrustRegion:
-    """Proposes points of [0, 1]^d; grows after successes, shrinks after failures, ends when it is small."""
+    """Proposes points in [0, 1]^d; grows after successes, shrinks after failures, ends once it is small."""
 
     def __init__(self, dimension: int, settings: Settings) -> None:
         self._dimension = dimension
@@ -27,13 +29,13 @@ class TrustRegion:
 
     @property
     def is_starting(self) -> bool:
-        """Whether its first points are not all drawn yet."""
+        """Whether some of its first points have not been drawn yet."""
         return self._asked < self._settings.region_start
 
     @property
     def is_exhausted(self) -> bool:
-        """Whether it shrank so far that another start promises more."""
-        return self._length < _LEAST_LENGTH
+        """Whether it has become so small that a new start is more promising."""
+        return self._length < _MIN_LENGTH
 
     def ask(self, rng: np.random.Generator) -> Array:
         """Return the next point, shape (d,)."""
@@ -47,6 +49,7 @@ class TrustRegion:
         self._lengths = process.lengths
         candidates = self._candidates(points[int(np.argmin(costs))], rng)
         mean, deviation = process.predict(candidates)
+        # A lower confidence bound with a random factor balances exploitation and exploration.
         return np.asarray(candidates[int(np.argmin(mean - abs(rng.standard_normal()) * deviation))])
 
     def tell(self, point: Array, cost: float) -> None:
@@ -61,12 +64,12 @@ class TrustRegion:
         else:
             self._successes, self._failures = 0, self._failures + 1
         if self._successes >= 3:
-            self._length, self._successes = min(_MOST_LENGTH, 2 * self._length), 0
+            self._length, self._successes = min(_MAX_LENGTH, 2 * self._length), 0
         if self._failures >= max(4, self._dimension // 2):
             self._length, self._failures = self._length / 2, 0
 
     def _recent(self) -> tuple[Array, Array]:
-        """Points and costs that the process keeps: the latest, and the best."""
+        """Return the points and costs for the process: the latest ones and the best one."""
         keep = list(range(max(0, len(self._costs) - self._settings.region_points), len(self._costs)))
         best = int(np.argmin(self._costs))
         if best not in keep:
@@ -74,7 +77,7 @@ class TrustRegion:
         return np.array([self._points[i] for i in keep]), np.array([self._costs[i] for i in keep])
 
     def _candidates(self, best: Array, rng: np.random.Generator) -> Array:
-        """Points around the best that differ from it in some coordinates, many of them at bounds."""
+        """Return points around the best that differ from it in some coordinates, many of these at bounds."""
         settings, d = self._settings, self._dimension
         shape = (settings.region_candidates, d)
         reach = self._lengths / np.exp(np.mean(np.log(self._lengths))) * self._length / 2

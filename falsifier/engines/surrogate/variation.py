@@ -1,22 +1,22 @@
-"""Random points of a layout, and random changes of good ones."""
+"""Random points in a layout, and random changes of good ones."""
 
 import numpy as np
 
 from falsifier.engines.box import Array
 from falsifier.engines.surrogate.layout import Layout
 
-# Steps of small changes, as shares of a range: coarse, medium and fine, equally often.
+# Standard deviations of small changes, as shares of a range: coarse, medium and fine, equally likely.
 _STEPS = np.array([0.3, 0.1, 0.03])
 
 
 def random_points(layout: Layout, rng: np.random.Generator, count: int) -> Array:
-    """Structured random points, shape (count, d): few or many pieces, at bounds or anywhere."""
+    """Return structured random points, shape (count, d): with few or many pieces, at bounds or in between."""
     points = np.empty((count, layout.dimension))
     for row in points:
         for group, fine in zip(layout.groups, layout.is_fine, strict=True):
             size = len(group)
             if fine:
-                # Numbers of pieces of every order of magnitude are equally likely.
+                # Every order of magnitude of the number of pieces is equally likely.
                 pieces = min(size, max(1, int(np.exp(rng.uniform(0, np.log(size + 1))))))
                 starts = np.zeros(size, dtype=int)
                 starts[rng.choice(np.arange(1, size), pieces - 1, replace=False)] = 1
@@ -40,15 +40,15 @@ def mutations(
     *,
     critical: Array | None = None,
 ) -> Array:
-    """Children of the parents, shape (count, d), each crossed over or changed in one to three places.
+    """Return children, shape (count, d), each with one to three changes of a parent, some also crossed over.
 
     Args:
-        layout: of the points.
-        rng: generator.
-        parents: shape (p, d).
+        layout: layout of the points.
+        rng: random generator.
+        parents: points to change, shape (p, d).
         count: number of children.
-        critical: where known, the critical time of each parent as a share of the horizon, shape (p,): half of
-            the changes of held cells then end there, as what comes later cannot matter.
+        critical: critical time of each parent as a share of the horizon, shape (p,), or None if unknown. If
+            known, half of the changes of held cells end there, because later inputs have no effect on it.
     """
     chosen = rng.integers(0, len(parents), count)
     children = parents[chosen].copy()
@@ -67,7 +67,7 @@ def mutations(
 
 
 def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
-    """One point: each input redrawn from its two bounds after every ``dwell`` s, with a random phase."""
+    """Return one point: every ``dwell`` s, with a random phase, each input is set to a random bound."""
     point = np.empty(layout.dimension)
     for j, group in enumerate(layout.groups):
         if j >= len(layout.codings):
@@ -79,7 +79,7 @@ def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
 
 
 def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
-    """One point: each input steps through evenly spread levels in random order, each held equally long."""
+    """Return one point: each input steps through evenly spread levels in random order, all equally long."""
     point = np.empty(layout.dimension)
     for group in layout.groups:
         count = min(pieces, len(group))
@@ -89,7 +89,7 @@ def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
 
 
 def _cross_over(layout: Layout, rng: np.random.Generator, child: Array, other: Array) -> None:
-    """Take the other's signals from a random time on, and its parameters at random."""
+    """Replace the child's signals with the other's from a random time on, and each parameter at random."""
     share = rng.random()
     for j, group in enumerate(layout.groups):
         if j < len(layout.codings):

@@ -1,7 +1,7 @@
-"""Pictures: what was simulated, what decided the verdict, how searches went and how methods compare.
+"""Figures: simulations, what decided a verdict, the progress of searches, the comparison of methods.
 
-The only place that imports matplotlib. Functions draw on the axes that they are given, or make a figure;
-nothing here needs a display.
+The only package that imports matplotlib. Functions draw on the given axes or make a new figure; none of them
+needs a display.
 """
 
 from typing import TYPE_CHECKING

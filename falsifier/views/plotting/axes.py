@@ -1,4 +1,4 @@
-"""Axes of one's own, the figure that axes are on, and text on it."""
+"""New axes, the figure that axes belong to, and text on it; without pyplot, which keeps global state."""
 
 from typing import TYPE_CHECKING
 
@@ -20,14 +20,14 @@ def caption(text: str) -> str:
 
 
 def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":
-    """Axes that fill a new figure of this size in inches."""
+    """Make axes that fill a new figure of this size in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained").subplots()
 
 
 def figure_of(ax: "Axes") -> "Figure":
-    """Figure that axes are on."""
+    """The figure that axes belong to."""
     from matplotlib.figure import Figure
 
     figure = ax.get_figure(root=True)

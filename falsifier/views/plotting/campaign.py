@@ -1,4 +1,4 @@
-"""Pictures of runs and campaigns."""
+"""Figures of runs and campaigns."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -7,6 +7,7 @@ import numpy as np
 
 from falsifier.campaigns.analysis import Run, Statistics, group, statistics
 from falsifier.campaigns.analysis.curves import falsification_curve
+from falsifier.core.words import counted
 from falsifier.views.plotting.axes import caption, figure_of, own_axes
 
 if TYPE_CHECKING:
@@ -17,11 +18,11 @@ _VALUE, _BEST, _ZERO, _FOUND = "#9aa7b5", "#1f5fa8", "#8a8a8a", "#b3261e"
 
 
 def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
-    """Robustness of each simulation of a run, the smallest so far, and the counterexample.
+    """Plot the robustness of each simulation of a run, the smallest so far, and the counterexample.
 
     Args:
-        run: of load or load_run.
-        ax: where to draw; None: a figure of its own.
+        run: a run returned by load or load_run.
+        ax: where to draw; None: a new figure.
     """
     ax = ax if ax is not None else own_axes()
     numbers = np.arange(1, len(run.robustness) + 1)
@@ -37,14 +38,15 @@ def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
 
 
 def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
-    """Share of runs that are falsified after so many simulations, one curve for each method."""
+    """Plot the share of falsified runs over the number of simulations, one curve per method."""
     ax = ax if ax is not None else own_axes()
     by_method: dict[str, list[Run]] = {}
     for run in runs:
         by_method.setdefault(run.method.label, []).append(run)
     for label, members in by_method.items():
         counts, shares = falsification_curve(members)
-        ax.step(counts, shares, where="post", linewidth=1.6, label=caption(f"{label} ({len(members)} runs)"))
+        name = caption(f"{label} ({counted(len(members), 'run')})")
+        ax.step(counts, shares, where="post", linewidth=1.6, label=name)
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
     if by_method:
         ax.legend()
@@ -52,7 +54,7 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
 
 
 def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
-    """Mean simulations over the falsified runs with standard deviation; a bar for each method."""
+    """Plot the mean number of simulations until falsification with standard deviation, one bar per method."""
     cells = {key: statistics(members) for key, members in group(runs).items()}
     requirements = list(dict.fromkeys(requirement for requirement, _ in cells))
     methods = list(dict.fromkeys(method for _, method in cells))
@@ -78,5 +80,5 @@ def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
 
 
 def _each(found: Sequence[Statistics | None], value: Callable[[Statistics], float | None]) -> list[float]:
-    """The value of each, 0 where there is none."""
+    """The value of each; 0 without one, so that matplotlib draws no bar."""
     return [(value(s) or 0.0) if s is not None else 0.0 for s in found]

@@ -1,10 +1,12 @@
-"""Picture of how a formula came to its value: windows within windows, down to the critical time."""
+"""Figure of how a formula gets its value: nested time windows down to the critical time."""
 
 from typing import TYPE_CHECKING
 
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
-from falsifier.views.plotting.axes import caption, figure_of
+from falsifier.stl import Formula
+from falsifier.stl.formula import Always, Eventually, Until
+from falsifier.views.plotting.axes import figure_of
 from falsifier.views.plotting.evaluation import plot_requirement
 
 if TYPE_CHECKING:
@@ -12,20 +14,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLOURS = ("#8a5a00", "#2f7d4f", "#6a3d9a", "#1f5fa8")
+# Operators with a time window, as formulas write them.
+_OPERATORS: dict[type[Formula], str] = {Always: "G", Eventually: "F", Until: "U"}
 # Height of a window's bar and of its row, as a share of the axes.
 _BAR, _ROW = 0.025, 0.11
 
 
 def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
-    """The deciding quantity, and below it the window of each operator on the way to the critical time.
+    """Plot the deciding quantity, and below it the window of each operator on the path to the critical time.
 
     Args:
-        problem: what was required.
+        problem: the problem with the requirement.
         evaluation: an evaluation with its trajectory.
-        ax: where to draw; None: a figure of its own.
+        ax: where to draw; None: a new figure.
 
     Raises:
-        ValueError: when the evaluation has no trajectory.
+        ValueError: if the evaluation has no trajectory.
     """
     from matplotlib.transforms import blended_transform_factory
 
@@ -43,6 +47,6 @@ def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" =
         start, end = step.window
         y, colour = _ROW * (len(windows) - row), _COLOURS[row % len(_COLOURS)]
         ax.fill_between([start, end], y, y - _BAR, color=colour, transform=in_axes, linewidth=0, alpha=0.8)
-        operator = step.text.partition(" was ")[0]
-        ax.text(start, y, caption(operator), color=colour, transform=in_axes, va="bottom", fontsize=8)
+        label = f"{_OPERATORS[type(step.formula)]} over [{start:.6g}, {end:.6g}] s"
+        ax.text(start, y, label, color=colour, transform=in_axes, va="bottom", fontsize=8)
     return figure_of(ax)

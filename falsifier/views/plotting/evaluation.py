@@ -1,4 +1,4 @@
-"""Pictures of one simulation."""
+"""Figures of one simulation."""
 
 from io import BytesIO
 from pathlib import Path
@@ -22,32 +22,32 @@ _PANEL_HEIGHT = 1.9
 
 
 def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
-    """Picture of a result, a counterexample or a trajectory.
+    """Plot a result, a counterexample or a trajectory.
 
     Raises:
-        ValueError: for a result without a simulation that could be drawn.
+        ValueError: for a result in which every simulation failed.
     """
     if isinstance(shown, Trajectory):
         return plot_trajectory(shown)
     evaluation = shown.shown if isinstance(shown, Result) else shown.evaluation
     if evaluation is None:
-        raise ValueError("no simulation succeeded: there is nothing to draw")
+        raise ValueError("nothing to plot: every simulation failed")
     return plot_evaluation(shown.problem, evaluation)
 
 
 def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
-    """Figure of one simulation: compared quantities with their bounds and windows, then inputs.
+    """Plot one simulation: compared quantities with their bounds and windows, then inputs.
 
     Args:
-        problem: what was searched.
+        problem: the problem with the requirement and the search space.
         evaluation: an evaluation with its trajectory.
 
     Raises:
-        ValueError: when the evaluation has no trajectory.
+        ValueError: if the evaluation has no trajectory.
     """
     trajectory, verdict = evaluation.trajectory, evaluation.verdict
     if trajectory is None or verdict is None:
-        raise ValueError("a simulation that failed has nothing to draw")
+        raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     from matplotlib.figure import Figure
 
     drawn = panels(
@@ -66,19 +66,19 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
 
 
 def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
-    """The quantity that decided the verdict, with its bound, its window and the critical time.
+    """Plot the quantity that decided the verdict, with its bound, its window and the critical time.
 
     Args:
-        problem: what was required.
+        problem: the problem with the requirement.
         evaluation: an evaluation with its trajectory.
-        ax: where to draw; None: a figure of its own.
+        ax: where to draw; None: a new figure.
 
     Raises:
-        ValueError: when the evaluation has no trajectory.
+        ValueError: if the evaluation has no trajectory.
     """
     trajectory, verdict = evaluation.trajectory, evaluation.verdict
     if trajectory is None or verdict is None:
-        raise ValueError("a simulation that failed has nothing to draw")
+        raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     ax = ax if ax is not None else own_axes(8, 3)
     drawn = panels(problem.requirement.formula, trajectory, evaluation.candidate, (), verdict)
     plot_panel(ax, next(panel for panel in drawn if panel.critical is not None))
@@ -115,12 +115,12 @@ def plot_panel(ax: "Axes", panel: Panel) -> None:
 
 
 def save_figure(figure: "Figure", path: Path) -> None:
-    """Write a figure; the file's ending decides the format."""
+    """Write a figure; the file extension determines the format."""
     figure.savefig(path, dpi=130)
 
 
 def png(figure: "Figure", *, dpi: int) -> bytes:
-    """A figure as the content of a PNG file."""
+    """Return a figure as the content of a PNG file."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi)
     return buffer.getvalue()

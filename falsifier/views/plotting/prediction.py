@@ -1,4 +1,4 @@
-"""Picture of what an engine believed against what was simulated."""
+"""Figure that compares an engine's predictions with simulations."""
 
 from typing import TYPE_CHECKING
 
@@ -15,12 +15,12 @@ _POINT, _ZERO = "#1f5fa8", "#8a8a8a"
 
 
 def plot_predictions(predicted: ArrayLike, simulated: ArrayLike, ax: "Axes | None" = None) -> "Figure":
-    """One point a candidate; on the diagonal the engine was right.
+    """Plot simulated over predicted robustness, one point per candidate, and the line of equality.
 
     Args:
-        predicted: robustness that was predicted, shape (n,).
-        simulated: robustness that was simulated, shape (n,).
-        ax: where to draw; None: a figure of its own.
+        predicted: predicted robustness, shape (n,).
+        simulated: simulated robustness, shape (n,).
+        ax: where to draw; None: a new figure.
     """
     ax = ax if ax is not None else own_axes(4.5, 4.2)
     x, y = np.asarray(predicted, dtype=np.float64), np.asarray(simulated, dtype=np.float64)

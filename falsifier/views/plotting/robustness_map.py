@@ -1,4 +1,4 @@
-"""Picture of the neighbourhood of a counterexample."""
+"""Figure of the neighbourhood of a counterexample."""
 
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ _VIOLATES, _HOLDS, _ZERO = "#b3261e", "#1f5fa8", "#8a8a8a"
 
 
 def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
-    """Figure with two panels: robustness over the size of the change, and the map of the deciding inputs."""
+    """Plot robustness over the size of the change, and over the two most influential inputs."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 4.4), layout="constrained")
@@ -25,14 +25,13 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         _plot_map(right, found)
     else:
         _plot_line(right, found)
-    about = "where the violation persists"
-    figure.suptitle(f"{caption(title)}: {about}" if title else about)
+    figure.suptitle(f"{caption(title)}: robustness around the counterexample".removeprefix(": "))
     return figure
 
 
 def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
     violates = found.robustness < 0
-    for mask, color, label in ((violates, _VIOLATES, "violates"), (~violates, _HOLDS, "holds")):
+    for mask, color, label in ((violates, _VIOLATES, "violated"), (~violates, _HOLDS, "satisfied")):
         ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
     ax.plot(0.0, found.original, "o", color=_VIOLATES, label="counterexample")
     ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
@@ -50,7 +49,7 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
     ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
-    ax.figure.colorbar(mesh, ax=ax, label="robustness, below 0 violates")
+    ax.figure.colorbar(mesh, ax=ax, label="robustness (< 0: violated)")
 
 
 def _plot_line(ax: "Axes", found: RobustnessMap) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of signals, whatever was required of them."""
+"""Figures of signals over time, independent of any requirement."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,11 +14,11 @@ _COLOUR = "#1f5fa8"
 
 
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
-    """Figure with one small panel a signal.
+    """Plot signals over time, one small panel per signal.
 
     Args:
-        trajectory: what was simulated.
-        names: of the signals; None: all.
+        trajectory: the simulation.
+        names: names of the signals; None: all.
     """
     from matplotlib.figure import Figure
 
@@ -33,13 +33,13 @@ def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) 
 
 
 def plot_signal(trajectory: Trajectory, name: str, ax: "Axes | None" = None, *, label: str = "") -> "Figure":
-    """One signal over time.
+    """Plot one signal over time.
 
     Args:
-        trajectory: what was simulated.
-        name: of the signal.
-        ax: where to draw; None: a figure of its own.
-        label: of the line in a legend; then each line has a colour of its own.
+        trajectory: the simulation.
+        name: name of the signal.
+        ax: where to draw; None: a new figure.
+        label: label of the line in a legend; if given, each line gets its own colour.
     """
     ax = ax if ax is not None else own_axes(8, 2.5)
     colour = None if label else _COLOUR

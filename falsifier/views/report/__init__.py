@@ -1,4 +1,4 @@
-"""Reports of runs and campaigns: a self-contained page, Markdown, JUnit XML.
+"""Reports on runs and campaigns: a self-contained HTML page, Markdown, JUnit XML.
 
 ::
 

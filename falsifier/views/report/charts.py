@@ -1,4 +1,4 @@
-"""Drawings in SVG: colours come from the page's style sheet, so that they follow dark mode and print."""
+"""Charts in SVG; their colours come from the page's style sheet, which also covers dark mode and print."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 _WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM = 760.0, 62.0, 14.0, 22.0, 30.0
 _TICKS = 5
-# Values drawn of one run, and columns into which a long trajectory is summed up by its extremes.
+# Maximum number of values drawn per run, and of columns for a long trajectory, each drawn by its extremes.
 _DRAWN_VALUES = 300
 _DRAWN_COLUMNS = 240
 SERIES_COLOURS = 6
@@ -24,7 +24,7 @@ SERIES_COLOURS = 6
 
 @dataclass(frozen=True, slots=True)
 class _Frame:
-    """Maps data to the drawing: x in [left, right], y in [low, high]."""
+    """Maps data to chart coordinates: x in [left, right], y in [low, high]."""
 
     left: float
     right: float
@@ -41,7 +41,7 @@ class _Frame:
         return self.height - _BOTTOM - share * (self.height - _TOP - _BOTTOM)
 
     def path(self, xs: Sequence[float] | Array, ys: Sequence[float] | Array, *, steps: bool = False) -> str:
-        """Path through the points; with steps each value holds until the next point."""
+        """Path through the points; with steps, each value is held until the next point."""
         commands = []
         for i, (x, y) in enumerate(zip(xs, ys, strict=True)):
             px, py = self.x(float(x)), self.y(float(y))
@@ -54,21 +54,21 @@ class _Frame:
         return "".join(commands)
 
     def dots(self, xs: Array, ys: Array) -> str:
-        """Path of points: strokes without length, drawn with round ends."""
+        """Path of dots: zero-length strokes, which are drawn with round ends."""
         return "".join(
             f"M{self.x(float(x)):.1f} {self.y(float(y)):.1f}h0" for x, y in zip(xs, ys, strict=True)
         )
 
 
 def history_chart(runs: Sequence[Run], label: str) -> Html:
-    """Robustness over simulations for the runs of one method, with each run's smallest so far."""
+    """Draw robustness over simulations for the runs of one method, with each run's smallest so far."""
     valid = [run for run in runs if not np.isnan(run.robustness).all()]
     if not valid:
-        return el("p", "No simulation gave a robustness.", class_="note")
-    most = max(len(run.robustness) for run in valid)
+        return el("p", "Every simulation failed: there is no robustness to show.", class_="note")
+    longest = max(len(run.robustness) for run in valid)
     lowest = min(float(np.nanmin(run.robustness)) for run in valid)
     highest = max(float(np.nanmax(run.robustness)) for run in valid)
-    frame = _frame(0.5, most + 0.5, [lowest, highest, 0.0], 240)
+    frame = _frame(0.5, longest + 0.5, [lowest, highest, 0.0], 240)
     parts = [_axes(frame, "simulation", "robustness", whole=True), _level(frame, 0.0, "zero")]
     for run in valid:
         parts.append(el("path", d=frame.dots(*thinned(run.robustness, _DRAWN_VALUES)), class_="dots"))
@@ -79,16 +79,18 @@ def history_chart(runs: Sequence[Run], label: str) -> Html:
     for run in valid:
         if run.counterexample is not None:
             at_x, at_y = run.counterexample + 1, float(run.robustness[run.counterexample])
-            title = el("title", f"seed {run.seed}: counterexample at simulation {at_x}, {at_y:.5g}")
+            title = el(
+                "title", f"seed {run.seed}: counterexample at simulation {at_x}, robustness {at_y:.5g}"
+            )
             parts.append(el("circle", title, cx=frame.x(at_x), cy=frame.y(at_y), r=4, class_="critical"))
     return _svg(frame.height, f"Robustness over simulations, {label}", parts)
 
 
 def rate_chart(by_method: dict[str, list[Run]]) -> Html:
-    """Share of falsified runs over simulations, a curve for each method."""
+    """Draw the share of falsified runs over simulations, one curve per method."""
     curves = {label: falsification_curve(runs) for label, runs in by_method.items()}
-    most = max((float(x[-1]) for x, _ in curves.values()), default=1.0)
-    frame = _Frame(0.0, max(most, 1.0), 0.0, 1.0, 200.0)
+    longest = max((float(x[-1]) for x, _ in curves.values()), default=1.0)
+    frame = _Frame(0.0, max(longest, 1.0), 0.0, 1.0, 200.0)
     parts = [_axes(frame, "simulations", "falsified runs", whole=True)]
     for i, (x, y) in enumerate(curves.values()):
         d = frame.path([*x, frame.right], [*y, y[-1]], steps=True)
@@ -153,7 +155,7 @@ def _axes(frame: _Frame, x_label: str, y_label: str, *, whole: bool = False) -> 
 
 
 def _ticks(low: float, high: float, *, whole: bool = False) -> list[float]:
-    """Round numbers within [low, high], about as many as there is room for."""
+    """Round numbers within [low, high], about as many as fit."""
     raw = max((high - low) / _TICKS, 1.0 if whole else 0.0)
     power = 10.0 ** floor(log10(raw))
     step = next((m * power for m in (1, 2, 5) if m * power >= raw), 10 * power)
@@ -169,7 +171,7 @@ def _window(frame: _Frame, start: float, end: float, predicate: str) -> Html:
     x = frame.x(start)
     return el(
         "rect",
-        el("title", f"{predicate} counts from {start:.6g} s to {end:.6g} s"),
+        el("title", f"{predicate}, evaluated from {start:.6g} s to {end:.6g} s"),
         x=x,
         y=_TOP,
         width=max(frame.x(end) - x, 1.0),
@@ -179,7 +181,7 @@ def _window(frame: _Frame, start: float, end: float, predicate: str) -> Html:
 
 
 def _drawable(times: Array, values: Array) -> tuple[Array, Array]:
-    """Short trajectories as they are; of long ones the extremes of each column, in order of time."""
+    """Short trajectories unchanged; of long ones the extremes in each column, in order of time."""
     if len(times) <= 2 * _DRAWN_COLUMNS:
         return times, values
     kept = [0, len(times) - 1]

@@ -1,4 +1,4 @@
-"""What a report says, gathered from a directory before anything is laid out."""
+"""The content of a report, gathered from a directory before any layout."""
 
 import shlex
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ class Shown:
     Attributes:
         run: the run.
         candidate: what was simulated.
-        panels: what to draw; none where no trajectory was kept.
+        panels: what to draw; empty if the trajectory was not kept.
     """
 
     run: Run
@@ -32,14 +32,14 @@ class Shown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """One requirement.
+    """The part of a report about one requirement.
 
     Attributes:
-        name: of the requirement.
-        formula: its text.
+        name: name of the requirement.
+        formula: text of the formula.
         description: what it means.
         by_method: its runs by method.
-        shown: counterexamples in the order of the runs; without any, the smallest robustness of all.
+        shown: counterexamples in the order of the runs; if there are none, the best simulation of all runs.
     """
 
     name: str
@@ -50,19 +50,19 @@ class Section:
 
     @property
     def runs(self) -> list[Run]:
-        """Its runs of all methods."""
+        """Its runs with all methods."""
         return [run for runs in self.by_method.values() for run in runs]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Content:
-    """A whole report.
+    """A complete report.
 
     Attributes:
         title: name of the directory.
-        runs: all runs that have begun.
+        runs: all runs that have started.
         table: the protocol's table.
-        sections: one a requirement.
+        sections: one per requirement.
     """
 
     title: str
@@ -75,7 +75,7 @@ def gather(directory: Path, published: Published | None = None) -> Content:
     """Read a run or a campaign.
 
     Raises:
-        JournalError: when the directory is neither, or is damaged.
+        JournalError: if the directory is neither, or is damaged.
     """
     runs = load(directory)
     grouped: dict[str, dict[str, list[Run]]] = {}
@@ -90,13 +90,13 @@ def gather(directory: Path, published: Published | None = None) -> Content:
 
 
 def replay_command(run: Run) -> str:
-    """Shell command that simulates a run's counterexample again."""
+    """Shell command that replays a run's counterexample."""
     place = run.counterexample_file if run.shared else run.directory
     return shlex.join(["falsifier", "replay", str(place)])
 
 
 def searches(runs: Iterable[Run]) -> list[Run]:
-    """Of the runs that shared a search, the one that lasted longest: what a directory's search has used."""
+    """One run per directory: of those that share a search, the longest, which shows what the search spent."""
     longest: dict[Path, Run] = {}
     for run in runs:
         known = longest.get(run.directory)
@@ -106,16 +106,15 @@ def searches(runs: Iterable[Run]) -> list[Run]:
 
 
 def run_command(request: RunRequest, *, shared: bool = False) -> str:
-    """Shell command that repeats a run's search; shared: for all requirements of its spec.
+    """Shell command that repeats a run; shared: for all requirements of its spec.
 
     >>> run_command(RunRequest(problems=(ProblemSource(target="AT1"),), engine="uniform"))
     'falsifier run AT1 --engine uniform --budget 100 --seed 0'
     """
     problem, budget = request.source, request.budget
     if problem is None:
-        return "(its problem was made in Python)"
-    spec = problem.parts.file or problem.target.partition(":")[0]
-    target = spec if shared else problem.target
+        return "(no command: the problem was made in Python)"
+    target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
         ("--profile", problem.profile),

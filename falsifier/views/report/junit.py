@@ -1,4 +1,4 @@
-"""The report as JUnit XML: a test case for each run; a falsified requirement is a failure."""
+"""The report as JUnit XML: one test case per run; a falsified requirement is a failure."""
 
 from itertools import groupby
 from pathlib import Path
@@ -6,14 +6,15 @@ from xml.etree import ElementTree
 
 from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import plain
+from falsifier.core.words import counted
 from falsifier.views.report.content import replay_command, run_command, searches
 
 
 def junit_report(directory: Path) -> str:
-    """Results of a run or a campaign, one test suite for each method.
+    """Report on a run or a campaign, one test suite per method.
 
     Raises:
-        JournalError: when the directory is neither, or is damaged.
+        JournalError: if the directory is neither, or is damaged.
     """
     runs = sorted(load(directory), key=lambda run: run.method)
     root = ElementTree.Element("testsuites", name="falsifier")
@@ -47,7 +48,8 @@ def _case(label: str, run: Run) -> ElementTree.Element:
         time=f"{run.spent.seconds:.3f}",
     )
     if run.falsified and run.verdict is not None:
-        message = f"robustness {run.verdict.robustness:+.6g} after {run.simulations} simulations"
+        count = counted(run.simulations, "simulation")
+        message = f"robustness {run.verdict.robustness:+.6g} after {count}"
         failure = ElementTree.SubElement(case, "failure", message=message, type="falsified")
         lines = (
             run.manifest.requirement.formula,

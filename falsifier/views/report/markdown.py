@@ -3,14 +3,15 @@
 from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
+from falsifier.core.words import counted
 from falsifier.views.report.content import Content, Section, gather, replay_command, run_command
 
 
 def markdown_report(directory: Path) -> str:
-    """Summary of a run or a campaign.
+    """Summarize a run or a campaign.
 
     Raises:
-        JournalError: when the directory is neither, or is damaged.
+        JournalError: if the directory is neither, or is damaged.
     """
     content = gather(directory)
     parts = [f"# Falsification report: {markdown_text(content.title)}", content.table.markdown().rstrip()]
@@ -19,22 +20,24 @@ def markdown_report(directory: Path) -> str:
 
 
 def _section(section: Section) -> str:
-    """A falsified requirement with the counterexample that took the fewest simulations."""
+    """A falsified requirement, with the counterexample found in the fewest simulations."""
     run = min((run for run in section.runs if run.falsified), key=lambda run: run.simulations)
     lines = [f"## {markdown_text(section.name)}: falsified", markdown_code(section.formula)]
     if run.verdict is not None:
         lines.append(
             f"Robustness {run.verdict.robustness:+.6g} at t = {run.verdict.critical_time:.6g} s, "
-            f"{markdown_code(run.verdict.predicate)}, after {run.simulations} simulations of "
-            f"{markdown_text(run.method.label)}, seed {run.seed}."
+            f"decided by {markdown_code(run.verdict.predicate)}, after "
+            f"{counted(run.simulations, 'simulation')} with {markdown_text(run.method.label)}, "
+            f"seed {run.seed}."
         )
-    lines += [f"    {one_line(c)}" for c in (replay_command(run), run_command(run.manifest.request))]
+    commands = (replay_command(run), run_command(run.manifest.request, shared=run.shared))
+    lines.append("\n".join(f"    {one_line(command)}" for command in commands))
     return "\n\n".join(lines)
 
 
 def _environment(content: Content) -> str:
     if not content.runs:
-        return "No run has begun."
+        return "No run has started yet."
     manifest = content.runs[0].manifest
     packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
     return f"falsifier {manifest.falsifier}, Python {manifest.python}, {manifest.platform}, {packages}."

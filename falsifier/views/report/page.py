@@ -1,11 +1,11 @@
-"""The report as one HTML page that needs nothing from elsewhere and runs no script."""
+"""The report as one self-contained HTML page without scripts."""
 
 from importlib.resources import files
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Table
 from falsifier.core.files import file_name
-from falsifier.core.words import choices
+from falsifier.core.words import choices, counted
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
 from falsifier.views.report.content import (
@@ -20,10 +20,10 @@ from falsifier.views.report.content import (
 
 
 def html_report(directory: Path) -> str:
-    """Page on a run or a campaign.
+    """Report on a run or a campaign.
 
     Raises:
-        JournalError: when the directory is neither, or is damaged.
+        JournalError: if the directory is neither, or is damaged.
     """
     return page(gather(directory))
 
@@ -57,10 +57,11 @@ def _overview(content: Content) -> str:
     open_ = sum(not run.finished for run in runs) - failed
     started = min((run.manifest.started for run in runs), default="")
     parts = [
-        f"{len(content.sections)} requirements, {len(runs)} runs, {falsified} falsified",
+        counted(len(content.sections), "requirement"),
+        f"{counted(len(runs), 'run')}, {falsified} falsified",
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
-        f"{sum(run.simulations for run in searches(runs))} simulations",
+        counted(sum(run.simulations for run in searches(runs)), "simulation"),
         f"started {started}",
     ]
     return ", ".join(parts) + "."
@@ -94,7 +95,7 @@ def _table(table: Table, anchors: dict[str, str]) -> Html:
 
 
 def _scrolling(content: Html, label: str) -> Html:
-    """Wide content that scrolls by itself, reachable by keyboard."""
+    """Wide content in its own scrolling region, reachable by keyboard."""
     return el("div", content, class_="scroll", tabindex="0", role="region", aria_label=label)
 
 
@@ -108,7 +109,7 @@ def _section(section: Section) -> Html:
             el("figure", el("figcaption", "Falsified runs"), rate_chart(section.by_method), _legend(section))
         )
     found = any(shown.run.falsified for shown in section.shown)
-    title = "Counterexamples" if found else "Nearest to a violation"
+    title = "Counterexamples" if found else "Closest to a violation"
     return el(
         "section",
         el("h2", section.name),
@@ -124,7 +125,7 @@ def _section(section: Section) -> Html:
 
 def _legend(section: Section) -> Html:
     items = [
-        el("li", el("span", class_=f"chip s{i % SERIES_COLOURS}"), f"{label} ({len(runs)} runs)")
+        el("li", el("span", class_=f"chip s{i % SERIES_COLOURS}"), f"{label} ({counted(len(runs), 'run')})")
         for i, (label, runs) in enumerate(section.by_method.items())
     ]
     return el("ul", *items, class_="legend")
@@ -133,26 +134,26 @@ def _legend(section: Section) -> Html:
 def _shown(shown: Shown, *, opened: bool) -> Html:
     run, verdict = shown.run, shown.run.verdict
     robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
-    heading = f"{run.method.label}, seed {run.seed}: {run.simulations} simulations, {robustness}"
+    heading = f"{run.method.label}, seed {run.seed}: {counted(run.simulations, 'simulation')}, {robustness}"
     critical = verdict.critical_time if verdict else None
     facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
     if verdict is not None:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in verdict.values.items())
         facts += [
-            ("critical time", f"{verdict.critical_time:.6g} s, at {verdict.predicate}"),
-            ("values there", values),
+            ("critical time", f"{verdict.critical_time:.6g} s, decided by {verdict.predicate}"),
+            ("values then", values),
         ]
     facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
-    commands = [("repeat the search", run_command(run.manifest.request, shared=run.shared))]
+    commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
-        commands.insert(0, ("simulate it again", replay_command(run)))
+        commands.insert(0, ("replay the counterexample", replay_command(run)))
     rationale = shown.candidate.rationale
     return el(
         "details",
         el("summary", heading),
         *(el("figure", panel_chart(panel, critical)) for panel in shown.panels),
         _facts(facts),
-        el("blockquote", rationale, title="the engine's own words") if rationale else Html(""),
+        el("blockquote", rationale, title="the engine's rationale") if rationale else Html(""),
         el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),
         open="" if opened else None,
     )
@@ -163,18 +164,19 @@ def _facts(facts: list[tuple[str, str]]) -> Html:
 
 
 def _troubles(section: Section) -> Html:
-    """Runs that failed, and violations that were not confirmed."""
+    """Runs that failed or were interrupted, and violations that were not confirmed."""
     items = [
         el("li", f"{run.method.label}, seed {run.seed}: {run.status}: {run.reason}")
         for run in section.runs
         if run.status in ("failed", "interrupted")
     ]
     items += [
-        el("li", f"{run.method.label}, seed {run.seed}, simulation {index + 1}: {said}")
+        el("li", f"{run.method.label}, seed {run.seed}, simulation {index + 1}: {outcome}")
         for run in section.runs
-        for index, said in run.unconfirmed.items()
+        for index, outcome in run.unconfirmed.items()
     ]
-    return join(el("h3", "Not counted"), el("ul", *items)) if items else Html("")
+    title = "Incomplete runs and unconfirmed violations"
+    return join(el("h3", title), el("ul", *items)) if items else Html("")
 
 
 def _environment(content: Content) -> Html:

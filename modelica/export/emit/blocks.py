@@ -21,7 +21,7 @@ class Emitter:
         self.mode = mode
 
     def block(self, block: Block) -> list[str]:
-        """One block."""
+        """Print one block."""
         item = block.item
         match item:
             case Solved(target, value, _, _):
@@ -36,7 +36,7 @@ class Emitter:
                 return self.statement(item)
 
     def entry(self, name: str) -> list[str]:
-        """The value that a variable has where an algorithm section begins."""
+        """Assign to a variable its value at the start of an algorithm section."""
         if name.startswith("when("):
             return []
         variable = self.system.model.variables[name]
@@ -48,11 +48,11 @@ class Emitter:
         return [f"{slot} = {self.printer.text(variable.start) if variable.start else '0'};"]
 
     def statements(self, items: Iterable[Statement]) -> list[str]:
-        """Statements in their order."""
+        """Print statements in their order."""
         return [line for item in items for line in self.statement(item)]
 
     def statement(self, item: Statement) -> list[str]:
-        """One statement."""
+        """Print one statement."""
         text, slots = self.printer.text, self.system.layout.slots
         match item:
             case Set(name, value, _):
@@ -77,7 +77,7 @@ class Emitter:
                 if self.mode != "event":
                     return []
                 if state not in self.system.states:
-                    raise ExportError(place, f"reinit: '{state}' is not a state")
+                    raise ExportError(place, f"'{state}' in reinit is not a state")
                 k = self.system.states.index(state)
                 jump = f"m->reinit_value[{k}] = {text(value)}; m->reinit_set[{k}] = 1;"
                 return [f"if ({text(condition)}) {{ {jump} }}"]
@@ -85,7 +85,7 @@ class Emitter:
                 return [f"if (!{text(condition)}) model_fail(m, {c_string(f'{place}: {message}')});"]
 
     def outputs(self, item: Outputs) -> list[str]:
-        """A call of a function with array results or several outputs."""
+        """Print a call of a function with array results or several outputs."""
         layout = self.system.layout
         args = [text for arg in item.args for text in self.printer.argument(arg)]
         before: list[str] = []
@@ -98,7 +98,7 @@ class Emitter:
             ctype = C_TYPES[component.type_name]  # type: ignore[index]
             if target is None:
                 if component.dimensions:
-                    raise ExportError(item.place, "an array output cannot be left out")
+                    raise ExportError(item.place, "an array output cannot be omitted")
                 before.append(f"{ctype} unused_{k};")
                 pointers.append(f"&unused_{k}")
                 continue

@@ -27,7 +27,7 @@ from ..flat.ir import (
 from ..order.layout import C_TYPES, Layout, literal
 
 Mode = Literal["continuous", "event", "initial"]
-"""Where the text stands: relations are frozen in continuous mode, live in the two others."""
+"""Mode of the generated code: relations are frozen in continuous mode, evaluated in the other two."""
 
 
 _C_FUNCTIONS = {
@@ -49,7 +49,7 @@ _C_FUNCTIONS = {
 
 
 def c_name(full_name: str) -> str:
-    """The C name of a Modelica function."""
+    """Return the C name of a Modelica function."""
     return "fn_" + full_name.replace(".", "_")
 
 
@@ -61,7 +61,7 @@ class Printer:
     mode: Mode
 
     def text(self, node: Scalar) -> str:
-        """C text of an expression."""
+        """Return the C text of an expression."""
         match node:
             case Lit(value, kind):
                 return literal(value, kind)
@@ -97,7 +97,7 @@ class Printer:
                 return self.operation(node)
 
     def relation(self, node: Relation) -> str:
-        """A comparison: live at events, its stored value between them."""
+        """Print a comparison: evaluated at events, its stored value between them."""
         if self.mode == "continuous":
             if node in self.layout.relations:
                 return f"m->rel[{self.layout.relations[node]}]"
@@ -117,7 +117,7 @@ class Printer:
         return operation_text(node.name, args, node.type, [arg.type for arg in node.args])
 
     def pick(self, node: Pick) -> str:
-        """An array element with subscripts known during simulation only."""
+        """Print an array element whose subscripts are known only during simulation."""
         base, *_ = self.argument(node.array)
         index = "0"
         for subscript, size in zip(node.subscripts, node.array.dims, strict=True):
@@ -126,13 +126,13 @@ class Printer:
         return f"({base})[{index}]"
 
     def argument(self, value: Tensor) -> list[str]:
-        """A function argument: a scalar, or a pointer followed by the dimensions."""
+        """Print a function argument: a scalar, or a pointer followed by the dimensions."""
         if not value.dims:
             return [self.text(value.items[0])]
         return [self.pointer(value), *map(str, value.dims)]
 
     def pointer(self, value: Tensor) -> str:
-        """A pointer to the elements of an array in row-major order."""
+        """Print a pointer to the elements of an array in row-major order."""
         if all(isinstance(item, Lit) for item in value.items):
             texts = tuple(literal(item.value, value.type) for item in value.items if isinstance(item, Lit))
             return self.layout.table(texts, value.type)
@@ -146,12 +146,12 @@ class Printer:
 
 
 def _time_after(node: Relation) -> bool:
-    """Whether the relation becomes true (not false) as time passes."""
+    """Whether the relation becomes true, rather than false, as time passes."""
     return (node.name in (">", ">=")) == isinstance(node.left, Time)
 
 
 def operation_text(name: str, args: list[str], kind: Type, types: list[Type]) -> str:
-    """An operator or elementary function applied to C texts."""
+    """Return an operator or elementary function applied to C texts."""
     suffix = "int" if kind != "Real" else "real"
     match name, args:
         case "neg", [a]:

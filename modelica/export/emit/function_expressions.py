@@ -1,4 +1,4 @@
-"""Expressions inside of Modelica functions -> C."""
+"""Expressions in Modelica functions -> C."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .expressions import c_name, operation_text
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """C text of a value; with dimensions it is a pointer to its elements."""
+    """C text of a value; if it has dimensions, a pointer to its elements."""
 
     text: str
     type: Type
@@ -50,7 +50,7 @@ class Expressions:
     sizes: list[str]
 
     def converted(self, expr: Expr, kind: Type) -> str:
-        """A scalar of the wanted type."""
+        """Print a scalar expression of this type; an Integer is accepted as Real."""
         value = self.scalar(expr)
         if value.type == kind or (kind == "Real" and value.type == "Integer"):
             return value.text
@@ -68,7 +68,7 @@ class Expressions:
         """A scalar."""
         value = self.value(expr)
         if value.dims:
-            raise ExportError(expr.place, "array arithmetic is not supported inside of functions, use a loop")
+            raise ExportError(expr.place, "array arithmetic is not supported in functions; use a loop")
         return value
 
     def value(self, expr: Expr) -> Value:
@@ -98,7 +98,7 @@ class Expressions:
                 return self.call(expr)
             case End(place):
                 if not self.sizes:
-                    raise ExportError(place, "'end' can only stand inside of subscripts")
+                    raise ExportError(place, "'end' is only allowed in subscripts")
                 return Value(self.sizes[-1], "Integer")
         raise ExportError(expr.place, "this expression is not supported in a function")
 
@@ -112,7 +112,7 @@ class Expressions:
         logical = operator in ("and", "or", "not")
         comparing = operator in fold.COMPARISONS
         if logical != ("Boolean" in types) and not (comparing and set(types) == {"Boolean"}):
-            raise ExportError(place, f"'{operator}' does not take {' and '.join(types)}")
+            raise ExportError(place, f"'{operator}' cannot be applied to {' and '.join(types)}")
         kind: Type = "Boolean" if logical or comparing else "Real"
         if kind == "Real" and operator not in ("/", "^") and set(types) == {"Integer"}:
             kind = "Integer"
@@ -124,7 +124,7 @@ class Expressions:
         if not rows or any(row.dims for row in rows):
             raise ExportError(
                 expr.place,
-                "inside of a function an empty array or a matrix needs to be a constant of the function",
+                "an empty array or a matrix in a function must be declared as a constant of the function",
             )
         kind: Type = "Real" if any(row.type == "Real" for row in rows) else rows[0].type
         if wanted == "Real" and kind == "Integer":
@@ -133,7 +133,7 @@ class Expressions:
         return Value(f"(const {C_TYPES[kind]}[]){{{texts}}}", kind, (str(len(rows)),))
 
     def whole(self, name: str, place: Place) -> Value:
-        """A variable of the function without subscripts."""
+        """Return a variable of the function as a whole, without subscripts."""
         if name in self.indices:
             return Value(f"i_{name}", self.indices[name])
         item = self.variables[name]
@@ -180,7 +180,7 @@ class Expressions:
         return Value(self.layout.table(texts, value.type), value.type, tuple(map(str, value.dims)))
 
     def call_arguments(self, call: Call) -> tuple[Class, list[str]]:
-        """The called function and the C texts of its inputs."""
+        """Return the called function and the C texts of its inputs."""
         function = find_class(call.name, self.cls, call.place)
         if function.kind != "function":
             raise ExportError(call.place, f"'{call.name}' is not a function")
@@ -188,7 +188,7 @@ class Expressions:
         inputs = [c for c in function.components if c.causality == "input"]
         if len(call.arguments) > len(inputs):
             raise ExportError(
-                call.place, f"'{call.name}' takes {len(inputs)} arguments, not {len(call.arguments)}"
+                call.place, f"'{call.name}' expects {len(inputs)} arguments, got {len(call.arguments)}"
             )
         given = dict(zip((c.name for c in inputs), call.arguments, strict=False))
         for name, expr in call.named:
@@ -243,7 +243,7 @@ class Expressions:
         ):
             return Value(f"{name}_of({args[0].text}, {args[0].dims[0]})", "Real")
         if any(arg.dims for arg in args):
-            raise ExportError(place, f"'{name}' of arrays is not supported inside of functions, use a loop")
+            raise ExportError(place, f"'{name}' of arrays is not supported in functions; use a loop")
         types: list[Type] = [arg.type for arg in args]
         texts = [arg.text for arg in args]
         if name in fold.REAL_FUNCTIONS:
@@ -254,9 +254,9 @@ class Expressions:
         elif name in ("min", "max", "div", "mod", "rem"):
             wanted, kind = 2, "Integer" if set(types) == {"Integer"} else "Real"
         else:
-            raise ExportError(place, f"'{name}' is not supported inside of functions")
+            raise ExportError(place, f"'{name}' is not supported in functions")
         if len(args) != wanted or "Boolean" in types:
-            raise ExportError(place, f"'{name}' takes {wanted} numbers")
+            raise ExportError(place, f"'{name}' expects {wanted} numeric arguments")
         if name == "integer" and types == ["Real"]:
             texts = [f"floor({texts[0]})"]
         return Value(operation_text(name, texts, kind, types), kind)

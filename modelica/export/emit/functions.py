@@ -1,4 +1,4 @@
-"""Modelica functions -> C functions. Inside of functions nothing makes events and array sizes may vary."""
+"""Modelica functions -> C functions. Functions create no events, and their array sizes may vary."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .function_expressions import Expressions, Value
 
 
 def functions_text(model: FlatModel, evaluator: Evaluator, layout: Layout) -> str:
-    """Prototypes and definitions of all functions that the model needs."""
+    """Return prototypes and definitions of all functions that the model needs."""
     done: dict[str, tuple[str, str]] = {}
     while pending := [name for name in model.functions if name not in done]:
         for name in pending:
@@ -66,7 +66,7 @@ class FunctionWriter(Expressions):
         self.outputs = outputs
 
     def write(self) -> tuple[str, str]:
-        """Head and body."""
+        """Return the head and the body of the C function."""
         parameters = ["Model *m"]
         lines: list[str] = []
         for item in self.cls.components:
@@ -92,14 +92,14 @@ class FunctionWriter(Expressions):
         return f"static {result} {c_name(self.cls.full_name)}({', '.join(parameters)})", text
 
     def local(self, item: Component, ctype: str) -> list[str]:
-        """Declaration of an output or protected variable with its first value."""
+        """Print the declaration of an output or protected variable with its initial value."""
         lines = []
         if not item.dimensions:
             value = self.converted(item.modifier.value, type_of(item)) if item.modifier.value else "0"
             return [f"{ctype} v_{item.name} = {value};"]
         for k, dim in enumerate(item.dimensions):
             if isinstance(dim, Colon):
-                raise ExportError(item.place, f"the size of '{item.name}' needs to be given")
+                raise ExportError(item.place, f"the size of '{item.name}' must be given")
             lines.append(f"const int n_{item.name}_{k + 1} = {self.integer(dim)};")
         count = " * ".join(f"n_{item.name}_{k + 1}" for k in range(len(item.dimensions)))
         if item.causality == "output":
@@ -112,7 +112,7 @@ class FunctionWriter(Expressions):
         return lines
 
     def results(self) -> list[str]:
-        """Hand the outputs over."""
+        """Print the statements that return the outputs."""
         if self.single:
             return [f"return v_{self.single.name};"]
         return [f"*out_{c.name} = v_{c.name};" for c in self.outputs if not c.dimensions]
@@ -146,13 +146,13 @@ class FunctionWriter(Expressions):
         raise ExportError(item.place, "this statement is not supported in a function")
 
     def indented(self, body: Body) -> list[str]:
-        """A block inside of braces."""
+        """Print the indented block between braces."""
         return ["    " + line for line in self.body(body)]
 
     def loop(self, item: For) -> list[str]:
-        """A for loop over a range of Integers."""
+        """Print a for loop over a range of Integers."""
         if not isinstance(item.over, Range):
-            raise ExportError(item.place, "a for loop in a function runs over a range 'a:b' or 'a:step:b'")
+            raise ExportError(item.place, "a for loop in a function needs a range 'a:b' or 'a:step:b'")
         step = 1
         if item.over.step is not None:
             value = self.constants.static_integer(item.over.step, item.place)
@@ -167,7 +167,7 @@ class FunctionWriter(Expressions):
         return [f"for ({begin}; {name} {test} last_{name}; {name} += {step}) {{", *lines, "}"]
 
     def target(self, ref: Ref) -> Value:
-        """The left side of an assignment."""
+        """Return the left side of an assignment."""
         name = ref.parts[0].name
         if name not in self.variables or len(ref.parts) > 1:
             raise ExportError(ref.place, f"there is no variable '{ref}' in the function '{self.cls.name}'")
@@ -185,7 +185,7 @@ class FunctionWriter(Expressions):
         return self.copy(target, self.value(right), place)
 
     def copy(self, target: Value, value: Value, place: Place) -> list[str]:
-        """Array assignment; the order of copying lets rows of one matrix overlap."""
+        """Print an array assignment; the order of copying allows overlapping rows of one matrix."""
         count = " * ".join(target.dims)
         if target.type != value.type and (target.type, value.type) != ("Real", "Integer"):
             raise ExportError(place, f"expected {target.type}, found {value.type}")
@@ -206,23 +206,27 @@ class FunctionWriter(Expressions):
     def several(self, left: tuple[Ref | None, ...], right: Expr, place: Place) -> list[str]:
         """`(a, b) := f(x)`."""
         if not isinstance(right, Call):
-            raise ExportError(place, "the right side needs to be a function call")
+            raise ExportError(place, "the right side must be a function call")
         function, args = self.call_arguments(right)
         outputs = [c for c in function.components if c.causality == "output"]
         if len(left) > len(outputs):
-            raise ExportError(place, f"'{function.name}' has {len(outputs)} outputs, not {len(left)}")
+            raise ExportError(
+                place, f"'{function.name}' has {len(outputs)} outputs, but {len(left)} are assigned"
+            )
         lines, pointers = [], []
         for k, output in enumerate(outputs):
             ref = left[k] if k < len(left) else None
             if ref is None:
                 if output.dimensions:
-                    raise ExportError(place, "an array output cannot be left out here")
+                    raise ExportError(place, "an array output cannot be omitted here")
                 lines.append(f"{C_TYPES[type_of(output)]} unused_{k};")
                 pointers.append(f"&unused_{k}")
                 continue
             target = self.target(ref)
             if target.type != type_of(output) or len(target.dims) != len(output.dimensions):
-                raise ExportError(place, f"'{ref}' does not fit the output '{output.name}'")
+                raise ExportError(
+                    place, f"'{ref}' does not have the type and dimensions of the output '{output.name}'"
+                )
             pointers.append(target.text if target.dims else f"&{target.text}")
         if len(outputs) == 1 and not outputs[0].dimensions:
             return (

@@ -1,4 +1,4 @@
-"""A sorted model -> model.c and sizes.h, the generated half of the FMU's sources."""
+"""A sorted model -> model.c and sizes.h, the generated part of the FMU's sources."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OPERATORS = {"<": "OP_LT", "<=": "OP_LE", ">": "OP_GT", ">=": "OP_GE"}
 
 
 def model_c(system: System, evaluator: Evaluator) -> str:
-    """The text of model.c (without the GUID, which depends on it)."""
+    """Return the text of model.c, without the GUID, which depends on it."""
     model, layout = system.model, system.layout
     continuous, event, initial = (
         Emitter(system, "continuous"),
@@ -60,7 +60,7 @@ def model_c(system: System, evaluator: Evaluator) -> str:
 
 
 def needed_for(names: set[str], blocks: list[Block]) -> list[Block]:
-    """The blocks that some variables depend on, in order."""
+    """Return the blocks on which some variables depend, in order."""
     wanted = set(names)
     chosen = []
     for block in reversed(blocks):
@@ -163,7 +163,7 @@ def _tables(system: System) -> str:
 
 
 def sizes_h(system: System) -> str:
-    """The text of sizes.h."""
+    """Return the text of sizes.h."""
     layout, solver = system.layout, system.model.solver
     fixed = solver.get("method", "adaptive") == "fixed"
     sizes = {

@@ -19,7 +19,7 @@ def section(body: Body, place: Place, here: Evaluator, model: FlatModel) -> None
 
 
 def statements(body: Body, here: Evaluator, model: FlatModel, guard: Scalar) -> list[Statement]:
-    """Statements with loops unrolled."""
+    """Return statements with loops unrolled."""
     made: list[Statement] = []
     local = here.at(here.scope, events=here.events, sink=made.append)
     for item in body:
@@ -60,9 +60,7 @@ def _statement(item: Item, here: Evaluator, model: FlatModel, made: list[Stateme
         case Run(call, place):
             raise ExportError(place, f"a call of '{call.name}' as a statement is not supported")
         case _:
-            raise ExportError(
-                item.place, "'while', 'break' and 'return' are only supported inside of functions"
-            )
+            raise ExportError(item.place, "'while', 'break' and 'return' are only supported in functions")
 
 
 def _assignable(ref: Ref, here: Evaluator) -> Tensor:
@@ -70,13 +68,13 @@ def _assignable(ref: Ref, here: Evaluator) -> Tensor:
     for item in target.items:
         if not isinstance(item, Var):
             raise ExportError(
-                ref.place, f"'{ref}' cannot be assigned (its subscripts need to be known before simulation)"
+                ref.place, f"'{ref}' cannot be assigned (its subscripts must be known before simulation)"
             )
     return target
 
 
 def _sets(target: Tensor, value: Tensor, place: Place, model: FlatModel) -> list[Statement]:
-    """Element by element; through copies where an element is still read after it has been set."""
+    """Assign element by element; use copies if an element is read after it has been set."""
     names = [name_of(item, place) for item in target.items]
     values = list(value.items)
     made: list[Statement] = []

@@ -38,7 +38,9 @@ def operation(operator: str, operands: list[Tensor], place: Place, *, events: bo
         raise ExportError(place, "an array cannot be a divisor; use './'")
     elementwise = operator.startswith(".")
     if operator in ("+", "-") and left.dims != right.dims:
-        raise ExportError(place, f"'{operator}' of sizes {list(left.dims)} and {list(right.dims)}")
+        raise ExportError(
+            place, f"the operands of '{operator}' have sizes {list(left.dims)} and {list(right.dims)}"
+        )
     return _spread(operator.lstrip("."), left, right, place, elementwise=elementwise)
 
 
@@ -55,7 +57,8 @@ def _unary(operator: str, operand: Tensor, place: Place) -> Tensor:
 def _spread(operator: str, left: Tensor, right: Tensor, place: Place, *, elementwise: bool) -> Tensor:
     if left.dims and right.dims and left.dims != right.dims:
         raise ExportError(
-            place, f"sizes {list(left.dims)} and {list(right.dims)} do not fit" + " elementwise" * elementwise
+            place,
+            f"the sizes {list(left.dims)} and {list(right.dims)} do not match" + " elementwise" * elementwise,
         )
     dims = left.dims or right.dims
     ones = left.items if left.dims == dims else left.items * prod(dims)
@@ -79,7 +82,7 @@ def _sum(items: list[Scalar], place: Place) -> Scalar:
 
 def _matrix_product(left: Tensor, right: Tensor, place: Place) -> Tensor:
     if len(left.dims) > 2 or len(right.dims) > 2 or left.dims[-1] != right.dims[0]:
-        raise ExportError(place, f"'*' of sizes {list(left.dims)} and {list(right.dims)}")
+        raise ExportError(place, f"the operands of '*' have sizes {list(left.dims)} and {list(right.dims)}")
     inner = left.dims[-1]
     rows = [left.items[k : k + inner] for k in range(0, len(left.items), inner)]
     width = right.dims[1] if len(right.dims) == 2 else 1
@@ -89,7 +92,7 @@ def _matrix_product(left: Tensor, right: Tensor, place: Place) -> Tensor:
 
 
 def recompute(name: str, known: tuple[Lit, ...], place: Place) -> Scalar:
-    """An operation again, after its operands have become known."""
+    """Evaluate an operation whose operands are now known."""
     if name in ("and", "or", "not"):
         return fold.logic(name, known, place)
     if name in fold.COMPARISONS:
@@ -113,7 +116,7 @@ def call(evaluator: Evaluator, node: Call) -> Tensor:
     if node.name in _REFUSED:
         raise ExportError(node.place, _REFUSED[node.name])
     if node.named:
-        raise ExportError(node.place, f"'{node.name}' takes no named arguments")
+        raise ExportError(node.place, f"'{node.name}' does not accept named arguments")
     if node.name in fold.REAL_FUNCTIONS:
         return _map(evaluator, node, lambda args: fold.function(node.name, args, node.place))
     return _CALLS[node.name](evaluator, node)
@@ -121,7 +124,7 @@ def call(evaluator: Evaluator, node: Call) -> Tensor:
 
 def _args(evaluator: Evaluator, node: Call, *counts: int) -> list[Tensor]:
     if len(node.arguments) not in counts:
-        raise ExportError(node.place, f"'{node.name}' takes {' or '.join(map(str, counts))} arguments")
+        raise ExportError(node.place, f"'{node.name}' expects {' or '.join(map(str, counts))} arguments")
     return [evaluator.value(item) for item in node.arguments]
 
 
@@ -164,7 +167,7 @@ def _rounding(evaluator: Evaluator, node: Call) -> Tensor:
 
 
 def _division(evaluator: Evaluator, node: Call) -> Tensor:
-    """div, mod, rem: of Integers exact, of Reals by floor (with events)."""
+    """div, mod, rem: exact for Integers, by floor (with events) for Reals."""
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
         place = node.place
@@ -172,7 +175,7 @@ def _division(evaluator: Evaluator, node: Call) -> Tensor:
             return fold.arithmetic(node.name, args, place)
         if node.name != "mod" and evaluator.events:
             raise ExportError(
-                place, f"'{node.name}' of Reals makes events that are not supported; use mod or noEvent"
+                place, f"'{node.name}' of Reals creates events, which is not supported; use mod or noEvent"
             )
         if node.name != "mod":
             return fold.arithmetic(node.name, args, place)
@@ -186,7 +189,7 @@ def _extreme(evaluator: Evaluator, node: Call) -> Tensor:
     args = _args(evaluator, node, 1, 2)
     items = args[0].items if len(args) == 1 else args[0].items + args[1].items
     if len(args) == 2 and (args[0].dims or args[1].dims):
-        raise ExportError(node.place, f"'{node.name}' takes two scalars or one array")
+        raise ExportError(node.place, f"'{node.name}' expects two scalars or one array")
     result = items[0]
     for item in items[1:]:
         result = fold.arithmetic(node.name, (result, item), node.place)
@@ -194,10 +197,10 @@ def _extreme(evaluator: Evaluator, node: Call) -> Tensor:
 
 
 def _variable(evaluator: Evaluator, node: Call) -> Tensor:
-    """The argument of der, pre, edge, change: variables, not values."""
+    """Evaluate the argument of der, pre, edge or change, which must be a variable."""
     value = _args(evaluator, node, 1)[0]
     if not all(isinstance(item, Var) for item in value.items):
-        raise ExportError(node.place, f"'{node.name}' needs a variable as its argument")
+        raise ExportError(node.place, f"the argument of '{node.name}' must be a variable")
     return value
 
 
@@ -279,7 +282,7 @@ def _cat(evaluator: Evaluator, node: Call) -> Tensor:
     parts = [evaluator.value(text) for text in node.arguments[1:]]
     if axis != 1 or any(part.dims[1:] != parts[0].dims[1:] or not part.dims for part in parts):
         raise ExportError(
-            node.place, "'cat' is supported along dimension 1 for arrays of equal further sizes"
+            node.place, "'cat' is only supported along dimension 1, for arrays with equal other sizes"
         )
     dims = (sum(part.dims[0] for part in parts), *parts[0].dims[1:])
     return tensor(dims, [item for part in parts for item in part.items])
@@ -291,7 +294,7 @@ def _initial(evaluator: Evaluator, node: Call) -> Tensor:
 
 def _sample(evaluator: Evaluator, node: Call) -> Tensor:
     raise ExportError(
-        node.place, "'sample' can only stand as the condition of 'when', alone or as 'sample(...) and ...'"
+        node.place, "'sample' is only allowed as a condition of 'when', alone or as 'sample(...) and ...'"
     )
 
 
@@ -327,7 +330,7 @@ _CALLS: dict[str, Known] = {
 
 
 _REFUSED = {
-    "delay": "'delay' is not supported; sample the signal and keep a list of its values",
+    "delay": "'delay' is not supported; sample the signal and store its values in an array",
     "terminate": "'terminate' is not supported",
     "terminal": "'terminal' is not supported",
     "spatialDistribution": "'spatialDistribution' is not supported",

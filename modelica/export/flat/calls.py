@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 
 
 def function_outputs(function: Class, call: Call) -> list[Component]:
-    """The outputs of a function."""
+    """Return the outputs of a function.
+
+    Raises:
+        ExportError: if it has none.
+    """
     outputs = [item for item in function.components if item.causality == "output"]
     if not outputs:
         raise ExportError(call.place, f"the function '{call.name}' has no output")
@@ -23,12 +27,12 @@ def function_outputs(function: Class, call: Call) -> list[Component]:
 
 
 def arguments(here: Evaluator, function: Class, call: Call) -> tuple[Tensor, ...]:
-    """Values for all inputs of a function, in their order."""
+    """Return the values for all inputs of a function, in their order."""
     inputs = [item for item in function.components if item.causality == "input"]
     given: dict[str, Tensor] = {}
     if len(call.arguments) > len(inputs):
         raise ExportError(
-            call.place, f"'{call.name}' takes {len(inputs)} arguments, not {len(call.arguments)}"
+            call.place, f"'{call.name}' expects {len(inputs)} arguments, got {len(call.arguments)}"
         )
     for item, text in zip(inputs, call.arguments, strict=False):
         given[item.name] = here.value(text)
@@ -49,23 +53,23 @@ def arguments(here: Evaluator, function: Class, call: Call) -> tuple[Tensor, ...
 def fit_argument(
     here: Evaluator, item: Component, given: dict[str, Tensor], function: Class, call: Call
 ) -> Tensor:
-    """Check one argument against the declaration."""
+    """Check one argument against the declaration; return it with the declared type."""
     value, kind = given[item.name], type_of(item)
     wanted = here.at(Scope(None, function, given))
     if len(value.dims) != len(item.dimensions):
         raise ExportError(
             call.place,
-            f"the argument '{item.name}' of '{call.name}' needs {len(item.dimensions)} dimensions, "
+            f"the argument '{item.name}' of '{call.name}' must have {len(item.dimensions)} dimensions, "
             f"not {len(value.dims)}",
         )
     for text, size in zip(item.dimensions, value.dims, strict=True):
         if not isinstance(text, Colon) and (n := wanted.static_integer(text, call.place)) != size:
-            raise ExportError(call.place, f"'{item.name}' of '{call.name}' needs size {n}, not {size}")
+            raise ExportError(call.place, f"'{item.name}' of '{call.name}' must have size {n}, not {size}")
     return fitted(value, value.dims, kind, call.place)
 
 
 def lifted(here: Evaluator, function: Class, args: tuple[Tensor, ...], place: Place) -> list[Tensor]:
-    """Call a function with array results: auxiliary variables take the results."""
+    """Call a function with array results or several outputs; auxiliary variables receive the results."""
     if here.sink is None:
         raise ExportError(
             place, f"'{function.name}' has an array or several outputs, which is not supported here"

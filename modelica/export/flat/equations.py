@@ -29,21 +29,23 @@ def equation(item: Item, here: Evaluator, model: FlatModel) -> None:
         case Run(call, place) if call.name == "assert":
             model.equations.append(assertion(call, here, TRUE))
         case Run(call, place):
-            raise ExportError(place, f"'{call.name}' cannot stand here")
+            raise ExportError(place, f"'{call.name}' is not allowed here")
         case _:
             raise ExportError(item.place, "this is not an equation")
 
 
 def _equal(left: Tensor, right: Tensor, place: Place, model: FlatModel) -> None:
     if left.dims != right.dims:
-        raise ExportError(place, f"the sides of '=' have sizes {list(left.dims)} and {list(right.dims)}")
+        raise ExportError(place, f"the two sides of '=' have sizes {list(left.dims)} and {list(right.dims)}")
     for a, b in zip(left.items, right.items, strict=True):
         if (a.type == "Boolean") != (b.type == "Boolean"):
             raise ExportError(place, f"'=' between {a.type} and {b.type}")
         for one, other in ((a, b), (b, a)):
             real = other.type == "Real" and not isinstance(other, (Var, Der))
             if isinstance(one, Var) and one.type == "Integer" and real:
-                raise ExportError(place, f"the Integer '{one.name}' cannot take a Real; use integer(...)")
+                raise ExportError(
+                    place, f"a Real cannot be assigned to the Integer '{one.name}'; use integer(...)"
+                )
         model.equations.append(Equation(a, b, place))
 
 
@@ -76,7 +78,7 @@ def _if_equation(item: If, here: Evaluator, model: FlatModel) -> None:
 
 
 def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str, Equation]:
-    """The equations of one branch by the variable or derivative on their left side."""
+    """Return the equations of one branch, by the variable or derivative on their left side."""
     refuse_when(body)
     before = len(model.equations)
     for part in body:
@@ -91,6 +93,6 @@ def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str
             model.equations.append(item)
         else:
             raise ExportError(
-                item.place, "an equation inside of 'if' needs the form 'x = ...' or 'der(x) = ...'"
+                item.place, "an equation inside 'if' must have the form 'x = ...' or 'der(x) = ...'"
             )
     return found

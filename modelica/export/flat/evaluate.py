@@ -1,4 +1,4 @@
-"""Expressions of the syntax tree -> scalar expressions: names resolved, arrays apart, constants computed."""
+"""Syntax tree of expressions -> scalar expressions: names resolved, arrays expanded, constants computed."""
 
 from __future__ import annotations
 
@@ -53,8 +53,9 @@ class Evaluator:
     """Evaluates expressions in one scope.
 
     Attributes:
-        events: relations make events (off inside of `noEvent`, of when bodies and of initial values).
-        sink: takes calls of functions with arrays or several outputs, which are pulled out of expressions.
+        events: whether relations create events (not inside `noEvent`, when bodies and initial values).
+        sink: receives calls of functions with array results or several outputs, which are taken out of
+            expressions.
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class Evaluator:
         self._sizes: list[int] = []
 
     def at(self, scope: Scope, *, events: bool = False, sink: Sink | None = None) -> Evaluator:
-        """An evaluator of the same model for another scope."""
+        """Return an evaluator of the same model for another scope."""
         other = Evaluator(self.model, scope, events=events, sink=sink)
         other.leaves, other.constants, other.bindings = self.leaves, self.constants, self.bindings
         other._busy = self._busy
@@ -79,7 +80,7 @@ class Evaluator:
 
     @contextmanager
     def without_events(self) -> Iterator[None]:
-        """Relations inside make no events."""
+        """Evaluate relations without events within this context."""
         before, self.events = self.events, False
         yield
         self.events = before
@@ -87,32 +88,32 @@ class Evaluator:
     # ---------------------------------------------------------------- values
 
     def bound(self, bound: Bound) -> Tensor:
-        """The value of a modifier."""
+        """Evaluate a modifier."""
         value = self.at(bound.scope).value(bound.expr)
         if bound.indices:
             if len(value.dims) < len(bound.indices):
                 raise ExportError(
-                    bound.place, "a modifier of an array of components needs 'each' or an array value"
+                    bound.place, "a modifier for an array of components needs 'each' or an array value"
                 )
             return element(value, bound.indices, bound.place)
         return value
 
     def scalar(self, expr: Expr) -> Scalar:
-        """The value of an expression that must be scalar."""
+        """Evaluate an expression that must be scalar."""
         value = self.value(expr)
         if value.dims:
             raise ExportError(expr.place, f"expected a scalar, found an array of size {list(value.dims)}")
         return value.items[0]
 
     def value(self, expr: Expr) -> Tensor:
-        """The value of any expression."""
+        """Evaluate any expression."""
         match expr:
             case Number(value, _):
                 return scalar_tensor(Lit(value, "Integer" if isinstance(value, int) else "Real"))
             case Truth(value, _):
                 return scalar_tensor(Lit(value, "Boolean"))
             case Text(_, place):
-                raise ExportError(place, "a string cannot stand here")
+                raise ExportError(place, "a string is not allowed here")
             case Ref():
                 return self.reference(expr)
             case ArrayOf(elements, place):
@@ -129,24 +130,24 @@ class Evaluator:
                 return self.call(expr)
             case End(place):
                 if not self._sizes:
-                    raise ExportError(place, "'end' can only stand inside of subscripts")
+                    raise ExportError(place, "'end' is only allowed in subscripts")
                 return scalar_tensor(Lit(self._sizes[-1], "Integer"))
             case Colon(place):
-                raise ExportError(place, "':' can only stand as a subscript")
+                raise ExportError(place, "':' is only allowed as a subscript")
 
     def range(self, expr: Range) -> Tensor:
-        """`first:step:last` with bounds known now."""
+        """Evaluate `first:step:last`, whose bounds must be known before simulation."""
         parts = [expr.first, expr.step or Number(1, expr.place), expr.last]
         values = [self.static(self.scalar(part), expr.place) for part in parts]
         first, step, last = (value.value for value in values)
         if step == 0:
-            raise ExportError(expr.place, "a range with step 0")
+            raise ExportError(expr.place, "the step of a range must not be 0")
         count = max(0, int((last - first) / step + 1e-9) + 1)
         kind: Type = "Integer" if all(value.type == "Integer" for value in values) else "Real"
         return Tensor((count,), tuple(Lit(first + k * step, kind) for k in range(count)), kind)
 
     def choice(self, expr: Choice) -> Tensor:
-        """If-expression; branches that are known to be out of reach are not looked at."""
+        """Evaluate an if-expression; branches that are known to be unreachable are skipped."""
         pending: list[tuple[Scalar, Tensor]] = []
         for condition_text, value_text in expr.branches:
             condition = self.scalar(condition_text)
@@ -169,7 +170,7 @@ class Evaluator:
     # ---------------------------------------------------------------- names
 
     def reference(self, ref: Ref) -> Tensor:
-        """The value behind a name."""
+        """Evaluate a name."""
         first = ref.parts[0]
         if first.name in self.scope.local:
             if len(ref.parts) > 1:
@@ -188,7 +189,7 @@ class Evaluator:
         return self.subscript(self.package_constant(component, owner), ref.parts[-1].subscripts, ref.place)
 
     def package_constant(self, component: Component, owner: Class) -> Tensor:
-        """The value of a constant that is declared in a package."""
+        """Return the value of a constant that is declared in a package."""
         key = id(component)
         if key not in self.constants:
             text, place = component.modifier.value, component.place
@@ -208,7 +209,7 @@ class Evaluator:
         return self.constants[key]
 
     def member(self, node: Node, parts: tuple[Part, ...], place: Place) -> Tensor:
-        """A component of an instance."""
+        """Evaluate a component of an instance."""
         part, rest = parts[0], parts[1:]
         if part.name not in node.elements:
             raise ExportError(place, f"'{node.cls.full_name}' has no component '{part.name}'")
@@ -226,16 +227,14 @@ class Evaluator:
         return self.element_member(child, part, rest, place)
 
     def element_member(self, array: NodeArray, part: Part, rest: tuple[Part, ...], place: Place) -> Tensor:
-        """`car[2].v`, `car.v`, `car[1:3].v`."""
+        """Evaluate `car[2].v`, `car.v` or `car[1:3].v`."""
         count = prod(array.dims)
         numbers = Tensor(array.dims, tuple(Lit(k, "Integer") for k in range(count)), "Integer")
         chosen = self.subscript(numbers, part.subscripts, place)
         values = []
         for item in chosen.items:
             if not isinstance(item, Lit):
-                raise ExportError(
-                    place, f"the subscript of '{part.name}' needs to be known before simulation"
-                )
+                raise ExportError(place, f"the subscript of '{part.name}' must be known before simulation")
             values.append(self.member(array.nodes[int(item.value)], rest, place))
         return Tensor(
             chosen.dims + (values[0].dims if values else ()),
@@ -244,7 +243,7 @@ class Evaluator:
         )
 
     def leaf(self, leaf: Leaf) -> Tensor:
-        """The variables of a leaf, or its values if it is a constant."""
+        """Return the variables of a leaf, or its values if it is a constant."""
         if leaf.variability == "constant":
             value = self.binding(leaf)
             if all(isinstance(item, Lit) for item in value.items):
@@ -252,7 +251,7 @@ class Evaluator:
         return Tensor(leaf.dims, tuple(Var(name, leaf.type) for name in leaf.scalars()), leaf.type)
 
     def binding(self, leaf: Leaf) -> Tensor:
-        """The value of a parameter or constant as an expression."""
+        """Return the value of a parameter or constant as an expression."""
         if leaf.name not in self.bindings:
             place = leaf.component.place
             if leaf.name in self._busy:
@@ -272,7 +271,7 @@ class Evaluator:
             return value
         if len(subscripts) > len(value.dims):
             raise ExportError(
-                place, f"{len(subscripts)} subscripts on an array with {len(value.dims)} dimensions"
+                place, f"{len(subscripts)} subscripts for an array with {len(value.dims)} dimensions"
             )
         chosen: list[Tensor] = []
         for text, size in zip(subscripts, value.dims, strict=False):
@@ -281,19 +280,19 @@ class Evaluator:
             chosen.append(everything if isinstance(text, Colon) else self.value(text))
             self._sizes.pop()
         if any(index.type != "Integer" for index in chosen):
-            raise ExportError(place, "subscripts need to be Integers")
+            raise ExportError(place, "subscripts must be Integers")
         if all(isinstance(item, Lit) for index in chosen for item in index.items):
             return selected(value, chosen, place)
         if any(index.dims for index in chosen) or len(chosen) < len(value.dims):
             raise ExportError(
-                place, "a subscript that changes during simulation can only pick a single element"
+                place, "a subscript that changes during simulation must select a single element"
             )
         return scalar_tensor(Pick(value, tuple(index.items[0] for index in chosen), value.type, place))
 
     # ---------------------------------------------------------------- calls
 
     def call(self, call: Call) -> Tensor:
-        """A built-in operator or a function."""
+        """Evaluate a call of a built-in operator or a function."""
         if builtin.known(call.name):
             return builtin.call(self, call)
         function = find_class(call.name, self.scope.cls, call.place)
@@ -310,7 +309,7 @@ class Evaluator:
     # ---------------------------------------------------------------- known now
 
     def static(self, value: Scalar, place: Place) -> Lit:
-        """A value that must be known before simulation; parameters used for it become structural."""
+        """Compute a value that must be known before simulation; parameters in it become structural."""
         match value:
             case Lit():
                 return value
@@ -330,10 +329,10 @@ class Evaluator:
                 return self.static(Op(name, (left, right), "Boolean"), place)
             case Cond(condition, then, otherwise, _):
                 return self.static(then if self.static(condition, place).value else otherwise, place)
-        raise ExportError(place, "this value needs to be known before simulation")
+        raise ExportError(place, "this value must be known before simulation")
 
     def static_integer(self, expr: Expr, place: Place) -> int:
-        """A size or another whole number that must be known before simulation."""
+        """Compute a size or other integer that must be known before simulation."""
         result = self.static(self.scalar(expr), place)
         if result.type != "Integer":
             raise ExportError(place, "expected an Integer")

@@ -18,14 +18,14 @@ SOLVER_SETTINGS = {
     "checks": None,
     "repeatTicks": ("never", "unseen", "always"),
 }
-"""Names of solver settings with the words that they can be; None stands for a number."""
+"""Names of solver settings with their allowed words; None means a number."""
 
 
 def flatten(root: Class, name: str) -> FlatModel:
-    """Flatten the model of that full name.
+    """Flatten the model with this full name.
 
     Raises:
-        ExportError: names the file and line of what is wrong or not supported.
+        ExportError: with the file and line of what is wrong or not supported.
     """
     cls = absolute(name, root)
     if cls is None:
@@ -107,12 +107,12 @@ def _text(leaf: Leaf, name: str) -> str | None:
     if mod is None or mod.value is None:
         return None
     if not isinstance(mod.value.expr, Text):
-        raise ExportError(mod.value.place, f"'{name}' needs to be a string")
+        raise ExportError(mod.value.place, f"'{name}' must be a string")
     return mod.value.expr.value or None
 
 
 def _bodies(node: Node, evaluator: Evaluator, model: FlatModel) -> None:
-    """Declaration equations, equation and algorithm sections of an instance and all below it."""
+    """Add the declaration equations, equations and algorithms of an instance and of all below it."""
     for child in node.children():
         match child:
             case Leaf():
@@ -156,11 +156,11 @@ def _declaration_equation(leaf: Leaf, evaluator: Evaluator, model: FlatModel) ->
 
 def _initial_equation(made: object, model: FlatModel) -> Equation:
     if not isinstance(made, Equation):
-        raise ExportError(getattr(made, "place", None), "this is not supported as an initial equation")
+        raise ExportError(getattr(made, "place", None), "an initial equation must have the form 'x = ...'")
     for one, other in ((made.left, made.right), (made.right, made.left)):
         if isinstance(one, (Var, Pre)) and model.variables[one.name].variability != "parameter":
             return Equation(Var(one.name, one.type), other, made.place)
-    raise ExportError(made.place, "an initial equation needs the form 'x = ...' with a variable x")
+    raise ExportError(made.place, "an initial equation must have the form 'x = ...' with a variable x")
 
 
 def _experiment(cls: Class, model: FlatModel) -> None:
@@ -172,13 +172,13 @@ def _experiment(cls: Class, model: FlatModel) -> None:
     for name, mod in settings.get("__falsifier_solver", Modifier()).inner:
         if name not in SOLVER_SETTINGS:
             raise ExportError(
-                mod.place, f"__falsifier_solver knows {', '.join(SOLVER_SETTINGS)}, not '{name}'"
+                mod.place, f"unknown solver setting '{name}'; expected one of {', '.join(SOLVER_SETTINGS)}"
             )
         value = _literal(mod.value, mod.place)
         words = SOLVER_SETTINGS[name]
         if (words is None and isinstance(value, (str, bool))) or (words and value not in words):
             raise ExportError(
-                mod.place, f"'{name}' needs " + (f"one of {', '.join(words)}" if words else "a number")
+                mod.place, f"'{name}' must be " + (f"one of {', '.join(words)}" if words else "a number")
             )
         model.solver[name] = value
 
@@ -188,7 +188,7 @@ def _number(settings: dict[str, Modifier], name: str) -> float | None:
         return None
     value = _literal(settings[name].value, settings[name].place)
     if isinstance(value, (bool, str)):
-        raise ExportError(settings[name].place, f"'{name}' needs a number")
+        raise ExportError(settings[name].place, f"'{name}' must be a number")
     return float(value)
 
 
@@ -198,4 +198,4 @@ def _literal(value: Expr | None, place: Place | None) -> float | str | bool:
             return number
         case Operation("/", (Number(a, _), Number(b, _)), _):
             return a / b
-    raise ExportError(place, "this setting needs a literal value")
+    raise ExportError(place, "this setting must be a literal value")

@@ -1,4 +1,4 @@
-"""Makers of scalar expressions that compute at once what is known at once."""
+"""Constructors of scalar expressions that compute constant expressions immediately."""
 
 from __future__ import annotations
 
@@ -59,7 +59,9 @@ def arithmetic(name: str, args: tuple[Scalar, ...], place: Place) -> Scalar:
     try:
         result = _compute(name, values)
     except (ZeroDivisionError, OverflowError, ValueError) as error:
-        raise ExportError(place, f"'{name}' of {', '.join(map(str, values))}: {error}") from None
+        raise ExportError(
+            place, f"'{name}' of {', '.join(map(str, values))} cannot be computed: {error}"
+        ) from None
     return Lit(float(result) if kind == "Real" else int(result), kind)
 
 
@@ -131,14 +133,14 @@ def logic(name: str, args: tuple[Scalar, ...], place: Place) -> Scalar:
 
 
 def comparison(name: str, left: Scalar, right: Scalar, place: Place, *, events: bool) -> Scalar:
-    """A relation; with `events` it is frozen between events when Reals are compared."""
+    """A relation; with `events`, a comparison of Reals is frozen between events."""
     if (left.type == "Boolean") != (right.type == "Boolean"):
         raise ExportError(place, f"'{name}' compares a Boolean with a number")
     if isinstance(left, Lit) and isinstance(right, Lit):
         return Lit(COMPARISONS[name](left.value, right.value), "Boolean")
     reals = "Real" in (left.type, right.type)
     if reals and name in ("==", "<>"):
-        raise ExportError(place, f"'{name}' between Reals is only possible inside of functions")
+        raise ExportError(place, f"'{name}' between Reals is only possible in functions")
     if reals and events:
         return Relation(name, left, right)
     return Op(name, (left, right), "Boolean")
@@ -147,7 +149,7 @@ def comparison(name: str, left: Scalar, right: Scalar, place: Place, *, events: 
 def choose(condition: Scalar, then: Scalar, otherwise: Scalar, place: Place) -> Scalar:
     """An if-expression."""
     if condition.type != "Boolean":
-        raise ExportError(place, "the condition after 'if' needs to be Boolean")
+        raise ExportError(place, "the condition after 'if' must be Boolean")
     if (then.type == "Boolean") != (otherwise.type == "Boolean"):
         raise ExportError(place, "the branches of 'if' have different types")
     if isinstance(condition, Lit):

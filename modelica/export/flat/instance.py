@@ -1,4 +1,4 @@
-"""The instance tree: classes with their modifiers applied, components made on demand."""
+"""The instance tree: classes with their modifiers applied; components are created on demand."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ ATTRIBUTES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """Where names are looked up: an instance, the class that the text stands in, known local values."""
+    """Where names are looked up: an instance, the class that contains the text, known local values."""
 
     node: Node | None
     cls: Class
     local: dict[str, Tensor] = field(default_factory=dict)
 
     def with_local(self, name: str, value: Tensor) -> Scope:
-        """The same scope with one more local name."""
+        """Return the same scope with one more local name."""
         return Scope(self.node, self.cls, {**self.local, name: value})
 
 
@@ -46,7 +46,7 @@ class Bound:
 
 @dataclass(frozen=True, slots=True)
 class Mods:
-    """A modifier whose expressions know their scope."""
+    """A modifier whose expressions have their scope."""
 
     value: Bound | None = None
     inner: dict[str, Mods] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Mods:
     place: Place | None = None
 
     def element(self, indices: tuple[int, ...]) -> Mods:
-        """The modifier of one element of an array of components."""
+        """Return the modifier of one element of an array of components."""
         if self.each:
             return self
         value = self.value and Bound(
@@ -71,7 +71,7 @@ def scoped(modifier: Modifier, scope: Scope, place: Place) -> Mods:
 
 
 def merge(outer: Mods, inner: Mods) -> Mods:
-    """The outer modifier wins."""
+    """Merge two modifiers; the outer one overrides the inner one."""
     names = {**inner.inner, **outer.inner}
     merged = {
         name: merge(outer.inner[name], inner.inner[name])
@@ -97,7 +97,7 @@ class Leaf:
     description: str
 
     def scalars(self) -> list[str]:
-        """The names of its elements in row-major order."""
+        """Return the names of its elements in row-major order."""
         if not self.dims:
             return [self.name]
         ranges = [range(1, n + 1) for n in self.dims]
@@ -152,7 +152,7 @@ class Node:
             self.elements[component.name] = (component, cls, merge(outer, own))
 
     def child(self, name: str) -> Leaf | Node | NodeArray:
-        """The component of that name."""
+        """Return the component of this name."""
         if name not in self._children:
             if name in self._open:
                 raise ExportError(
@@ -163,7 +163,7 @@ class Node:
         return self._children[name]
 
     def children(self) -> Iterator[Leaf | Node | NodeArray]:
-        """All components in the order of declaration."""
+        """Yield all components in the order of declaration."""
         for name in self.elements:
             yield self.child(name)
 
@@ -230,12 +230,12 @@ class Node:
         if any(isinstance(text, Colon) for text in texts):
             if mods.value is None:
                 raise ExportError(
-                    component.place, f"'{component.name}' needs a value for its size to be known"
+                    component.place, f"'{component.name}' needs a value, which determines its size"
                 )
             dims = self.evaluator.bound(mods.value).dims
             if len(dims) != len(texts):
                 raise ExportError(
-                    component.place, f"the value of '{component.name}' needs {len(texts)} dimensions"
+                    component.place, f"the value of '{component.name}' must have {len(texts)} dimensions"
                 )
             return dims
         dims = tuple(self.evaluator.at(scope).static_integer(text, component.place) for text in texts)

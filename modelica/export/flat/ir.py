@@ -1,4 +1,4 @@
-"""What flattening produces: scalar expressions, equations and variables without any class structure."""
+"""The result of flattening: scalar expressions, equations and variables without class structure."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Var:
 
 @dataclass(frozen=True, slots=True)
 class Pre:
-    """Its value before the present event."""
+    """The value of a variable before the current event."""
 
     name: str
     type: Type
@@ -85,7 +85,7 @@ class Op:
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """A comparison that makes a state or time event when it changes and is frozen between events."""
+    """A comparison that creates a state or time event when it changes, and is frozen between events."""
 
     name: str
     left: Scalar
@@ -95,7 +95,7 @@ class Relation:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """The largest whole number not above `arg`; makes an event when it changes."""
+    """The largest integer not above `arg`; creates an event when it changes."""
 
     arg: Scalar
     type: Type = "Real"
@@ -145,7 +145,7 @@ class Tensor:
 
 
 def children(node: Scalar) -> Iterator[Scalar]:
-    """The direct operands of an expression."""
+    """Yield the direct operands of an expression."""
     match node:
         case Op():
             yield from node.args
@@ -170,7 +170,7 @@ def children(node: Scalar) -> Iterator[Scalar]:
 
 
 def walk(node: Scalar) -> Iterator[Scalar]:
-    """The expression and everything in it."""
+    """Yield the expression and everything in it."""
     yield node
     for child in children(node):
         yield from walk(child)
@@ -178,7 +178,7 @@ def walk(node: Scalar) -> Iterator[Scalar]:
 
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """`left = right`; `discrete` where it stems from a when clause."""
+    """`left = right`; `discrete` if it comes from a when clause."""
 
     left: Scalar
     right: Scalar
@@ -197,7 +197,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """`targets = function(args)`: every output of the function, None for one that is not used."""
+    """`targets = function(args)`: all outputs of the function; an unused one is None."""
 
     targets: tuple[tuple[str, ...] | None, ...]
     function: str
@@ -208,7 +208,7 @@ class Outputs:
 
 @dataclass(frozen=True, slots=True)
 class Reinit:
-    """A state jumps to `value` where `condition` holds."""
+    """Set a state to `value` if `condition` holds."""
 
     state: str
     condition: Scalar
@@ -218,7 +218,7 @@ class Reinit:
 
 @dataclass(frozen=True, slots=True)
 class Assert:
-    """An error with `message` where `condition` does not hold."""
+    """An error with `message` if `condition` does not hold."""
 
     condition: Scalar
     message: str
@@ -282,7 +282,7 @@ class Variable:
 
 @dataclass(slots=True)
 class FlatModel:
-    """A model without structure."""
+    """A model without class structure."""
 
     name: str
     description: str
@@ -299,7 +299,7 @@ class FlatModel:
 
 
 def names_in(node: Scalar, keep: Callable[[Scalar], bool] = lambda _: True) -> set[str]:
-    """Names of variables and derivatives (`der(x)`) whose present value an expression needs."""
+    """Return the names of variables and derivatives (`der(x)`) whose current value an expression needs."""
     found = set()
     for part in walk(node):
         if isinstance(part, Var) and keep(part):

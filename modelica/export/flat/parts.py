@@ -16,15 +16,15 @@ TRUE = Lit(value=True, type="Boolean")
 
 
 def loop_values(over: Expr, here: Evaluator, place: Place) -> list[Scalar]:
-    """The values that the index of a for loop takes."""
+    """Return the values of the index of a for loop."""
     values = here.value(over)
     if len(values.dims) != 1:
-        raise ExportError(place, "a for loop runs over a range or a vector: 'for i in 1:n loop'")
+        raise ExportError(place, "a for loop needs a range or a vector: 'for i in 1:n loop'")
     return [here.static(item, place) for item in values.items]
 
 
 def with_index(here: Evaluator, index: str, value: Scalar) -> Evaluator:
-    """The same scope with a value for a loop index."""
+    """Return an evaluator for the same scope, with a value for a loop index."""
     scope = here.scope.with_local(index, Tensor((), (value,), value.type))
     return here.at(scope, events=here.events, sink=here.sink)
 
@@ -32,11 +32,13 @@ def with_index(here: Evaluator, index: str, value: Scalar) -> Evaluator:
 def outputs(item: Several, here: Evaluator) -> Outputs:
     """`(a, b) = f(x)`."""
     if not isinstance(item.right, Call):
-        raise ExportError(item.place, "the right side of '(a, b) =' needs to be a function call")
+        raise ExportError(item.place, "the right side of '(a, b) =' must be a function call")
     function = find_class(item.right.name, here.scope.cls, item.place)
     results = function_outputs(function, item.right)
     if len(item.left) > len(results):
-        raise ExportError(item.place, f"'{function.name}' has {len(results)} outputs, not {len(item.left)}")
+        raise ExportError(
+            item.place, f"'{function.name}' has {len(results)} outputs, but {len(item.left)} are assigned"
+        )
     args = arguments(here, function, item.right)
     model = here.model
     model.functions[function.full_name] = function
@@ -54,31 +56,32 @@ def outputs(item: Several, here: Evaluator) -> Outputs:
 def _target_names(target: Tensor, result: Tensor, place: Place) -> tuple[str, ...]:
     if target.dims != result.dims or target.type != result.type:
         raise ExportError(
-            place, f"{target.type}{list(target.dims)} cannot take {result.type}{list(result.dims)}"
+            place,
+            f"{result.type}{list(result.dims)} cannot be assigned to {target.type}{list(target.dims)}",
         )
     return tuple(name_of(item, place) for item in target.items)
 
 
 def name_of(item: Scalar, place: Place) -> str:
-    """The name of a variable on a left side."""
+    """Return the name of a variable on a left side."""
     if not isinstance(item, Var):
-        raise ExportError(place, "a variable needs to stand on the left side")
+        raise ExportError(place, "the left side must be a variable")
     return item.name
 
 
 def refuse_when(body: Body) -> None:
-    """No when clause may stand inside of if."""
+    """Reject when clauses inside if."""
     for item in body:
         if isinstance(item, When):
             raise ExportError(
-                item.place, "'when' inside of 'if' is not supported; put the condition into the when clause"
+                item.place, "'when' inside 'if' is not supported; put the condition into the when clause"
             )
 
 
 def reinit(call: Call, here: Evaluator, guard: Scalar) -> list[Reinit]:
     """`reinit(x, value)`."""
     if len(call.arguments) != 2:
-        raise ExportError(call.place, "'reinit' takes two arguments: reinit(state, value)")
+        raise ExportError(call.place, "'reinit' expects two arguments: reinit(state, value)")
     target, value = (here.value(text) for text in call.arguments)
     value = fitted(value, target.dims, "Real", call.place)
     pairs = zip(target.items, value.items, strict=True)

@@ -1,4 +1,4 @@
-"""Arrays of scalar expressions: making, fitting and taking elements."""
+"""Arrays of scalar expressions: construction, conversion and element access."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def tensor(dims: tuple[int, ...], items: list[Scalar], kind: Type | None = None)
 
 
 def type_of(component: Component) -> Type:
-    """The built-in type of a component of a function or package."""
+    """Return the built-in type of a component of a function or package."""
     if component.type_name not in ("Real", "Integer", "Boolean"):
         raise ExportError(component.place, f"type '{component.type_name}' is not supported in functions")
     return component.type_name  # type: ignore[return-value]
 
 
 def cast(item: Scalar, kind: Type, place: Place) -> Scalar:
-    """Integer -> Real where needed; anything else must fit."""
+    """Convert an Integer to Real if necessary; any other type must match."""
     if item.type == kind:
         return item
     if kind == "Real" and item.type == "Integer":
@@ -38,7 +38,7 @@ def cast(item: Scalar, kind: Type, place: Place) -> Scalar:
 
 
 def fitted(value: Tensor, dims: tuple[int, ...], kind: Type, place: Place) -> Tensor:
-    """A value for a variable of that size and type; a scalar fills an array."""
+    """Convert a value for a variable of this size and type; a scalar fills an array."""
     items = value.items
     if value.dims != dims:
         if value.dims:
@@ -57,7 +57,7 @@ def stacked(parts: list[Tensor], place: Place) -> Tensor:
 
 
 def selected(value: Tensor, chosen: list[Tensor], place: Place) -> Tensor:
-    """The part of an array that known subscripts choose, one scalar or vector a dimension."""
+    """Return the part of an array selected by known subscripts, one scalar or vector per dimension."""
     rest = value.dims[len(chosen) :]
     block = prod(rest)
     strides = [prod(value.dims[k + 1 : len(chosen)]) for k in range(len(chosen))]
@@ -67,7 +67,7 @@ def selected(value: Tensor, chosen: list[Tensor], place: Place) -> Tensor:
         for item, stride, size in zip(combination, strides, value.dims, strict=False):
             number = int(item.value) if isinstance(item, Lit) else 0
             if not 1 <= number <= size:
-                raise ExportError(place, f"subscript {number} is outside of 1..{size}")
+                raise ExportError(place, f"subscript {number} is outside 1..{size}")
             offset += (number - 1) * stride
         items.extend(value.items[offset * block : (offset + 1) * block])
     dims = tuple(index.dims[0] for index in chosen if index.dims) + rest
@@ -75,5 +75,5 @@ def selected(value: Tensor, chosen: list[Tensor], place: Place) -> Tensor:
 
 
 def element(value: Tensor, indices: tuple[int, ...], place: Place) -> Tensor:
-    """One element or sub-array."""
+    """Return one element or sub-array."""
     return selected(value, [scalar_tensor(Lit(k, "Integer")) for k in indices], place)

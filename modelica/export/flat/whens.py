@@ -26,7 +26,7 @@ from .tensors import cast, fitted
 
 
 def when_condition(text: Expr, here: Evaluator, model: FlatModel, add: Callable[[Condition], None]) -> Scalar:
-    """The condition of a when clause as 'has become true just now'."""
+    """Return an expression that is true at the instant when the condition becomes true."""
     if isinstance(text, ArrayOf):
         result = when_condition(text.elements[0], here, model, add)
         for element in text.elements[1:]:
@@ -42,7 +42,7 @@ def when_condition(text: Expr, here: Evaluator, model: FlatModel, add: Callable[
                 return fold.logic("and", (_tick(first, here), here.scalar(second)), text.place)
     value = here.scalar(text)
     if value.type != "Boolean":
-        raise ExportError(text.place, "the condition of 'when' needs to be Boolean")
+        raise ExportError(text.place, "the condition of 'when' must be Boolean")
     if isinstance(value, Initial):
         return value
     model.conditions += 1
@@ -52,11 +52,11 @@ def when_condition(text: Expr, here: Evaluator, model: FlatModel, add: Callable[
 
 def _tick(call: Call, here: Evaluator) -> Tick:
     if len(call.arguments) != 2 or call.named:
-        raise ExportError(call.place, "'sample' takes two arguments: sample(start, interval)")
+        raise ExportError(call.place, "'sample' expects two arguments: sample(start, interval)")
     start, interval = (cast(here.scalar(text), "Real", call.place) for text in call.arguments)
     for value in (start, interval):
         if not _parametric(value, here):
-            raise ExportError(call.place, "the arguments of 'sample' need to be parameters or literals")
+            raise ExportError(call.place, "the arguments of 'sample' must be parameters or literals")
     return Tick(start, interval)
 
 
@@ -72,7 +72,7 @@ def _parametric(value: Scalar, here: Evaluator) -> bool:
 
 
 def when_equation(item: When, here: Evaluator, model: FlatModel) -> None:
-    """Add one scalar equation for each variable that the when clause sets."""
+    """Add one scalar equation per variable that the when clause sets."""
     cases: list[tuple[Scalar, dict[str, Equation]]] = []
     earlier: Scalar = Lit(value=False, type="Boolean")
     for text, body in item.branches:
@@ -84,7 +84,7 @@ def when_equation(item: When, here: Evaluator, model: FlatModel) -> None:
     targets = dict.fromkeys(key for _, found in cases for key in found)
     for target in targets:
         if any(found and target not in found for _, found in cases):
-            raise ExportError(item.place, f"every branch of this when clause needs to set '{target}'")
+            raise ExportError(item.place, f"every branch of this when clause must set '{target}'")
         variable = model.variables[target]
         value: Scalar = Pre(target, variable.type)
         for edge, found in reversed(cases):
@@ -94,7 +94,7 @@ def when_equation(item: When, here: Evaluator, model: FlatModel) -> None:
 
 
 def _when_body(body: Body, guard: Scalar, here: Evaluator, model: FlatModel) -> dict[str, Equation]:
-    """The variables set in a when clause; reinit and assert go to the model with their guard."""
+    """Return the equations of a when clause by variable; add reinit and assert to the model, with a guard."""
     found: dict[str, Equation] = {}
     for item in body:
         match item:
@@ -119,9 +119,9 @@ def _when_body(body: Body, guard: Scalar, here: Evaluator, model: FlatModel) -> 
             case Run(call, place) if call.name == "assert":
                 model.equations.append(assertion(call, here, guard))
             case Run(call, place):
-                raise ExportError(place, f"'{call.name}' cannot stand in a when clause")
+                raise ExportError(place, f"'{call.name}' is not allowed in a when clause")
             case _:
-                raise ExportError(item.place, "this cannot stand in a when clause")
+                raise ExportError(item.place, "this is not allowed in a when clause")
     return found
 
 
@@ -137,7 +137,7 @@ def _when_if(item: If, guard: Scalar, here: Evaluator, model: FlatModel) -> dict
     result = {}
     for target in dict.fromkeys(key for _, found in [*cases, (TRUE, last)] for key in found):
         if target not in last or any(target not in found for _, found in cases):
-            raise ExportError(item.place, f"every branch of 'if' in a when clause needs to set '{target}'")
+            raise ExportError(item.place, f"every branch of 'if' in a when clause must set '{target}'")
         value = last[target].right
         for condition, found in reversed(cases):
             value = fold.choose(condition, found[target].right, value, item.place)

@@ -1,1 +1,1 @@
-"""Flat model -> equations in the order of computation, variables in their places."""
+"""Flat model -> equations in the order of computation, and the memory layout of variables."""

@@ -40,7 +40,7 @@ Computed = Solved | Condition | Outputs | Section | Reinit | Assert
 
 
 def bare_name(node: Scalar) -> str:
-    """The name of a variable or derivative that stands alone, else an empty string."""
+    """Return the name of an expression that is only a variable or derivative, else an empty string."""
     match node:
         case Var(name, _):
             return name
@@ -50,7 +50,7 @@ def bare_name(node: Scalar) -> str:
 
 
 def values(item: Flat | Computed | Statement) -> Iterator[Scalar]:
-    """All expressions in an equation or statement."""
+    """Yield all expressions in an equation or statement."""
     match item:
         case Equation():
             yield item.left
@@ -78,7 +78,7 @@ def values(item: Flat | Computed | Statement) -> Iterator[Scalar]:
 
 
 def targets(item: Flat | Computed | Statement) -> tuple[str, ...]:
-    """What an item computes, each once."""
+    """Return the names that an item computes, each once."""
     match item:
         case Solved():
             return (item.target,)
@@ -97,7 +97,7 @@ def targets(item: Flat | Computed | Statement) -> tuple[str, ...]:
 
 
 def when_targets(item: Statement) -> tuple[str, ...]:
-    """Variables that a statement sets inside of a when clause."""
+    """Return the variables that a statement sets in a when clause."""
     if isinstance(item, Branch) and all(only_at_events(condition) for condition, _ in item.branches):
         return tuple(name for name in targets(item) if not name.startswith("when("))
     return ()

@@ -1,4 +1,4 @@
-"""Where every variable, relation and sample of a model lies in the C memory."""
+"""The memory layout of the C model: places of all variables, relations and samples."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def literal(value: float, kind: Type) -> str:
 
 @dataclass(slots=True)
 class Layout:
-    """Where everything lies in the C model; filled once and read by the printers."""
+    """Places of everything in the C model; filled once, then read by the printers."""
 
     slots: dict[str, str] = field(default_factory=dict)  # variable or der(x) -> C lvalue
     offsets: dict[str, tuple[str, int]] = field(default_factory=dict)  # variable -> (array, index)
@@ -51,12 +51,12 @@ class Layout:
     tables: dict[tuple[str, ...], str] = field(default_factory=dict)  # constant arrays
 
     def table(self, texts: tuple[str, ...], kind: Type) -> str:
-        """The name of a constant array with these elements."""
+        """Return the name of a constant array with these elements."""
         key = (C_TYPES[kind], *texts)
         return self.tables.setdefault(key, f"table_{len(self.tables) + 1}")
 
     def table_text(self) -> str:
-        """Definitions of all constant arrays."""
+        """Return the definitions of all constant arrays."""
         lines = []
         for (ctype, *texts), name in self.tables.items():
             lines.append(
@@ -67,11 +67,11 @@ class Layout:
 
 @dataclass(slots=True)
 class System:
-    """Everything about a model that the printers need.
+    """Everything that the printers need to know about a model.
 
     Attributes:
         reals: names of all Reals in the order of their value references; states and derivatives first.
-        ints: names of all Integers and Booleans in that order.
+        ints: names of all Integers and Booleans in the order of their value references.
     """
 
     model: FlatModel
@@ -91,7 +91,7 @@ class System:
 
 
 def lay_out(model: FlatModel, states: list[str], blocks: list[Block], initial_blocks: list[Block]) -> System:
-    """Give every variable, relation and sample its place."""
+    """Assign a place to every variable, relation and sample."""
     system = System(model, states, blocks, initial_blocks)
     known_states = set(states)
     others = [n for n, v in model.variables.items() if v.type == "Real" and n not in known_states]
@@ -119,12 +119,12 @@ def lay_out(model: FlatModel, states: list[str], blocks: list[Block], initial_bl
 
 
 def in_when(block: Block) -> bool:
-    """Whether a block stems from a when clause or may contain one."""
+    """Whether a block comes from a when clause or may contain one."""
     return isinstance(block.item, Section) or (isinstance(block.item, Solved) and block.item.discrete)
 
 
 def _section_memory(blocks: list[Block], model: FlatModel) -> set[str]:
-    """Variables of algorithm sections that keep their value between events."""
+    """Return the variables of algorithm sections that keep their value between events."""
     found: set[str] = set()
     for block in blocks:
         if isinstance(block.item, Section):
@@ -138,7 +138,7 @@ def _section_memory(blocks: list[Block], model: FlatModel) -> set[str]:
 
 
 def _check_pre(system: System) -> None:
-    """`pre` of a continuous variable is only defined at events."""
+    """Reject `pre` of a continuous variable outside when clauses: it is only defined at events."""
     known = set(system.discrete_reals)
     for block in system.blocks:
         if in_when(block) or not isinstance(block.item, (Solved, Condition, Outputs)):
@@ -147,7 +147,7 @@ def _check_pre(system: System) -> None:
             if isinstance(part, Pre) and part.type == "Real" and part.name not in known:
                 place = block.item.place
                 raise ExportError(
-                    place, f"'pre({part.name})' of a continuous variable can only stand in a when clause"
+                    place, f"'pre({part.name})' of a continuous variable is only allowed in a when clause"
                 )
 
 
@@ -183,14 +183,14 @@ def _changes(node: Scalar, varying: set[str]) -> bool:
 
 
 def discrete_outputs(system: System, names: list[str]) -> list[int]:
-    """Places of the outputs that change at events only."""
+    """Return the places of the outputs that change only at events."""
     discrete = set(system.discrete_reals) | set(system.ints)
     outputs = {name for name, variable in system.model.variables.items() if variable.causality == "output"}
     return [k for k, name in enumerate(names) if name in discrete & outputs]
 
 
 def kinds_of(system: System) -> dict[str, str]:
-    """How each variable may be set from outside."""
+    """Return how each variable may be set through the FMI."""
     model = system.model
     fixed = fixed_names(model)
     initial = {e.left.name for e in model.initial_equations if isinstance(e.left, Var)}

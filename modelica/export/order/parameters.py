@@ -8,7 +8,7 @@ from .contents import values
 
 
 def sorted_parameters(model: FlatModel) -> list[Variable]:
-    """Calculated parameters in an order in which they can be computed."""
+    """Return the calculated parameters in an order in which they can be computed."""
     order: list[Variable] = []
     state: dict[str, int] = {}
 
@@ -30,7 +30,7 @@ def sorted_parameters(model: FlatModel) -> list[Variable]:
 
 
 def calculated_starts(model: FlatModel) -> list[Variable]:
-    """Variables whose start value is an expression of parameters."""
+    """Return the variables whose start value is an expression of parameters."""
     found = []
     for variable in model.variables.values():
         if (
@@ -57,7 +57,7 @@ def _known_names(value: Scalar | None, variable: Variable, model: FlatModel) -> 
 
 
 def fixed_names(model: FlatModel) -> set[str]:
-    """Parameters that only act at the start: in start values, initial equations and sample times."""
+    """Return the parameters used only at the start: in start values, initial equations and sample times."""
     seeds: set[str] = set()
     for variable in calculated_starts(model):
         assert variable.start is not None

@@ -1,4 +1,4 @@
-"""Gives every equation the unknown that it is solved for."""
+"""Assigns to every equation the unknown for which it is solved."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ def solve(equations: list[Flat], unknown: set[str], model: FlatModel) -> list[Co
     """Match equations and unknowns.
 
     Raises:
-        ExportError: too many or too few equations, or one that cannot be solved for any of its unknowns.
+        ExportError: if there are too many or too few equations, or one cannot be solved for any of its
+            unknowns.
     """
     fixed: list[Computed] = []
     open_equations: list[Equation] = []
@@ -26,7 +27,7 @@ def solve(equations: list[Flat], unknown: set[str], model: FlatModel) -> list[Co
         fixed.append(item)
         for name in targets(item):
             if name in taken:
-                raise ExportError(item.place, f"'{name}' is computed here and at {taken[name]}")
+                raise ExportError(item.place, f"'{name}' is already computed at {taken[name]}")
             if name not in unknown and not name.startswith("when("):
                 raise ExportError(
                     item.place, f"'{name}' cannot be computed here: it is an input, parameter or state"
@@ -88,7 +89,7 @@ def _declared(key: str, model: FlatModel) -> Place:
 
 
 def _candidates(item: Equation, free: set[str]) -> dict[str, Scalar]:
-    """What the equation can be solved for, best first."""
+    """Return the unknowns for which the equation can be solved, best first, with their expressions."""
     found: dict[str, Scalar] = {}
     for one, other in ((item.left, item.right), (item.right, item.left)):
         name = bare_name(one)
@@ -112,7 +113,7 @@ def _candidates(item: Equation, free: set[str]) -> dict[str, Scalar]:
 
 
 def _isolate(node: Scalar, other: Scalar, name: str, place: Place) -> Scalar | None:
-    """Move everything but the unknown to the other side."""
+    """Move everything except the unknown to the other side; return None if that is impossible."""
     while bare_name(node) != name:
         if not isinstance(node, Op) or node.type != "Real":
             return None

@@ -1,4 +1,4 @@
-"""Puts the equations in an order in which they can be computed one after the other."""
+"""Sorts the equations into an order in which they can be computed one after the other."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Block:
     """One step of the computation.
 
     Attributes:
-        defines: what it computes.
-        uses: what needs to be known before.
-        discrete: it can only change at events.
+        defines: names that it computes.
+        uses: names that must be computed before.
+        discrete: whether it can only change at events.
     """
 
     item: Computed
@@ -45,7 +45,7 @@ class Block:
 
 
 def states_of(model: FlatModel) -> list[str]:
-    """Variables whose derivative appears, in the order of declaration."""
+    """Return the variables whose derivative occurs, in the order of declaration."""
     found = set()
     for item in model.equations:
         for value in values(item):
@@ -61,7 +61,7 @@ def sort(model: FlatModel, states: list[str]) -> list[Block]:
     """Match equations with unknowns and order them.
 
     Raises:
-        ExportError: too many or too few equations, an equation that cannot be solved, an algebraic loop.
+        ExportError: for too many or too few equations, an equation that cannot be solved, an algebraic loop.
     """
     unknown = _unknowns(model, states)
     items = solve(model.equations, unknown, model)
@@ -69,7 +69,7 @@ def sort(model: FlatModel, states: list[str]) -> list[Block]:
 
 
 def sort_initial(model: FlatModel, states: list[str]) -> list[Block]:
-    """The order of the initial system: states with an initial equation are unknown as well."""
+    """Return the order of the initial system, in which states with an initial equation are unknowns too."""
     unknown = _unknowns(model, states)
     given = {e.left.name: e for e in model.initial_equations if isinstance(e.left, Var)}
     items: list[Computed] = [
@@ -88,9 +88,7 @@ def sort_initial(model: FlatModel, states: list[str]) -> list[Block]:
         else:
             items.append(item)
     for name, equation in starts.items():
-        raise ExportError(
-            equation.place, f"'{name}' has an equation already; an initial equation is one too many"
-        )
+        raise ExportError(equation.place, f"'{name}' already has an equation; remove its initial equation")
     return _ordered(items, model, set(states))
 
 
@@ -129,7 +127,7 @@ def _ordered(items: list[Computed], model: FlatModel, states: set[str]) -> list[
 
 
 def _topological(needs: list[list[int]], items: list[Computed], defines: list[tuple[str, ...]]) -> list[int]:
-    """Order by dependence; equations of a loop are named in the error."""
+    """Return an order in which each item follows those that it needs; a loop is an error with its items."""
     order: list[int] = []
     state = [0] * len(items)
     for root in range(len(items)):

@@ -18,7 +18,7 @@ TOOL = "falsifier Modelica exporter"
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A variable as FMI sees it."""
+    """A variable in modelDescription.xml."""
 
     name: str
     reference: int
@@ -32,12 +32,12 @@ class Entry:
 
 
 def model_identifier(system: System) -> str:
-    """The C identifier of the model, also the name of the FMU's binaries."""
+    """Return the C identifier of the model, which is also the file name of the FMU's binaries."""
     return system.model.name.rsplit(".", 1)[-1]
 
 
 def entries(system: System) -> list[Entry]:
-    """All variables that the FMU shows: inputs, outputs, parameters, other public ones, states."""
+    """Return all variables of the FMU: inputs, outputs, parameters, other public variables, states."""
     references = {name: k for k, name in enumerate([*system.reals, *system.ints])}
     kinds = kinds_of(system)
     states, shown = set(system.states), []
@@ -93,7 +93,7 @@ def _value(value: float, kind: str) -> str:
 
 
 def _typed(variable: Variable | None, kind: str) -> dict[str, str]:
-    """Attributes that both versions of FMI share."""
+    """Return the attributes that both FMI versions have in common."""
     if variable is None:
         return {}
     found = {"quantity": variable.quantity} if variable.quantity else {}
@@ -143,7 +143,7 @@ def _experiment(parent: Element, system: System) -> None:
 
 
 def fmi2(system: System, sources: list[str]) -> str:
-    """modelDescription.xml of FMI 2.0, with a mark in the place of the GUID."""
+    """Return modelDescription.xml for FMI 2.0, with a placeholder for the GUID."""
     shown = entries(system)
     identifier = model_identifier(system)
     root = Element(
@@ -171,7 +171,7 @@ def fmi2(system: System, sources: list[str]) -> str:
             SubElement(files, "File", name=source)
     _units(root, shown)
     categories = SubElement(root, "LogCategories")
-    SubElement(categories, "Category", name="logStatusError", description="Why a call has failed")
+    SubElement(categories, "Category", name="logStatusError", description="Reason why a call failed")
     _experiment(root, system)
     variables = SubElement(root, "ModelVariables")
     index = {entry.name: k + 1 for k, entry in enumerate(shown)}
@@ -218,7 +218,7 @@ def _structure(shown: list[Entry], system: System) -> dict[str, list[Entry]]:
 
 
 def fmi3(system: System) -> str:
-    """modelDescription.xml of FMI 3.0, with a mark in the place of the instantiation token."""
+    """Return modelDescription.xml for FMI 3.0, with a placeholder for the instantiation token."""
     shown = entries(system)
     identifier = model_identifier(system)
     root = Element(
@@ -237,7 +237,7 @@ def fmi3(system: System) -> str:
     SubElement(root, "CoSimulation", {**flags, "canHandleVariableCommunicationStepSize": "true"})
     _units(root, shown)
     categories = SubElement(root, "LogCategories")
-    SubElement(categories, "Category", name="logStatusError", description="Why a call has failed")
+    SubElement(categories, "Category", name="logStatusError", description="Reason why a call failed")
     _experiment(root, system)
     variables = SubElement(root, "ModelVariables")
     time = len(system.reals) + len(system.ints)
@@ -266,7 +266,7 @@ def fmi3(system: System) -> str:
     for k, reference in enumerate(indicators):
         attributes = {"name": f"_indicator_{k + 1}", "valueReference": reference, "causality": "local"}
         attributes |= {"variability": "continuous", "initial": "calculated"}
-        SubElement(variables, "Float64", attributes | {"description": "Changes its sign at a state event"})
+        SubElement(variables, "Float64", attributes | {"description": "Changes sign at a state event"})
     structure = SubElement(root, "ModelStructure")
     tags = {
         "Outputs": "Output",

@@ -1,4 +1,4 @@
-"""Compiles the C sources for every platform and packs the FMU, byte for byte the same each time."""
+"""Compiles the C sources for every platform and packs the FMU; the same sources give the same bytes."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ SOURCES = {2: (*_COMMON, "fmi2.c"), 3: (*_COMMON, "fmi3.c")}
 _WARNINGS = ("-Wall", "-Wextra", "-Werror", "-Wno-parentheses-equality", "-Wno-unused", "-Wno-type-limits")
 
 
+# No fused multiply-adds (-ffp-contract=off): they round differently, so results would depend on the platform.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-shared", "-s")
 
 
 @dataclass(frozen=True, slots=True)
 class Platform:
-    """Where a binary goes and how it is compiled."""
+    """Folder, file suffix and compiler target of one platform's binary."""
 
     folder2: str
     folder3: str
@@ -58,12 +59,12 @@ class Contents:
     sizes_h: str
 
     def sources(self) -> dict[str, str]:
-        """All C files by name."""
+        """Return all C files by name."""
         files = {name: (RUNTIME / name).read_text(encoding="utf-8") for name in SOURCES[self.version]}
         return files | {"model.c": self.model_c, "sizes.h": self.sizes_h}
 
     def guid(self) -> str:
-        """An identifier that depends on nothing but the contents."""
+        """Return an identifier that depends only on the contents."""
         digest = hashlib.sha256(self.description.encode())
         for name, text in sorted(self.sources().items()):
             digest.update(f"\0{name}\0{text}".encode())
@@ -72,7 +73,7 @@ class Contents:
 
 
 def c_files(version: int) -> list[str]:
-    """The files to compile."""
+    """Return the names of the files to compile."""
     return sorted(["model.c", *(name for name in SOURCES[version] if name.endswith(".c"))])
 
 
@@ -136,6 +137,7 @@ def _build_description(contents: Contents) -> str:
 def _pack(entries: dict[str, bytes], target: Path) -> None:
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name in sorted(entries, key=lambda n: (n != "modelDescription.xml", n)):
+            # A fixed date and fixed attributes: the archive depends only on its contents.
             info = zipfile.ZipInfo(name, (2000, 1, 1, 0, 0, 0))
             info.compress_type = zipfile.ZIP_DEFLATED
             info.external_attr = 0o644 << 16

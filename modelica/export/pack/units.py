@@ -1,4 +1,4 @@
-"""SI base units of the units that models use, so that tools can convert them."""
+"""SI base units of the units in the models, which tools need to convert values."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _UNITS: dict[str, dict[str, float]] = {
 
 
 def base_unit(name: str) -> dict[str, str] | None:
-    """Attributes of the BaseUnit element, None for a unit that is not known."""
+    """Return the attributes of the BaseUnit element; None for an unknown unit."""
     found = _UNITS.get(name)
     if found is None:
         return None

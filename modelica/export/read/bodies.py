@@ -37,28 +37,28 @@ _ESCAPES = {"n": "\n", "t": "\t", "r": "\r"}
 
 
 def _one(node: Any) -> Any:
-    """The first of a list, or the thing itself."""
+    """Return the first element of a list, or the argument itself if it is not a list."""
     return node[0] if isinstance(node, list) else node
 
 
 class BodyReader:
-    """Everything below the level of declarations."""
+    """Reads equations, statements and expressions."""
 
     def __init__(self, file: str) -> None:
         self.file = file
 
     def place(self, ctx: Any) -> Place:
-        """Where a node of the parse tree begins."""
+        """Return the place at which a node of the parse tree starts."""
         token = getattr(ctx, "start", None) or ctx.symbol
         return Place(self.file, token.line)
 
     def strings(self, ctx: Any) -> str:
-        """A description: string literals joined by +."""
+        """Read a description: string literals joined by +."""
         return "".join(self.string(node.getText()) for node in ctx.STRING()) if ctx else ""
 
     @staticmethod
     def string(literal: str) -> str:
-        """The text of a string literal; line breaks inside it become single spaces."""
+        """Return the text of a string literal, with each run of white space replaced by one space."""
         out, marks = [], iter(literal[1:-1])
         for mark in marks:
             if mark == "\\":
@@ -96,7 +96,7 @@ class BodyReader:
         raise ExportError(place, "connect equations are not supported")
 
     def output_list(self, ctx: Any) -> tuple[Ref | None, ...] | None:
-        """The references of `(a, , b)`, or None when the node is something else."""
+        """Read the references of `(a, , b)`; return None for any other node."""
         node = ctx
         while node.getChildCount() == 1:
             node = node.getChild(0)
@@ -106,7 +106,7 @@ class BodyReader:
         return items if len(items) > 1 else None
 
     def slots(self, ctx: Any) -> tuple[Ref | None, ...]:
-        """References between commas, None for an empty slot."""
+        """Read references separated by commas; an empty slot is None."""
         slots: list[Ref | None] = [None]
         for child in ctx.children or ():
             if child.getText() == ",":
@@ -114,9 +114,7 @@ class BodyReader:
                 continue
             item = self.expression(child)
             if not isinstance(item, Ref):
-                raise ExportError(
-                    self.place(child), "only variables can stand on the left side of several outputs"
-                )
+                raise ExportError(self.place(child), "only variables can receive the outputs of a function")
             slots[-1] = item
         return tuple(slots)
 
@@ -161,7 +159,7 @@ class BodyReader:
         return If(tuple(zip(conditions, blocks, strict=True)), otherwise, place)
 
     def loop(self, ctx: Any, body: Any, place: Place) -> For:
-        """For loop; several indices become nested loops."""
+        """Read a for loop; several indices become nested loops."""
         inner: Body = body(ctx.block)
         for node in reversed(ctx.indices.for_index()):
             if node.expression() is None:
@@ -190,7 +188,7 @@ class BodyReader:
         return Range(parts[0], step, parts[-1], self.place(ctx))
 
     def expr(self, ctx: Any) -> Expr:
-        """Operators."""
+        """An operator with its operands, or a primary expression."""
         place, form = self.place(ctx), type(ctx).__name__
         match form:
             case "Expr_primaryContext":
@@ -238,7 +236,9 @@ class BodyReader:
             case "Primary_output_expression_listContext":
                 inner = ctx.output_expression_list()
                 if inner.getChildCount() != 1:
-                    raise ExportError(place, "a list of outputs can only stand left of '=' or ':='")
+                    raise ExportError(
+                        place, "a list of outputs is only allowed on the left side of '=' or ':='"
+                    )
                 return self.expression(inner.getChild(0))
             case "Primary_expression_listContext":
                 rows = tuple(
@@ -264,7 +264,7 @@ class BodyReader:
         """Positional and named arguments."""
         if ctx.for_indices():
             raise ExportError(
-                place, "'for' inside of an array or a call is not supported, use a function with a loop"
+                place, "'for' inside an array or a call is not supported; use a function with a loop"
             )
         named: list[tuple[str, Expr]] = []
         if ctx.named_arguments():

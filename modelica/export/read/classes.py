@@ -1,7 +1,7 @@
-"""Reads Modelica text: pymoca's grammar and parser make the parse tree, this module the syntax tree.
+"""Reads Modelica text: pymoca's grammar and parser create the parse tree, this module the syntax tree.
 
-The parse tree is used, not pymoca's own syntax tree: the latter has no line numbers and drops named
-arguments, which would turn errors into wrong FMUs.
+pymoca's own syntax tree is not used, because it has no line numbers and drops named arguments, so that errors
+would result in wrong FMUs.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ def parse_file(path: Path, shown: str) -> list[Class]:
 
     Args:
         path: the file.
-        shown: how error messages name it.
+        shown: its name in error messages.
 
     Returns:
-        The classes that the file defines.
+        The classes defined in the file.
     """
     from pymoca.parser import ModelicaLexer, ModelicaParser, antlr4
 
@@ -39,7 +39,7 @@ def parse_file(path: Path, shown: str) -> list[Class]:
     tree = parser.stored_definition()
     rest = tokens.LT(1)
     if rest.type != antlr4.Token.EOF:
-        raise ExportError(Place(shown, rest.line), f"syntax error: did not expect '{rest.text}' here")
+        raise ExportError(Place(shown, rest.line), f"syntax error: unexpected '{rest.text}'")
     reader = ClassReader(shown)
     return [reader.class_definition(node.class_definition()) for node in tree.stored_definition_class()]
 
@@ -48,7 +48,7 @@ class ClassReader(BodyReader):
     """Parse tree of classes -> syntax tree."""
 
     def class_definition(self, ctx: Any) -> Class:
-        """One class with everything in it."""
+        """Read one class with its contents."""
         place = self.place(ctx)
         kind = ctx.class_prefixes().class_type().getText()
         spec = ctx.class_specifier()
@@ -81,7 +81,7 @@ class ClassReader(BodyReader):
             elif form == "Algorithm_sectionContext":
                 if node.INITIAL():
                     raise ExportError(
-                        self.place(node), "'initial algorithm' is not supported, use 'initial equation'"
+                        self.place(node), "'initial algorithm' is not supported; use 'initial equation'"
                     )
                 owner.algorithms.append((self.statements(node.statement_block()), self.place(node)))
             elif form == "AnnotationContext":
@@ -115,7 +115,7 @@ class ClassReader(BodyReader):
                 )
 
     def imports(self, ctx: Any) -> list[Import]:
-        """An import clause in any of its four forms."""
+        """Read an import clause in any of its four forms."""
         place, text = self.place(ctx), ctx.getText()
         name = str(self.ref(ctx.component_reference()))
         if ctx.IDENT():
@@ -128,7 +128,7 @@ class ClassReader(BodyReader):
         return [Import(name.rsplit(".", 1)[-1], name, place)]
 
     def component_clause(self, ctx: Any, *, public: bool, final: bool) -> list[Component]:
-        """All components of one clause such as `parameter Real a = 1, b = 2`."""
+        """Read all components of one clause such as `parameter Real a = 1, b = 2`."""
         prefix = [child.getText() for child in ctx.type_prefix().children or ()]
         for word in ("flow", "stream"):
             if word in prefix:

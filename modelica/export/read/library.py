@@ -39,7 +39,7 @@ def _file(path: Path, owner: Class, shown: str) -> list[Class]:
 
 def _directory(path: Path, owner: Class, shown: str) -> None:
     if not (path / "package.mo").is_file():
-        raise ExportError(None, f"{path} has no package.mo")
+        raise ExportError(None, f"{path} has no package.mo; give a .mo file or a directory with one")
     package = _file(path / "package.mo", owner, f"{shown}/package.mo")[0]
     for entry in sorted(path.iterdir()):
         if entry.is_dir() and (entry / "package.mo").is_file():
@@ -49,13 +49,13 @@ def _directory(path: Path, owner: Class, shown: str) -> None:
 
 
 def base_classes(cls: Class) -> list[tuple[Class, Modifier]]:
-    """The classes that `cls` extends, with their modifiers."""
+    """Return the classes that `cls` extends, with their modifiers."""
     scope = cls.parent or cls
     return [(find_class(item.name, scope, item.place, cls), item.modifier) for item in cls.extends]
 
 
 def member_class(cls: Class, name: str) -> Class | None:
-    """A class defined in `cls` or inherited by it."""
+    """Return a class that is defined in `cls` or inherited by it; None if there is none."""
     if name in cls.classes:
         return cls.classes[name]
     for base, _ in base_classes(cls):
@@ -66,7 +66,7 @@ def member_class(cls: Class, name: str) -> Class | None:
 
 
 def member_component(cls: Class, name: str) -> tuple[Component, Class] | None:
-    """A component declared in `cls` or inherited by it, and the class that declares it."""
+    """Return a component of `cls` or its bases, and the class that declares it; None if there is none."""
     for component in cls.components:
         if component.name == name:
             return component, cls
@@ -84,7 +84,7 @@ def _root(cls: Class) -> Class:
 
 
 def absolute(name: str, root: Class) -> Class | None:
-    """A class by its full name."""
+    """Return a class by its full name; None if there is none."""
     current: Class | None = root
     for part in name.split("."):
         current = member_class(current, part) if current else None
@@ -92,7 +92,11 @@ def absolute(name: str, root: Class) -> Class | None:
 
 
 def find_class(name: str, scope: Class, place: Place, avoid: Class | None = None) -> Class:
-    """Look a class up by the rules of Modelica, or say that there is none."""
+    """Look up a class by the rules of Modelica.
+
+    Raises:
+        ExportError: if there is none.
+    """
     found = lookup(name, scope, avoid)
     if found is None:
         raise ExportError(
@@ -102,7 +106,13 @@ def find_class(name: str, scope: Class, place: Place, avoid: Class | None = None
 
 
 def lookup(name: str, scope: Class, avoid: Class | None = None) -> Class | None:
-    """Look a class up, None when there is none. `avoid` guards a class that extends by its own name."""
+    """Look up a class; return None if there is none.
+
+    Args:
+        name: dotted name.
+        scope: class in which the name is used.
+        avoid: a class that extends a base class with its own name; it is not its own base class.
+    """
     first, *rest = name.split(".")
     current: Class | None = _first(first, scope, avoid)
     for part in rest:
@@ -135,7 +145,7 @@ def _first(name: str, scope: Class, avoid: Class | None) -> Class | None:
 
 
 def find_constant(name: str, scope: Class) -> tuple[Component, Class] | None:
-    """A component of an enclosing package or of a named one: `Data.gain`, `gain`."""
+    """Return a component of an enclosing package or of a named one, such as `Data.gain` or `gain`."""
     *path, last = name.split(".")
     if path:
         owner = lookup(".".join(path), scope)

@@ -1,4 +1,4 @@
-"""The syntax tree of the supported part of Modelica. Every node knows its file and line."""
+"""The syntax tree of the supported part of Modelica. Every node has its file and line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Place:
 
 
 class ExportError(Exception):
-    """Something in the Modelica text that cannot become an FMU; the message begins with file and line."""
+    """Something in the Modelica text that cannot be exported; the message starts with file and line."""
 
     def __init__(self, place: Place | None, message: str) -> None:
         super().__init__(f"{place}: {message}" if place else message)
@@ -50,7 +50,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One step of a dotted name with its subscripts."""
+    """One part of a dotted name, with its subscripts."""
 
     name: str
     subscripts: tuple[Expr, ...] = ()
@@ -132,7 +132,7 @@ Expr = Number | Truth | Text | Ref | Call | Operation | Choice | ArrayOf | Range
 
 @dataclass(frozen=True, slots=True)
 class Equal:
-    """`left = right`; several left sides stand for `(a, b) = f(x)` (None where one is left out)."""
+    """`left = right`."""
 
     left: Expr
     right: Expr
@@ -141,7 +141,7 @@ class Equal:
 
 @dataclass(frozen=True, slots=True)
 class Several:
-    """`(a, b) = f(x)` as an equation or a statement; None where an output is left out."""
+    """`(a, b) = f(x)` as an equation or a statement; an omitted output is None."""
 
     left: tuple[Ref | None, ...]
     right: Expr
@@ -159,7 +159,7 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A call that stands alone: `assert`, `reinit`."""
+    """A call as a statement or an equation: `assert`, `reinit`."""
 
     call: Call
     place: Place
@@ -217,7 +217,7 @@ Body = tuple[Item, ...]
 
 @dataclass(frozen=True, slots=True)
 class Modifier:
-    """What stands behind a name: `(start = 1, min = 0) = value`."""
+    """What follows a name: `(start = 1, min = 0) = value`."""
 
     value: Expr | None = None
     inner: tuple[tuple[str, Modifier], ...] = ()
@@ -281,5 +281,5 @@ class Class:
 
     @property
     def full_name(self) -> str:
-        """The dotted name from the outermost class on."""
+        """The dotted name, starting with the outermost class."""
         return f"{self.parent.full_name}.{self.name}" if self.parent and self.parent.name else self.name

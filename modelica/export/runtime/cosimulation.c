@@ -1,12 +1,13 @@
-/* Co-simulation: communication steps with all events inside of them. */
+/* Co-simulation: communication steps, including the events within them. */
 #include "model.h"
 
 #define MAX_IDLE_EVENTS 10000
 
-/* Ticks and time events at the end of a communication step act at once, with the inputs of that step, so that what
- * is read there has happened. Where the next step brings other inputs the tick is repeated with them, as in a
- * simulation in one piece. SOLVER_REPEAT_TICKS: 0 never, 2 always, 1 unless the tick has changed a discrete output:
- * what has been seen stays (a gear must not appear for the length of one communication step).
+/* Ticks and time events at the end of a communication step act immediately, with the inputs of that step, so that
+ * the outputs read there include their effect. If the inputs change for the next step, the tick is repeated with the
+ * new inputs, as if there were no communication points. SOLVER_REPEAT_TICKS: 0 never, 2 always, 1 unless the tick has
+ * changed a discrete output: an output that was read must not be revoked (a gear would appear for one communication
+ * step only).
  */
 static int seen(const Model *before, const Model *now) {
     for (int k = 0; k < MODEL_OUTPUT_INTS; k++)
@@ -61,7 +62,7 @@ int simulation_step(Simulation *s, double start, double size) {
     Model *m = &s->now;
     double end = start + size;
     if (fabs(start - m->time) > TIME_TOLERANCE * max_real(1, fabs(start))) {
-        model_fail(m, "the communication step does not begin where the last one has ended");
+        model_fail(m, "the communication step does not start where the last one ended");
         return 1;
     }
     if (s->changed_reals || s->changed_others) take_inputs(s);
@@ -73,7 +74,7 @@ int simulation_step(Simulation *s, double start, double size) {
         if (m->error[0]) break;
         if (m->time - before > TIME_TOLERANCE) m->idle_events = 0;
         if (state_event || end - m->time > TIME_TOLERANCE) {
-            if (++m->idle_events > MAX_IDLE_EVENTS) model_fail(m, "events follow each other without end");
+            if (++m->idle_events > MAX_IDLE_EVENTS) model_fail(m, "the events never end");
             events_handle(m);
         }
     }

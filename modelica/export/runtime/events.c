@@ -11,7 +11,7 @@ void model_fail(Model *m, const char *message) {
 
 void model_fail_subscript(Model *m, int index, int size, int line) {
     char text[96];
-    snprintf(text, sizeof text, "the subscript %d is outside of 1..%d (line %d)", index, size, line);
+    snprintf(text, sizeof text, "the subscript %d is outside 1..%d (line %d)", index, size, line);
     model_fail(m, text);
 }
 
@@ -24,7 +24,7 @@ static int holds(int op, double z) {
     }
 }
 
-/* The two crossing functions of a floor always have to hold: x - f >= 0 and x - (f + 1) < 0. */
+/* The two crossing functions of a floor must always hold: x - f >= 0 and x - (f + 1) < 0. */
 static int expected(const Model *m, int k) { return k < MODEL_RELATIONS ? m->rel[k] : 1; }
 
 int events_crossed(Model *m, double *z) {
@@ -89,11 +89,11 @@ static void iterate(Model *m) {
     int changed = 1;
     for (int n = 0; changed && !m->error[0]; n++) {
         if (n == MAX_ITERATIONS) {
-            model_fail(m, "the when clauses of the model do not come to rest");
+            model_fail(m, "the event iteration of the when clauses does not converge");
             break;
         }
         if (n) remember(m);
-        else remember_continuous(m); /* the others are as the last event has left them, but for inputs */
+        else remember_continuous(m); /* the others are as the last event left them, except for inputs */
         model_event(m);
         memset(m->tick, 0, sizeof m->tick);
         m->after_event |= freeze_relations(m);
@@ -121,7 +121,7 @@ void events_initialize(Model *m) {
     for (int k = 0; k < MODEL_TICKS; k++) {
         double start, interval;
         model_tick_times(m, k, &start, &interval);
-        if (!(interval > 0)) model_fail(m, "the interval of sample(start, interval) needs to be positive");
+        if (!(interval > 0)) model_fail(m, "the interval of sample(start, interval) must be positive");
         m->tick_count[k] = 0;
         if (interval > 0 && m->time > start)
             m->tick_count[k] = (long long)ceil((m->time - start - TIME_TOLERANCE) / interval);

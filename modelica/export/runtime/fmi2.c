@@ -1,4 +1,4 @@
-/* FMI 2.0: model exchange and co-simulation. Types as the standard defines them. */
+/* FMI 2.0: model exchange and co-simulation. Types as defined in the standard. */
 #include "instance.h"
 
 #ifdef FMI2_FUNCTION_PREFIX
@@ -48,7 +48,7 @@ API(void *) F(fmi2Instantiate)(fmi2String name, int type, fmi2String guid, fmi2S
     if (!c) {
         if (functions && functions->logger)
             functions->logger(functions->componentEnvironment, name, RESULT_ERROR, "logStatusError", "%s",
-                              "the GUID does not fit this FMU, or there is no memory");
+                              "the GUID does not match this FMU, or memory allocation failed");
         return NULL;
     }
     c->callbacks = functions;
@@ -62,7 +62,7 @@ API(fmi2Status) F(fmi2SetupExperiment)(void *p, fmi2Boolean tolerance_defined, f
                                        fmi2Boolean stop_defined, fmi2Real stop) {
     (void)stop_defined, (void)stop;
     Instance *c = p;
-    if (c->state.phase != PHASE_CREATED) return instance_error(c, "fmi2SetupExperiment comes before the initialization; call fmi2Reset first");
+    if (c->state.phase != PHASE_CREATED) return instance_error(c, "fmi2SetupExperiment: already initialized; call fmi2Reset first");
     c->state.start_time = start;
     c->state.simulation.now.time = start;
     if (tolerance_defined && tolerance > 0) c->state.simulation.now.tolerance = tolerance;
@@ -70,7 +70,7 @@ API(fmi2Status) F(fmi2SetupExperiment)(void *p, fmi2Boolean tolerance_defined, f
 }
 API(fmi2Status) F(fmi2EnterInitializationMode)(void *p) {
     Instance *c = p;
-    if (c->state.phase != PHASE_CREATED) return instance_error(c, "fmi2EnterInitializationMode: initialized already");
+    if (c->state.phase != PHASE_CREATED) return instance_error(c, "fmi2EnterInitializationMode: already initialized; call fmi2Reset first");
     c->state.phase = PHASE_INITIALIZING;
     return RESULT_OK;
 }
@@ -186,7 +186,7 @@ API(fmi2Status) F(fmi2DoStep)(void *p, fmi2Real time, fmi2Real size, fmi2Boolean
     if (c->state.phase != PHASE_STEPPING) return instance_error(c, "fmi2DoStep: not initialized for co-simulation");
     return (fmi2Status)instance_step(c, time, size);
 }
-API(fmi2Status) F(fmi2CancelStep)(void *c) { return instance_error(c, "there is no step to cancel"); }
+API(fmi2Status) F(fmi2CancelStep)(void *c) { return instance_error(c, "steps are synchronous and cannot be cancelled"); }
 API(fmi2Status) F(fmi2GetStatus)(void *c, int kind, fmi2Status *value) {
     (void)c, (void)kind, (void)value;
     return RESULT_DISCARD;

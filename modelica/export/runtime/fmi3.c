@@ -1,4 +1,4 @@
-/* FMI 3.0: model exchange and co-simulation. Types as the standard defines them. */
+/* FMI 3.0: model exchange and co-simulation. Types as defined in the standard. */
 #include "instance.h"
 
 #include <stdbool.h>
@@ -32,7 +32,7 @@ static void *instantiate(const char *name, const char *token, int cosimulation, 
     Instance *c = logger ? instance_new(name, token, cosimulation) : NULL;
     if (!c) {
         free(logger);
-        if (log) log(environment, RESULT_ERROR, "logStatusError", "the instantiation token does not fit this FMU, or there is no memory");
+        if (log) log(environment, RESULT_ERROR, "logStatusError", "the instantiation token does not match this FMU, or memory allocation failed");
         return NULL;
     }
     logger->function = log;
@@ -77,7 +77,7 @@ FMI_EXPORT void F(fmi3FreeInstance)(void *p) {
 API(fmi3EnterInitializationMode)(void *p, bool tolerance_defined, double tolerance, double start, bool stop_defined, double stop) {
     (void)stop_defined, (void)stop;
     Instance *c = p;
-    if (c->state.phase != PHASE_CREATED) return instance_error(c, "fmi3EnterInitializationMode: initialized already; call fmi3Reset first");
+    if (c->state.phase != PHASE_CREATED) return instance_error(c, "fmi3EnterInitializationMode: already initialized; call fmi3Reset first");
     c->state.start_time = start;
     c->state.simulation.now.time = start;
     if (tolerance_defined && tolerance > 0) c->state.simulation.now.tolerance = tolerance;
@@ -104,25 +104,25 @@ API(fmi3Reset)(void *p) {
 
 /* ---- variables ---- */
 API(fmi3GetFloat64)(void *c, const VR vr[], size_t n, double values[], size_t nv) {
-    if (nv != n) return instance_error(c, "all variables are scalars: as many values as value references");
+    if (nv != n) return instance_error(c, "all variables are scalars: expected as many values as value references");
     return instance_get_reals(c, vr, n, values);
 }
 API(fmi3SetFloat64)(void *c, const VR vr[], size_t n, const double values[], size_t nv) {
-    if (nv != n) return instance_error(c, "all variables are scalars: as many values as value references");
+    if (nv != n) return instance_error(c, "all variables are scalars: expected as many values as value references");
     return instance_set_reals(c, vr, n, values);
 }
 API(fmi3GetInt32)(void *c, const VR vr[], size_t n, int32_t values[], size_t nv) {
-    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: as many values as value references");
+    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: expected as many values as value references");
     for (size_t k = 0; k < n && !result; k++) result = instance_get_int(c, vr[k], &values[k]);
     return result;
 }
 API(fmi3SetInt32)(void *c, const VR vr[], size_t n, const int32_t values[], size_t nv) {
-    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: as many values as value references");
+    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: expected as many values as value references");
     for (size_t k = 0; k < n && !result; k++) result = instance_set_int(c, vr[k], values[k]);
     return result;
 }
 API(fmi3GetBoolean)(void *c, const VR vr[], size_t n, bool values[], size_t nv) {
-    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: as many values as value references");
+    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: expected as many values as value references");
     for (size_t k = 0; k < n && !result; k++) {
         int value = 0;
         result = instance_get_int(c, vr[k], &value);
@@ -131,7 +131,7 @@ API(fmi3GetBoolean)(void *c, const VR vr[], size_t n, bool values[], size_t nv) 
     return result;
 }
 API(fmi3SetBoolean)(void *c, const VR vr[], size_t n, const bool values[], size_t nv) {
-    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: as many values as value references");
+    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: expected as many values as value references");
     for (size_t k = 0; k < n && !result; k++) result = instance_set_int(c, vr[k], values[k]);
     return result;
 }
@@ -173,7 +173,7 @@ API(fmi3SetClock)(void *c, const VR vr[], size_t n, const bool values[]) {
     return n ? (int)instance_error(c, "this FMU has no clocks") : RESULT_OK;
 }
 
-/* ---- what this FMU does not offer ---- */
+/* ---- not supported by this FMU ---- */
 API(fmi3GetNumberOfVariableDependencies)(void *c, VR vr, size_t *n) {
     (void)vr, (void)n;
     return instance_error(c, "dependencies are not provided per element");

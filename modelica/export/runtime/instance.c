@@ -1,9 +1,9 @@
-/* The part of an FMU that does not depend on the version of FMI. */
+/* The part of an FMU that does not depend on the FMI version. */
 #include "instance.h"
 
 #include <stdio.h>
 
-/* Value references: Reals by their place, then Integers and Booleans, then the time (FMI 3). */
+/* Value references: Reals in the order of `r`, then Integers and Booleans in that of `i`, then time (FMI 3). */
 #define VR_INTS ((unsigned)MODEL_REALS)
 #define VR_TIME ((unsigned)(MODEL_REALS + MODEL_INTS))
 #define VR_INDICATORS (VR_TIME + 1) /* event indicators (FMI 3) */
@@ -65,8 +65,8 @@ Result instance_end_initialization(Instance *c) {
     return instance_result(c);
 }
 
-/* The model to read from. While initialization goes on that is a copy: solving the initial system must not
- * overwrite start values that may still be set. */
+/* The model to read from. During initialization it is a copy, because solving the initial system must not overwrite
+ * start values that may still be set. */
 static Model *readable(Instance *c) {
     if (c->state.phase == PHASE_CREATED) return &c->state.simulation.now;
     if (c->state.phase != PHASE_INITIALIZING) {
@@ -101,7 +101,7 @@ Result instance_get_reals(Instance *c, const unsigned *vr, size_t n, double *val
         if (vr[k] < VR_INTS) values[k] = m->r[vr[k]];
         else if (vr[k] == VR_TIME) values[k] = c->state.phase < PHASE_EVENT ? c->state.start_time : m->time;
         else if (vr[k] > VR_TIME && vr[k] < VR_INDICATORS + MODEL_CROSSINGS) values[k] = indicator(m, vr[k] - VR_INDICATORS);
-        else return instance_error(c, "get: there is no Real with this value reference");
+        else return instance_error(c, "get: no Real has this value reference");
     }
     return instance_result(c);
 }
@@ -121,7 +121,7 @@ static void changed(Instance *c, int kind) {
 Result instance_set_reals(Instance *c, const unsigned *vr, size_t n, const double *values) {
     Simulation *s = &c->state.simulation;
     for (size_t k = 0; k < n; k++) {
-        if (vr[k] >= VR_INTS) return instance_error(c, "set: there is no Real with this value reference");
+        if (vr[k] >= VR_INTS) return instance_error(c, "set: no Real has this value reference");
         int kind = model_real_kind[vr[k]];
         if (!may_set(c, kind)) return instance_error(c, "set: this variable cannot be set now");
         if (s->now.r[vr[k]] == values[k]) continue;
@@ -134,14 +134,14 @@ Result instance_set_reals(Instance *c, const unsigned *vr, size_t n, const doubl
 }
 
 Result instance_get_int(Instance *c, unsigned vr, int *value) {
-    if (vr < VR_INTS || vr >= VR_TIME) return instance_error(c, "get: there is no Integer or Boolean with this value reference");
+    if (vr < VR_INTS || vr >= VR_TIME) return instance_error(c, "get: no Integer or Boolean has this value reference");
     *value = readable(c)->i[vr - VR_INTS];
     return instance_result(c);
 }
 
 Result instance_set_int(Instance *c, unsigned vr, int value) {
     Simulation *s = &c->state.simulation;
-    if (vr < VR_INTS || vr >= VR_TIME) return instance_error(c, "set: there is no Integer or Boolean with this value reference");
+    if (vr < VR_INTS || vr >= VR_TIME) return instance_error(c, "set: no Integer or Boolean has this value reference");
     if (!may_set(c, model_int_kind[vr - VR_INTS])) return instance_error(c, "set: this variable cannot be set now");
     if (s->now.i[vr - VR_INTS] == value) return RESULT_OK;
     s->now.i[vr - VR_INTS] = value;
@@ -154,7 +154,7 @@ Result instance_set_int(Instance *c, unsigned vr, int value) {
 
 Result instance_save(Instance *c, void **state) {
     if (!*state) *state = malloc(sizeof(State));
-    if (!*state) return instance_error(c, "no memory for the FMU state");
+    if (!*state) return instance_error(c, "not enough memory for the FMU state");
     memcpy(*state, &c->state, sizeof(State));
     return RESULT_OK;
 }
@@ -175,7 +175,7 @@ Result instance_serialize(Instance *c, const void *state, void *bytes, size_t si
 Result instance_deserialize(Instance *c, const void *bytes, size_t size, void **state) {
     if (size != sizeof(State)) return instance_error(c, "deserialize: these bytes are not a state of this FMU");
     if (!*state) *state = malloc(sizeof(State));
-    if (!*state) return instance_error(c, "no memory for the FMU state");
+    if (!*state) return instance_error(c, "not enough memory for the FMU state");
     memcpy(*state, bytes, sizeof(State));
     return RESULT_OK;
 }
@@ -243,7 +243,7 @@ Result instance_step_completed(Instance *c, int *enter_event_mode) {
     double z[MODEL_CROSSINGS + 1];
     Model *m = &c->state.simulation.now;
     *enter_event_mode = 0;
-    if (MODEL_CROSSINGS) { /* a host that stops just before the zero of an indicator does not lose the event */
+    if (MODEL_CROSSINGS) { /* otherwise the event is lost if the solver stops just before an indicator's zero */
         events_evaluate(m);
         *enter_event_mode = events_crossed(m, z);
     }
@@ -253,7 +253,7 @@ Result instance_step_completed(Instance *c, int *enter_event_mode) {
 /* ---- co-simulation ---- */
 
 Result instance_step(Instance *c, double start, double size) {
-    if (!(size > 0)) return instance_error(c, "the communication step size needs to be positive");
+    if (!(size > 0)) return instance_error(c, "the communication step size must be positive");
     simulation_step(&c->state.simulation, start, size);
     return instance_result(c);
 }

@@ -1,4 +1,4 @@
-/* What both versions of FMI share: an instance, its phases, checked access to variables. */
+/* Common to both FMI versions: an instance, its phases, checked access to variables. */
 #ifndef INSTANCE_H
 #define INSTANCE_H
 
@@ -18,7 +18,7 @@ typedef struct {
     Phase phase;
     int cosimulation;
     double start_time;
-} State; /* all that get/set FMU state saves */
+} State; /* everything that get/set FMU state saves */
 
 typedef struct {
     State state;
@@ -26,7 +26,7 @@ typedef struct {
     void (*log)(void *environment, const char *name, int status, const char *message);
     const void *callbacks; /* FMI 2: the callback functions of the environment */
     const char *name;
-    Model *preview; /* during initialization: a copy on which the initial system has been solved */
+    Model *preview; /* during initialization: a copy with the initial system solved */
 } Instance;
 
 Instance *instance_new(const char *name, const char *guid, int cosimulation);

@@ -1,8 +1,8 @@
-/* Runge-Kutta integration by the Dormand-Prince pair 5(4), with fixed or adaptive steps.
+/* Runge-Kutta integration with the Dormand-Prince pair 5(4), with fixed or adaptive steps.
  *
- * State events are found by comparing relations with their frozen values at points of the step and located on
- * the continuous extension of the pair. Coefficients: Dormand, Prince (1980) and Hairer, Norsett, Wanner,
- * Solving Ordinary Differential Equations I, section II.5 and II.6.
+ * State events are detected by comparing relations with their frozen values at several points of a step, and located
+ * on the continuous extension of the pair. Coefficients: Dormand, Prince (1980) and Hairer, Norsett, Wanner,
+ * Solving Ordinary Differential Equations I, sections II.5 and II.6.
  */
 #include "model.h"
 
@@ -83,7 +83,7 @@ static void interpolate(Step *s, double theta, double *y) {
     }
 }
 
-/* Put the model at a point of the step; returns whether a relation differs there from its frozen value. */
+/* Evaluate the model at a point of the step; returns whether a relation differs from its frozen value there. */
 static int probe(Model *m, Step *s, double theta, double *z) {
     double y[N + 1], k[N + 1];
     interpolate(s, theta, y);
@@ -91,13 +91,13 @@ static int probe(Model *m, Step *s, double theta, double *z) {
     return events_crossed(m, z);
 }
 
-/* The earliest crossing in (lo, hi], given that nothing has crossed at lo and something has at hi. */
+/* Locate the earliest crossing in (lo, hi], given that nothing has crossed at lo and something has at hi. */
 static void locate(Model *m, Step *s, double lo, double hi, double *z_lo, double *z_hi) {
     double z[MODEL_CROSSINGS + 1];
     double tolerance = 1e-13 * max_real(1, fabs(s->t)) / s->h;
     for (int n = 0; n < 200 && hi - lo > tolerance; n++) {
         double theta = 0.5 * (lo + hi);
-        if (n % 3 < 2) { /* two steps on either side of the chord's zero, then a bisection */
+        if (n % 3 < 2) { /* one point on either side of the secant's zero, then a bisection */
             double nearest = hi;
             for (int k = 0; k < MODEL_CROSSINGS; k++)
                 if ((z_lo[k] < 0) != (z_hi[k] < 0) || z_hi[k] == 0)
@@ -119,11 +119,11 @@ static void locate(Model *m, Step *s, double lo, double hi, double *z_lo, double
     m->rest_current = 0;
 }
 
-/* Whether a state event lies in the step; if so the model is put at the first one.
+/* Returns whether there is a state event in the step; if so, the model is set to the time of the first one.
  *
- * Relations are compared at SOLVER_CHECKS points of the step. Just after an event they are also compared near its
- * beginning: a relation that has turned just now may turn back at once (a ball that hops very low), and both turns
- * would lie inside of one step.
+ * Relations are compared at SOLVER_CHECKS points of the step. Just after an event they are also compared near the
+ * start of the step: a relation that has just changed may soon change back (a ball on a very low bounce), and both
+ * changes would otherwise be missed within one step.
  */
 static int find_event(Model *m, Step *s, double end, double *z_start) {
     static const double near[] = {1e-5, 1e-3, 3e-2};
@@ -200,7 +200,7 @@ int integrate(Model *m, double stop) {
         if (!(SOLVER_STEP > 0)) {
             double error = error_of(m, &s);
             double factor = error > 0 ? 0.9 * pow(error, -0.2) : 5;
-            if (!(error <= 1)) { /* also where the error is not a number */
+            if (!(error <= 1)) { /* also if the error is NaN */
                 m->step = s.h * (error > 1 && isfinite(error) ? max_real(0.2, factor) : 0.2);
                 if (m->step < 1e-13 * max_real(1, fabs(s.t))) {
                     model_fail(m, "the integrator cannot reach its tolerance");
@@ -212,7 +212,7 @@ int integrate(Model *m, double stop) {
                 m->error[0] = 0;
                 continue;
             }
-            if (s.h >= m->step || factor < 1) m->step = s.h * min_real(5, max_real(0.2, factor)); /* not where `stop` has cut it */
+            if (s.h >= m->step || factor < 1) m->step = s.h * min_real(5, max_real(0.2, factor)); /* not if `stop` cut it short */
         }
         if (!all_finite(m, s.y1)) {
             if (!m->error[0]) model_fail(m, "a state is not a finite number");

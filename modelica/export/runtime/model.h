@@ -1,6 +1,6 @@
-/* The simulated model: its memory, what the generated model.c provides, what the runtime does with it.
+/* The simulated model: its memory, the functions of the generated model.c, and those of the runtime.
  *
- * A Model holds no pointers: copying the struct copies the complete state of a simulation.
+ * A Model contains no pointers: copying the struct copies the complete state of a simulation.
  */
 #ifndef MODEL_H
 #define MODEL_H
@@ -12,7 +12,7 @@
 #include "sizes.h" /* generated: MODEL_STATES, MODEL_REALS, ... */
 
 #define MODEL_CROSSINGS (MODEL_RELATIONS + 2 * MODEL_FLOORS)
-#define TIME_TOLERANCE 1e-9 /* s; instants closer than this are the same */
+#define TIME_TOLERANCE 1e-9 /* s; times that differ by less than this are considered equal */
 
 typedef struct {
     double time;
@@ -25,19 +25,19 @@ typedef struct {
     unsigned char trel[MODEL_TIME_RELATIONS + 1]; /* `time >= threshold`, frozen between events */
     double fl[MODEL_FLOORS + 1];                  /* floor values, frozen between events */
     unsigned char tick[MODEL_TICKS + 1];          /* sample(...) is true now */
-    long long tick_count[MODEL_TICKS + 1];        /* index of the next tick: no sum of rounded intervals */
+    long long tick_count[MODEL_TICKS + 1];        /* index of the next tick; its time is computed from it, without accumulating rounding errors */
     double reinit_value[MODEL_STATES + 1];
     unsigned char reinit_set[MODEL_STATES + 1];
-    double step;      /* s; what the adaptive integrator would like to do next */
+    double step;      /* s; next step proposed by the adaptive integrator */
     double tolerance; /* relative, adaptive integrator */
-    int current;      /* derivatives belong to the present states, inputs and time */
-    int rest_current; /* so do all other variables */
+    int current;      /* derivatives are up to date with states, inputs and time */
+    int rest_current; /* all other variables are, too */
     int after_event;  /* no step since the last event */
-    int idle_events;  /* events since time last moved on */
-    char error[256];  /* empty: all is well */
+    int idle_events;  /* events since time last advanced */
+    char error[256];  /* empty: no error */
 } Model;
 
-/* What may be set from outside, and when. */
+/* Whether and when a variable may be set through the FMI. */
 enum { KIND_LOCAL = 0, KIND_START = 1, KIND_FIXED = 2, KIND_TUNABLE = 3, KIND_INPUT = 4 };
 /* How a crossing function compares with zero. */
 enum { OP_LT = 0, OP_LE = 1, OP_GT = 2, OP_GE = 3 };
@@ -53,8 +53,8 @@ void model_defaults(Model *m);           /* literal values of parameters and sta
 void model_parameters(Model *m);         /* parameters that depend on others */
 void model_starts(Model *m);             /* start values that depend on parameters */
 void model_initial(Model *m);            /* the initial system */
-void model_event(Model *m);              /* everything, relations live, when clauses active */
-void model_derivatives(Model *m);        /* what the derivatives need, relations frozen */
+void model_event(Model *m);              /* everything, relations evaluated, when clauses active */
+void model_derivatives(Model *m);        /* derivatives and what they need, relations frozen */
 void model_rest(Model *m);               /* everything else that can change between events */
 void model_operands(Model *m);           /* what the crossing functions need beyond the derivatives */
 void model_crossings(Model *m, double *z);
@@ -67,15 +67,15 @@ void model_fail(Model *m, const char *message);
 void model_fail_subscript(Model *m, int index, int size, int line);
 
 /* events.c */
-void events_initialize(Model *m);           /* solve the initial system at the present time */
+void events_initialize(Model *m);           /* solve the initial system at the current time */
 void events_handle(Model *m);               /* ticks and time events that are due, then event iteration */
-int events_crossed(Model *m, double *z);    /* relations differ from their frozen values; fills z */
+int events_crossed(Model *m, double *z);    /* whether a relation differs from its frozen value; fills z */
 double events_next_time(Model *m);          /* HUGE_VAL if there is none */
-void events_evaluate(Model *m);             /* make derivatives current */
-void events_evaluate_all(Model *m);         /* make all variables current */
+void events_evaluate(Model *m);             /* bring the derivatives up to date */
+void events_evaluate_all(Model *m);         /* bring all variables up to date */
 
 /* integrate.c */
-int integrate(Model *m, double stop); /* to `stop` or to the first state event (then 1) */
+int integrate(Model *m, double stop); /* to `stop`, or to the first state event; then returns 1 */
 
 /* cosimulation.c */
 typedef struct {
@@ -94,7 +94,7 @@ static inline int subscript(Model *m, int index, int size, int line) {
     return 0;
 }
 static inline void same_size(Model *m, int a, int b) {
-    if (a != b) model_fail(m, "arrays of different sizes in an assignment");
+    if (a != b) model_fail(m, "the arrays in an assignment have different sizes");
 }
 static inline int time_reached(const Model *m, double at) { return m->time >= at - TIME_TOLERANCE; }
 static inline double square(double x) { return x * x; }

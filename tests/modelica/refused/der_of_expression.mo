@@ -1,5 +1,5 @@
 model M
   Real x;
 equation
-  der(2 * x) = 1;  // error: needs a variable
+  der(2 * x) = 1;  // error: must be a variable
 end M;

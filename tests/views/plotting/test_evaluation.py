@@ -27,7 +27,7 @@ def test_a_requirement_is_drawn_on_given_axes_up_to_its_critical_time() -> None:
 
 
 def test_a_failed_simulation_has_nothing_to_draw() -> None:
-    with pytest.raises(ValueError, match="nothing to draw"):
+    with pytest.raises(ValueError, match="nothing to plot"):
         plot_requirement(hard(), Evaluation(Candidate(), "failed"))
 
 

@@ -146,7 +146,7 @@ def test_every_run_is_counted_and_every_counterexample_is_drawn(page: Element) -
         assert len(input_.all("circle", "point")) == 4
         assert "falsifier replay" in details.content
         assert "falsifier run python:tests.problems:hard" in details.content
-    assert never.all("h3")[0].content == "Nearest to a violation"
+    assert never.all("h3")[0].content == "Closest to a violation"
     assert len(never.all("details")) == 1
 
 
