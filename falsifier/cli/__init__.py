@@ -25,7 +25,17 @@ from falsifier.views.terminal import warn
 _PIPE_CLOSED = 141
 _FAILED = 3
 # What a machine has run out of: disk, quota, memory, files, processes.
-_EXHAUSTED = frozenset((errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EAGAIN))
+_EXHAUSTED = frozenset(
+    (
+        errno.ENOSPC,
+        errno.EDQUOT,
+        errno.EFBIG,
+        errno.ENOMEM,
+        errno.EMFILE,
+        errno.ENFILE,
+        errno.EAGAIN,
+    )
+)
 
 # name: (module, summary in --help)
 _COMMANDS = {
@@ -38,6 +48,7 @@ _COMMANDS = {
     "robustness-map": ("falsifier.cli.counterexample", "Map the robustness around a counterexample."),
     "bench": ("falsifier.cli.campaign", "Run requirements x methods x seeds, and print a table."),
     "watch": ("falsifier.cli.campaign", "Follow a running campaign from another terminal."),
+    "repair": ("falsifier.cli.repair", "Drop what is damaged in the files of a run or campaign."),
     "report": ("falsifier.cli.report", "Report on a run or campaign: HTML, Markdown, JUnit XML."),
     "validate": ("falsifier.cli.report", "Re-simulate counterexamples in ARCH-COMP format."),
     "info": ("falsifier.cli.inspect", "Show an FMU's interfaces, variables, units and ranges."),

@@ -133,6 +133,8 @@ def _finish(results: list[Result], *, as_json: bool) -> NoReturn:
     for result in results:
         if result.directory is not None:
             _write_counterexamples(result, result.directory)
+    for reason in {result.unrecorded for result in results} - {""}:
+        warn(f"falsifier: the end of the run could not be recorded: {reason}")
     if as_json:
         shown = [result_json(result) for result in results]
         text = json.dumps(shown[0] if len(shown) == 1 else shown, indent=2)
@@ -144,7 +146,11 @@ def _finish(results: list[Result], *, as_json: bool) -> NoReturn:
 
 def _write_counterexamples(result: Result, directory: Path) -> None:
     """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
-    name = counterexample_name(result)
+    try:
+        name = counterexample_name(result)
+    except FalsifierError as error:
+        warn(f"falsifier: {error}")
+        return
     found = [(name, result.counterexample)] if result.counterexample is not None else []
     found += [
         (f"fragile-{i}{name.removeprefix('counterexample')}", fragile)

@@ -31,7 +31,8 @@ def _section(section: Section) -> str:
             f"seed {run.seed}."
         )
     commands = (replay_command(run), run_command(run.manifest.request, shared=run.shared))
-    lines.append("\n".join(f"    {one_line(command)}" for command in commands))
+    listing = "\n".join(map(one_line, commands))
+    lines.append(f"```sh\n{listing}\n```")
     return "\n\n".join(lines)
 
 
