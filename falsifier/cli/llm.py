@@ -62,8 +62,8 @@ def prompt(
     if samples is not None and directory is None:
         raise click.UsageError("--samples requires --run DIR")
     problem = load_source(problem_source(options))
-    evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
-    told = evaluations[:samples]
+    evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else {}
+    told = list(evaluations.values())[:samples]
     settings = HybridSettings()
     count = 1 if engine == "llm" else settings.count if told else settings.opening
     messages = preview(problem, variant=variant, evaluations=told, count=count, anonymous=anonymous)

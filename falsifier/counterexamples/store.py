@@ -21,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name, write_whole
+from falsifier.core.sealing import check_seal, seal
 from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -68,6 +69,7 @@ class StoredCounterexample(BaseModel):
     reason: str
     fmu_sha256: str | None = None
     falsifier: str = __version__
+    sum: str = Field("", description="Checksum of the file up to here; without it, nothing is checked.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +138,8 @@ def save(stored: StoredCounterexample, path: Path) -> Path:
     """Write a counterexample file atomically, with the problem's paths relative to it; return its path."""
     request = stored.problem and _seen_from(stored.problem, path.parent)
     content = stored.model_copy(update={"problem": request}).model_dump(mode="json")
-    return write_whole(path, json.dumps(content, indent=2) + "\n")
+    del content["sum"]
+    return write_whole(path, seal(json.dumps(content, indent=2)))
 
 
 def load(path: Path) -> StoredCounterexample:
@@ -147,12 +150,23 @@ def load(path: Path) -> StoredCounterexample:
     """
     file = counterexample_file(path)
     try:
-        stored = StoredCounterexample.model_validate_json(file.read_bytes())
+        content = file.read_bytes()
+        stored = StoredCounterexample.model_validate_json(content)
+    except OSError as error:
+        raise SpecError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise SpecError(f"not a counterexample file: {first['msg']}", file=str(file), key=key) from None
-    return stored.model_copy(update={"problem": stored.problem and _found_from(stored.problem, file.parent)})
+    try:
+        if stored.sum:
+            check_seal(content)
+    except ValueError as error:
+        raise SpecError(
+            f"damaged or edited: {error}; if it was edited on purpose, delete its key sum", file=str(file)
+        ) from None
+    found = stored.problem and _found_from(stored.problem, file.parent)
+    return stored.model_copy(update={"problem": found, "sum": ""})
 
 
 def counterexample_file(path: Path) -> Path:
@@ -204,7 +218,7 @@ def keep_recorded(directory: Path) -> None:
         return
     described = manifest.read(directory)
     records = read_journal(directory)
-    evaluations: dict[str, list[Evaluation]] = {}
+    evaluations: dict[str, dict[int, Evaluation]] = {}
     for record in records:
         if not isinstance(record, ConfirmedRecord) or record.outcome != "confirmed":
             continue
