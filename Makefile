@@ -5,7 +5,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test lint types pytest docs fmus clean
+.PHONY: demo test lint types pytest docs notebooks fmus clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
@@ -21,10 +21,14 @@ types: .venv/test
 	$(BIN)/mypy
 
 pytest: .venv/test .venv-export/installed
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2
 
 docs: .venv/test
 	$(BIN)/mkdocs build --strict
+
+# Executes the notebooks and stores their outputs; the tests only execute them.
+notebooks: .venv/test
+	$(BIN)/python -m tests.notebooks
 
 # Rebuilds every FMU in fmus/ from modelica/. The exporter has its own environment, because pymoca and rtamt need
 # different versions of the antlr runtime.

@@ -51,22 +51,25 @@ if TYPE_CHECKING:
     from falsifier.counterexamples.explain import Explanation, explain
     from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
     from falsifier.counterexamples.shrink import Shrunk, shrink
-    from falsifier.counterexamples.store import StoredCounterexample
+    from falsifier.counterexamples.store import Replayed, StoredCounterexample, replay
+    from falsifier.counterexamples.store import load as load_counterexample
     from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
-    from falsifier.engines.llm import make_llm_engine
+    from falsifier.engines.llm import make_llm_engine, preview
     from falsifier.engines.protocol import AsksLLM, Engine
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
-    from falsifier.evaluation.evaluate import Evaluation, evaluate, simulate
+    from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for, simulate
     from falsifier.fmu import FmuModel, read_info
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
+    from falsifier.llm.prompts import VARIANTS
     from falsifier.llm.replay import RecordedChat
     from falsifier.llm.scripted import ScriptedChat
     from falsifier.problem.loading import load_problem, load_problems
     from falsifier.problem.problem import Problem
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
+    from falsifier.search import events
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.events import Event, Listener
     from falsifier.search.request import LLMSettings
@@ -110,6 +113,7 @@ _EXPORTS = {
     "Problem": "falsifier.problem.problem",
     "ProblemSource": "falsifier.problem.source",
     "RecordedChat": "falsifier.llm.replay",
+    "Replayed": "falsifier.counterexamples.store",
     "Requirement": "falsifier.problem.requirement",
     "Result": "falsifier.search.result",
     "RobustnessMap": "falsifier.counterexamples.robustness_map",
@@ -120,6 +124,7 @@ _EXPORTS = {
     "Spent": "falsifier.search.budget",
     "StoredCounterexample": "falsifier.counterexamples.store",
     "Trajectory": "falsifier.core.trajectory",
+    "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
     "Verdict": "falsifier.stl",
     "confirm": "falsifier.evaluation.confirm",
@@ -128,14 +133,18 @@ _EXPORTS = {
     "evaluate": "falsifier.evaluation.evaluate",
     "explain": "falsifier.counterexamples.explain",
     "falsify": "falsifier.search.run",
+    "load_counterexample": "falsifier.counterexamples.store:load",
     "load_problem": "falsifier.problem.loading",
     "load_problems": "falsifier.problem.loading",
     "make_engine": "falsifier.engines",
     "make_llm_engine": "falsifier.engines.llm",
+    "monitor_for": "falsifier.evaluation.evaluate",
     "parse": "falsifier.stl",
     "plot": "falsifier.views.plotting",
+    "preview": "falsifier.engines.llm",
     "progress": "falsifier.views.progress",
     "read_info": "falsifier.fmu",
+    "replay": "falsifier.counterexamples.store",
     "resume": "falsifier.search.run",
     "resume_campaign": "falsifier.campaigns",
     "robustness_map": "falsifier.counterexamples.robustness_map",
@@ -146,12 +155,14 @@ _EXPORTS = {
 }
 _MODULES = {
     "analysis": "falsifier.campaigns.analysis",
+    "events": "falsifier.search.events",
     "plotting": "falsifier.views.plotting",
 }
 
 __all__ = [
     "DEFAULT_ENGINE",
     "ENGINES",
+    "VARIANTS",
     "AsksLLM",
     "Budget",
     "CampaignRequest",
@@ -181,6 +192,7 @@ __all__ = [
     "Problem",
     "ProblemSource",
     "RecordedChat",
+    "Replayed",
     "Requirement",
     "Result",
     "RobustnessMap",
@@ -199,17 +211,22 @@ __all__ = [
     "connect",
     "cross",
     "evaluate",
+    "events",
     "explain",
     "falsify",
+    "load_counterexample",
     "load_problem",
     "load_problems",
     "make_engine",
     "make_llm_engine",
+    "monitor_for",
     "parse",
     "plot",
     "plotting",
+    "preview",
     "progress",
     "read_info",
+    "replay",
     "resume",
     "resume_campaign",
     "robustness_map",

@@ -2,12 +2,14 @@
 
 A test module for your own engine::
 
+    from falsifier.testing import EngineContract
+
     class TestMine(EngineContract):
         def make(self, problem, seed):
             return Mine(problem, seed=seed)
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,63 +24,100 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
 
+Array = NDArray[np.float64]
+Response = Callable[[Array, dict[str, Array], dict[str, float]], Mapping[str, Array]]
 Judge = Callable[[Candidate], Evaluation]
 
 STOP_TIME = 10.0
-INTERVAL = 0.05
+INTERVAL = 0.1
+# Wide enough for everything that engines propose over ten seconds.
+FREE = Freedom(max_control_points=100, min_interval=INTERVAL)
+START = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
+BIAS = ParameterRange("bias", -1.0, 1.0, nominal=0.0)
+
+
+def lag(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Respond as ``x' = gain * (sum of inputs) + bias - x`` does from ``x(0) = x0``, by explicit Euler."""
+    drive_ = parameters.get("gain", 1.0) * sum(inputs.values(), np.zeros_like(times))
+    drive_ += parameters.get("bias", 0.0)
+    x = np.empty_like(times)
+    x[0] = parameters.get("x0", 0.0)
+    for k in range(1, len(times)):
+        x[k] = x[k - 1] + (times[k] - times[k - 1]) * (drive_[k - 1] - x[k - 1])
+    return {"x": x}
 
 
 def lag_problem(
-    formula: str = "G[0,10] (y <= 3)", *, free: bool = False, inputs: int = 1, parameters: int = 1
+    formula: str = "G[0,10] (x <= 0.9)",
+    *,
+    inputs: int = 1,
+    limit: float = 1.0,
+    points: int = 4,
+    free: Freedom | None = None,
+    parameters: Sequence[ParameterRange] = (),
+    response: Response = lag,
+    name: str = "LAG",
 ) -> Problem:
-    """Problem with a first-order lag ``y' = sum of inputs - y``, ``y(0) = sum of parameters``.
+    """Problem with a first-order lag over ten seconds: output ``x``, up to three inputs ``u``, ``v``, ``w``.
 
-    Inputs ``u0, u1, ...`` and parameters ``p0, ...`` range over [-2, 2]. The second output, ``mode``, is 1
-    while y > 1 and 0 otherwise.
+    With the defaults it is violated only if ``u`` stays near its upper bound for a long time.
 
     Args:
-        formula: the requirement over y, mode and the inputs.
-        free: whether the parameterization of the inputs is free.
-        inputs: number of inputs.
-        parameters: number of parameters.
+        formula: the requirement over x and the inputs.
+        inputs: number of inputs, 0 to 3.
+        limit: the inputs' range is [-limit, limit].
+        points: number of control points of each input, linearly interpolated.
+        free: limits of a free parameterization of the inputs; None for a fixed one.
+        parameters: the searched ones of ``x0``, ``bias`` and ``gain``, for example ``[START, BIAS]``.
+        response: the function that is simulated.
+        name: name of the requirement.
     """
-    names = tuple(f"u{i}" for i in range(inputs))
-    freedom = Freedom(max_control_points=100, min_interval=0.05) if free else None
-    space = SearchSpace(
-        tuple(InputRange(name, -2.0, 2.0, control_points=4, free=freedom) for name in names),
-        tuple(ParameterRange(f"p{i}", -2.0, 2.0, nominal=0.0) for i in range(parameters)),
-        STOP_TIME,
+    drives = tuple(
+        InputRange(
+            input_,
+            -limit,
+            limit,
+            control_points=points,
+            interpolation="linear",
+            free=free,
+            unit="V",
+            description="drive",
+        )
+        for input_ in "uvw"[:inputs]
     )
-    info = ModelInfo(
-        "lag",
-        "a first-order lag",
-        variables=(
-            *(Variable(name, causality="input", low=-2.0, high=2.0) for name in names),
-            *(Variable(p.name, causality="parameter") for p in space.parameters),
-            Variable("y", causality="output"),
-            Variable("mode", kind="integer", causality="output"),
-        ),
+    variables = (
+        *(_input(r) for r in drives),
+        Variable("x", causality="output", unit="m", description="position"),
+        Variable("gain", causality="parameter", start=1.0, settable=True),
+        Variable("bias", causality="parameter", start=0.0, settable=True),
+        Variable("x0", causality="parameter", start=0.0, settable=True),
     )
     return Problem(
-        FunctionModel(_lag, info),
-        Requirement("R", parse(formula)),
-        space,
-        Experiment(STOP_TIME, INTERVAL, ("y", "mode")),
+        FunctionModel(response, ModelInfo("lag", "A first-order lag.", variables=variables)),
+        Requirement(name, parse(formula)),
+        SearchSpace(drives, tuple(parameters), STOP_TIME),
+        Experiment(STOP_TIME, INTERVAL, ("x",)),
     )
 
 
-def simulated(problem: Problem, margin: Callable[[NDArray[np.float64]], float]) -> Judge:
+def _input(r: InputRange) -> Variable:
+    return Variable(
+        r.name, causality="input", unit=r.unit, low=r.low, high=r.high, start=0.0, description=r.description
+    )
+
+
+def simulated(problem: Problem, margin: Callable[[Array], float]) -> Judge:
     """Return a function that evaluates candidates of a lag problem by simulation.
 
     Args:
         problem: a lag problem.
-        margin: maps the samples of y, shape (n,), to the robustness.
+        margin: maps the samples of x, shape (n,), to the robustness.
     """
 
     def judge(candidate: Candidate) -> Evaluation:
         trajectory = problem.model.simulate(candidate.signals, candidate.parameters, problem.experiment)
         inputs = {name: s.sample(trajectory.times) for name, s in candidate.signals.items()}
-        verdict = Verdict(margin(trajectory["y"]), critical_time=0.0, predicate="y <= 3")
+        verdict = Verdict(margin(trajectory["x"]), critical_time=0.0, predicate="x <= 0.9")
         return Evaluation(candidate, verdict=verdict, trajectory=trajectory.with_columns(inputs))
 
     return judge
@@ -106,17 +145,17 @@ class EngineContract:
     def problems(self) -> Sequence[Problem]:
         """Problems to test on: fixed, free, parameters only, two inputs."""
         return (
-            lag_problem(),
-            lag_problem(free=True),
-            lag_problem(inputs=0, parameters=2),
-            lag_problem(inputs=2, parameters=0, free=True),
+            lag_problem(parameters=[START]),
+            lag_problem(free=FREE, parameters=[START]),
+            lag_problem(inputs=0, parameters=[START, BIAS]),
+            lag_problem(inputs=2, free=FREE),
         )
 
     def test_candidates_are_admitted_by_the_space(self) -> None:
         """Candidates are within their ranges and allowed parameterizations, with origin and rationale."""
         for problem in self.problems():
             engine = self.make(problem, seed=1)
-            for candidate in drive(engine, simulated(problem, _below_three), rounds=self.rounds):
+            for candidate in drive(engine, simulated(problem, _margin), rounds=self.rounds):
                 admitted = problem.space.admit(candidate)
                 assert admitted.key == candidate.key
                 assert candidate.origin and candidate.rationale
@@ -124,7 +163,7 @@ class EngineContract:
     def test_deterministic_for_a_seed(self) -> None:
         """The same seed and calls give the same candidates; another seed gives others."""
         for problem in self.problems():
-            judge = simulated(problem, _below_three)
+            judge = simulated(problem, _margin)
             runs = [drive(self.make(problem, seed), judge, rounds=self.rounds) for seed in (3, 3, 4)]
             keys = [[c.key for c in run] for run in runs]
             assert keys[0] == keys[1]
@@ -132,9 +171,9 @@ class EngineContract:
 
     def test_asks_for_as_many_as_wanted(self) -> None:
         """``ask(n)`` returns n candidates, even if nothing has been told since the last call."""
-        problem = lag_problem(free=True)
+        problem = lag_problem(free=FREE, parameters=[START])
         engine = self.make(problem, seed=5)
-        judge = simulated(problem, _below_three)
+        judge = simulated(problem, _margin)
         for _ in range(3):
             batch = engine.ask(4)
             assert len(batch) == 4
@@ -144,11 +183,13 @@ class EngineContract:
 
     def test_accepts_foreign_evaluations(self) -> None:
         """``tell`` accepts candidates that the engine did not propose, with other control points."""
-        problem = lag_problem(free=True)
-        judge = simulated(problem, _below_three)
+        problem = lag_problem(free=FREE, parameters=[START])
+        judge = simulated(problem, _margin)
         foreign = [
-            Candidate({"u0": Signal((0.0, 2.5, 7.0), (1.0, -2.0, 0.5), "constant")}, {"p0": 0.5}, "somebody"),
-            Candidate({"u0": Signal((0.0,), (2.0,), "pchip")}, {"p0": 2.0}, "somebody"),
+            Candidate(
+                {"u": Signal((0.0, 2.5, 7.0), (0.5, -1.0, 0.25), "constant")}, {"x0": 0.25}, "somebody"
+            ),
+            Candidate({"u": Signal((0.0,), (1.0,), "pchip")}, {"x0": 1.0}, "somebody"),
         ]
         engine = self.make(problem, seed=6)
         engine.tell([judge(problem.space.admit(c)) for c in foreign])
@@ -156,8 +197,8 @@ class EngineContract:
 
     def test_survives_failures(self) -> None:
         """The engine continues after evaluations without verdict or trajectory."""
-        problem = lag_problem()
-        judge = simulated(problem, _below_three)
+        problem = lag_problem(parameters=[START])
+        judge = simulated(problem, _margin)
         count = 0
 
         def half_failing(candidate: Candidate) -> Evaluation:
@@ -171,32 +212,20 @@ class EngineContract:
 
     def test_survives_a_plateau(self) -> None:
         """If every candidate has the same robustness, the engine does not repeat one candidate."""
-        problem = lag_problem()
+        problem = lag_problem(parameters=[START])
         engine = self.make(problem, seed=8)
         asked = drive(engine, simulated(problem, lambda y: 0.5), rounds=self.rounds)
         assert len({c.key for c in asked}) > self.rounds / 2
 
     def test_resumes_by_replay(self) -> None:
         """After the same calls, a new instance continues with the same candidates."""
-        problem = lag_problem(free=True)
-        judge = simulated(problem, _below_three)
+        problem = lag_problem(free=FREE, parameters=[START])
+        judge = simulated(problem, _margin)
         first, second = self.make(problem, seed=9), self.make(problem, seed=9)
         drive(first, judge, rounds=self.rounds, n=2)
         drive(second, judge, rounds=self.rounds, n=2)
         assert [c.key for c in first.ask(2)] == [c.key for c in second.ask(2)]
 
 
-def _below_three(y: NDArray[np.float64]) -> float:
-    return float(np.min(3.0 - y))
-
-
-def _lag(
-    times: NDArray[np.float64], inputs: dict[str, NDArray[np.float64]], parameters: dict[str, float]
-) -> dict[str, NDArray[np.float64]]:
-    step = float(times[1] - times[0])
-    drive_ = np.sum([*inputs.values(), np.zeros_like(times)], axis=0)
-    y = np.empty_like(times)
-    y[0] = sum(parameters.values())
-    for k in range(len(times) - 1):
-        y[k + 1] = y[k] + step * (drive_[k] - y[k])
-    return {"y": y, "mode": (y > 1.0).astype(np.float64)}
+def _margin(x: Array) -> float:
+    return float(np.min(0.9 - x))

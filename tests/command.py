@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.patience import HANG
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -40,7 +42,7 @@ def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None) -> 
         env=clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "160"} | (env or {}),
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANG,
         check=False,
     )
     return Done(done.returncode, done.stdout, done.stderr)

@@ -6,11 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from falsifier.campaigns import run_campaign
 from tests.campaigns.support import request, work_in_threads
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does
+
+# How long an example takes on a busy machine says nothing about the property.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 _real_connect = socket.socket.connect
 

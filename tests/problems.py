@@ -1,35 +1,32 @@
-"""Small problems of Python functions, for tests that need no FMU."""
+"""The lag of falsifier.testing, easy and hard to falsify, slow and broken; by name, for other processes."""
 
 import os
 from collections.abc import Mapping
-from time import sleep
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import Requirement
-from falsifier.stl import parse
+from falsifier.testing import Array, lag, lag_problem
+from tests.patience import wait_until
 
-Array = NDArray[np.float64]
-STEP, STOP = 0.1, 10.0
-
-
-def follow(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """First-order lag x' = gain * u - x from x0, by explicit Euler."""
-    x = np.empty_like(times)
-    x[0] = parameters.get("x0", 0.0)
-    for k in range(1, len(times)):
-        x[k] = x[k - 1] + STEP * (parameters.get("gain", 1.0) * inputs["u"][k - 1] - x[k - 1])
-    return {"x": x}
+# Names an environment variable, "COUNT FOLDER": what is held there after so many simulations have begun.
+HOLD = "FALSIFIER_TESTS_HOLD"
+BEGUN, RELEASE = "begun", "release"
 
 
-def slow(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Take long enough that a campaign can be killed in the middle."""
-    sleep(0.01)
-    return follow(times, inputs, parameters)
+def held(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Wait for the folder's file ``release`` once enough simulations have begun in all processes together.
+
+    So a campaign can be killed in the middle, however slow the process is that kills it.
+    """
+    if HOLD in os.environ:
+        count, _, folder = os.environ[HOLD].partition(" ")
+        with (Path(folder) / BEGUN).open("ab") as file:
+            file.write(b".")
+        if (Path(folder) / BEGUN).stat().st_size > int(count):
+            wait_until((Path(folder) / RELEASE).exists)
+    return lag(times, inputs, parameters)
 
 
 def deadly(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
@@ -39,7 +36,7 @@ def deadly(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
 
 def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Give NaN whenever the input ends in the upper half of its range."""
-    x = follow(times, inputs, parameters)["x"].copy()
+    x = lag(times, inputs, parameters)["x"].copy()
     if inputs["u"][-1] > 0:
         x[5] = np.nan
     return {"x": x}
@@ -48,43 +45,6 @@ def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
 def never(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Fail always."""
     raise RuntimeError("out of order")
-
-
-INFO = ModelInfo(
-    "lag",
-    "A first-order lag.",
-    variables=(
-        Variable("u", causality="input", unit="V", low=-1.0, high=1.0, start=0.0, description="drive"),
-        Variable("x", causality="output", unit="m", description="position"),
-        Variable("gain", causality="parameter", start=1.0, settable=True),
-        Variable("x0", causality="parameter", start=0.0, settable=True),
-    ),
-)
-
-
-def lag_problem(
-    stl: str = "G[0,10] (x <= 0.9)",
-    *,
-    function: object = follow,
-    points: int = 4,
-    free: Freedom | None = None,
-    parameters: tuple[ParameterRange, ...] = (),
-    name: str = "LAG",
-) -> Problem:
-    """Problem over the lag: falsified only where u stays near its upper end for long."""
-    drive = InputRange(
-        "u",
-        -1.0,
-        1.0,
-        control_points=points,
-        interpolation="linear",
-        free=free,
-        unit="V",
-        description="drive",
-    )
-    space = SearchSpace((drive,), parameters, STOP)
-    model = FunctionModel(function, INFO)  # type: ignore[arg-type]
-    return Problem(model, Requirement(name, parse(stl)), space, Experiment(STOP, STEP, ("x",)))
 
 
 def easy() -> Problem:
@@ -109,19 +69,19 @@ def easy_again() -> Problem:
 
 def unusable() -> Problem:
     """Every simulation fails."""
-    return lag_problem(function=never, name="UNUSABLE")
+    return lag_problem(response=never, name="UNUSABLE")
 
 
-def slow_hard() -> Problem:
-    """Falsified by random inputs now and then, and slow."""
-    return lag_problem("G[0,10] (x <= 0.85)", function=slow, name="SLOW")
+def held_hard() -> Problem:
+    """Falsified by random inputs now and then; can be held."""
+    return lag_problem("G[0,10] (x <= 0.85)", response=held, name="HELD-HARD")
 
 
-def slow_impossible() -> Problem:
-    """Never falsified, and slow."""
-    return lag_problem("G[0,10] (x <= 2)", function=slow, name="SLOWER")
+def held_impossible() -> Problem:
+    """Never falsified; can be held."""
+    return lag_problem("G[0,10] (x <= 2)", response=held, name="HELD-NEVER")
 
 
 def worker_killer() -> Problem:
     """Every simulation ends the process that it runs in."""
-    return lag_problem(function=deadly, name="DEADLY")
+    return lag_problem(response=deadly, name="DEADLY")

@@ -10,14 +10,14 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError
 from falsifier.problem.problem import Problem
-from tests.problems import INFO, lag_problem
+from falsifier.testing import lag_problem
 
 
 @dataclass(frozen=True, slots=True)
 class EulerModel:
     """The lag x' = u - x, by explicit Euler with the communication step."""
 
-    info: ModelInfo = INFO
+    info: ModelInfo
     smallest_step: float = 0.0
 
     def simulate(
@@ -38,4 +38,5 @@ class EulerModel:
 
 
 def euler_problem(stl: str, *, smallest_step: float = 0.0) -> Problem:
-    return replace(lag_problem(stl), model=EulerModel(smallest_step=smallest_step))
+    problem = lag_problem(stl)
+    return replace(problem, model=EulerModel(problem.info, smallest_step))

@@ -1,64 +1,77 @@
 """The notebooks run from start to end, without keys, as they are committed."""
 
-import os
+import ast
 import re
-import sys
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pytest
-from jupyter_client.kernelspec import KernelSpec
-from jupyter_client.manager import AsyncKernelManager
-from nbclient import NotebookClient
 
-ROOT = Path(__file__).resolve().parents[1]
-NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+import falsifier
+from tests.notebooks import NOTEBOOKS, execute, read
+
 # Bytes of all notebooks together, outputs included.
 MOST_BYTES = 1_500_000
 ABSOLUTE_PATH = re.compile(r"(?:^|[\s'\"(=])/\w[\w.-]*/\w", re.MULTILINE)
-
-
-class ThisPython(AsyncKernelManager):
-    """Starts kernels with the Python that runs the tests, whatever kernels the user has installed."""
-
-    @property
-    def kernel_spec(self) -> KernelSpec:
-        """A kernel without an entry in anyone's home."""
-        command = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
-        return KernelSpec(argv=command, language="python", display_name="Python 3")
+PYTHON_BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs_from_start_to_end(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # The kernel finds this checkout, and leaves nothing in the user's home.
-    inherited = [p for p in [os.environ.get("PYTHONPATH", "")] if p]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), *inherited]))
-    for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR"):
-        monkeypatch.setenv(name, str(tmp_path / name.lower()))
-    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
-    resources = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(notebook, kernel_manager_class=ThisPython, timeout=120, resources=resources).execute()
-    assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
+def test_a_notebook_runs_from_start_to_end(path: Path, tmp_path: Path) -> None:
+    notebook = read(path)
+    execute(notebook, tmp_path)
+    counts = [cell.execution_count for cell in notebook.cells if cell.cell_type == "code"]
+    assert counts == list(range(1, len(counts) + 1))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_committed_executed_and_in_order(path: Path) -> None:
-    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
+    notebook = read(path)
     nbformat.validate(notebook)
     counts = [cell.execution_count for cell in notebook.cells if cell.cell_type == "code"]
     assert counts == list(range(1, len(counts) + 1))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_tells_no_path_of_the_machine_that_ran_it(path: Path) -> None:
-    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
-    texts = [output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs]
+def test_a_notebook_names_no_path_of_the_machine_that_ran_it(path: Path) -> None:
+    texts = [text for cell in read(path).cells for output in cell.get("outputs", ()) for text in said(output)]
+    assert texts
     assert not [text for text in texts if ABSOLUTE_PATH.search(text)]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_imports_from_the_door_only(path: Path) -> None:
+    imported = [name for code in programs(read(path)) for name in imports(code)]
+    assert imported
+    assert not {name for name in imported if name not in falsifier.__all__}
 
 
 def test_there_are_notebooks_and_they_are_small() -> None:
     assert len(NOTEBOOKS) == 5
     assert sum(path.stat().st_size for path in NOTEBOOKS) < MOST_BYTES
+
+
+def said(output: Any) -> list[str]:
+    """Texts of an output, in all forms but pictures."""
+    texts = [value for kind, value in output.get("data", {}).items() if kind.startswith("text/")]
+    return [*texts, *([output["text"]] if "text" in output else [])]
+
+
+def programs(notebook: Any) -> list[str]:
+    """Python of the code cells, without commands of the notebook, and of the examples in between."""
+    cells = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    code = ["\n".join(line for line in cell.splitlines() if line[:1] not in ("%", "!")) for cell in cells]
+    told = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
+    return code + [block for text in told for block in PYTHON_BLOCK.findall(text)]
+
+
+def imports(code: str) -> list[str]:
+    """What is imported of this package: names from the door, or a module's whole name."""
+    found = []
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names if alias.name.startswith("falsifier.")]
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "falsifier":
+            found += [a.name if node.module == "falsifier" else f"{node.module}.{a.name}" for a in node.names]
+    return found

@@ -12,6 +12,8 @@ import pytest
 
 from falsifier.core.files import bundled
 from tests.command import ROOT
+from tests.patience import HANG
+from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
 SPEC = """
 [model]
@@ -40,7 +42,7 @@ def run_pytest(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANG,
         check=False,
     )
 
@@ -72,7 +74,7 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     ):
         assert part in first.stdout
     pictures = [line.split()[-1] for line in first.stdout.splitlines() if line.startswith("  picture ")]
-    assert (repository / pictures[0]).read_bytes().startswith(b"\x89PNG")
+    assert {OUTPUT, INPUT, CRITICAL} <= colours(repository / pictures[0])
     stored = list((repository / "counterexamples").rglob("*.json"))
     assert [p.parent.name for p in stored] == ["car.fast"]
     assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
@@ -103,7 +105,7 @@ def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
     (repository / "tests" / "test_lag.py").write_text(
         """
 import pytest
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 def test_holds(falsifier_check):
     checked = falsifier_check(lag_problem("G[0,10] (x <= 2)"), budget=7)
@@ -131,10 +133,10 @@ def test_typo(falsifier_check):
     assert "pytest_falsifier.py" not in done.stdout
 
 
-def test_importing_the_plugin_costs_little_and_loads_nothing_of_the_package() -> None:
+def test_importing_the_plugin_loads_nothing_else() -> None:
     code = (
-        "import pytest, sys, time; start = time.process_time(); import pytest_falsifier; "
-        "print(time.process_time() - start, {'falsifier', 'numpy'} & {m.split('.')[0] for m in sys.modules})"
+        "import pytest, sys; before = set(sys.modules); import pytest_falsifier; "
+        "print(*(set(sys.modules) - before))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -143,6 +145,4 @@ def test_importing_the_plugin_costs_little_and_loads_nothing_of_the_package() ->
         text=True,
         check=True,
     )
-    seconds, modules = done.stdout.split(maxsplit=1)
-    assert float(seconds) < 0.05
-    assert modules.strip() == "set()"
+    assert done.stdout.split() == ["pytest_falsifier"]

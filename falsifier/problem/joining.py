@@ -11,6 +11,7 @@ from falsifier.fmu import FmuModel, read_info
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
 from falsifier.problem.ranges import fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
 # Tolerance, as a share of the output interval, for the stop time to be a multiple of it: with an interval of
@@ -70,6 +71,7 @@ def join(
     experiment = _experiment(spec, layers, model.info, file)
     inputs, parameters = _merged(spec, layers)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    check_sizes(experiment, space, file)
     section = spec.requirements[requirement]
     is_option = stl is not None or path.suffix == ".fmu"
     key = "--stl" if is_option else f"requirements.{requirement}.formula"
@@ -154,6 +156,7 @@ def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, fil
     output_interval = stated("output_interval") or info.step_size
     if output_interval is None:
         raise SpecError("the FMU has no default step; add this key", file=file, key="model.output_interval")
+    check_steps(stop_time, output_interval, file=file, key="model.output_interval")
     intervals = stop_time / output_interval
     if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
         raise SpecError(

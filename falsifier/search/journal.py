@@ -224,6 +224,7 @@ def read_manifest(directory: Path) -> dict[str, Any]:
         content = path.read_bytes()
         check_seal(content)
         manifest: dict[str, Any] = json.loads(content)
+        del manifest["sum"]
     except FileNotFoundError:
         raise JournalError(f"{directory}: not a run directory: it contains no {MANIFEST}") from None
     except (ValueError, OSError, RecursionError) as error:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.llm.messages import Exchange
 from falsifier.search.budget import Spent
-from falsifier.search.journal import read_journal
+from falsifier.search.journal import JournalReader
 from falsifier.search.records import (
     AskedRecord,
     ConfirmedRecord,
@@ -144,9 +144,11 @@ def read_tally(directory: Path, requirement: str | None = None) -> Tally:
     Raises:
         JournalError: if a line is invalid, unless it is an incomplete last line.
     """
-    tally = Tally(requirement)
-    for record in read_journal(directory):
+    tally, reader = Tally(requirement), JournalReader(directory, with_candidates=False)
+    for record in reader.new():
         tally.add(record)
+    if reader.begun:
+        tally.begin()
     return tally
 
 

@@ -3,6 +3,7 @@
 import pickle
 from contextlib import suppress
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
@@ -23,7 +24,7 @@ class _CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
 
     def _load_index(self) -> dict[Any, str]:
         try:
-            with open(self._index_path, "rb") as file:
+            with Path(self._index_path).open("rb") as file:
                 pickle.load(file)  # numba's version
                 _check(file.read())
             index: dict[Any, str] = super()._load_index()
@@ -32,8 +33,7 @@ class _CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
         return index
 
     def _load_data(self, name: str) -> Any:
-        with open(self._data_path(name), "rb") as file:
-            _check(file.read())
+        _check(Path(self._data_path(name)).read_bytes())
         return super()._load_data(name)
 
 

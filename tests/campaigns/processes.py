@@ -7,7 +7,7 @@ from falsifier.campaigns import resume_campaign, run_campaign
 from falsifier.campaigns.directory import is_campaign
 from tests.campaigns.support import request
 
-WANTED = request("slow_hard", "slow_impossible", seeds=3, budget=40)
+WANTED = request("held_hard", "held_impossible", seeds=3, budget=40)
 
 
 def work(directory: Path) -> None:

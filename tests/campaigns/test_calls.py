@@ -17,7 +17,7 @@ from falsifier.search.request import LLMSettings
 from tests.llm.server import Step, serving
 
 # Seconds that the server takes for an answer, and those that it asks to wait.
-TAKEN, PAUSE = 0.5, 1.5
+TAKEN, PAUSE = 0.3, 1.5
 STAND_IN = """
 import json
 from types import SimpleNamespace
@@ -90,7 +90,7 @@ class Limit:
 
 
 def test_the_limit_holds_over_all_processes(tmp_path: Path) -> None:
-    with serving(*[Step(ANSWER, delay=TAKEN)] * 6) as server:
+    with serving(*[Step(ANSWER, together=2, delay=TAKEN)] * 6) as server:
         outcome = run_campaign(campaign(server.url, runs=6, calls=2), tmp_path / "c", jobs=4)
     assert outcome.progress.counts == {"not falsified": 6}
     assert len(server.received) == 6

@@ -12,26 +12,47 @@ from typing import IO
 import pytest
 
 from falsifier.campaigns import Follower, is_worked_on, resume_campaign, run_campaign
-from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.directory import STOP
+from falsifier.campaigns.work import _STOP_PERIOD
 from tests.campaigns.processes import WANTED
 from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.command import listen_to_interrupts
+from tests.patience import HANG, wait_until
+from tests.problems import BEGUN, HOLD, RELEASE
 
 ROOT = Path(__file__).resolve().parents[2]
 KILLS = 2
 
 
-def start(directory: Path, stderr: IO[bytes] | None = None) -> "subprocess.Popen[bytes]":
-    command = [sys.executable, "-m", "tests.campaigns.processes", str(directory)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(
-        command, cwd=ROOT, env=environment, stderr=stderr, preexec_fn=listen_to_interrupts
-    )
+class Held:
+    """A campaign in a process of its own, which holds once so many simulations have begun."""
+
+    def __init__(self, directory: Path, folder: Path, count: int, stderr: IO[bytes] | None = None) -> None:
+        folder.mkdir()
+        self.folder, self.count = folder, count
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.campaigns.processes", str(directory)],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT), HOLD: f"{count} {folder}"},
+            stderr=stderr,
+            preexec_fn=listen_to_interrupts,
+        )
+        wait_until(lambda: self.begun() > count or self.process.poll() is not None)
+        assert self.process.poll() is None, "the campaign has ended"
+
+    def begun(self) -> int:
+        """How many simulations have begun."""
+        path = self.folder / BEGUN
+        return path.stat().st_size if path.exists() else 0
+
+    def release(self) -> None:
+        """Let it go on."""
+        (self.folder / RELEASE).touch()
 
 
 def simulations(directory: Path) -> int:
     """How many simulations the campaign's journals hold."""
-    return Follower(directory).look().spent.simulations if is_campaign(directory) else 0
+    return Follower(directory).look().spent.simulations
 
 
 def test_killed_at_random_instants_it_ends_like_an_uninterrupted_one(
@@ -40,14 +61,13 @@ def test_killed_at_random_instants_it_ends_like_an_uninterrupted_one(
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     work_in_threads(monkeypatch)
     run_campaign(WANTED, whole, jobs=2)
-    for instant in sorted(random.Random(4).sample(range(1, simulations(whole)), KILLS)):
-        process = start(killed)
-        deadline = time.monotonic() + 60
-        while simulations(killed) < instant and process.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.005)
+    rng, left = random.Random(4), simulations(whole)
+    for kill in range(KILLS):
+        campaign = Held(killed, tmp_path / f"hold{kill}", rng.randrange(1, left - 1))
         assert is_worked_on(killed)
-        process.kill()
-        assert process.wait() == -signal.SIGKILL, "the campaign ended before it could be killed"
+        campaign.process.kill()
+        assert campaign.process.wait() == -signal.SIGKILL
+        left = simulations(whole) - simulations(killed)
     assert any(not run.finished for run in Follower(killed).look().runs)
     assert not is_worked_on(killed)
     resume_campaign(killed, jobs=2)
@@ -58,16 +78,12 @@ def test_killed_at_random_instants_it_ends_like_an_uninterrupted_one(
 def test_a_killed_campaign_says_nothing_after_its_end(tmp_path: Path) -> None:
     said = tmp_path / "stderr"
     with said.open("wb") as stderr:
-        process = start(tmp_path / "c", stderr)
-    deadline = time.monotonic() + 60
-    while simulations(tmp_path / "c") < 5 and time.monotonic() < deadline:
-        time.sleep(0.02)
+        process = Held(tmp_path / "c", tmp_path / "hold", 5, stderr).process
     helpers = children(process.pid)
     assert len(helpers) == 3  # two workers, and the one that frees what they share
     process.kill()
     process.wait()
-    while any(Path(f"/proc/{pid}").exists() for pid in helpers) and time.monotonic() < deadline:
-        time.sleep(0.02)
+    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in helpers))
     assert said.read_text() == ""
 
 
@@ -86,12 +102,12 @@ def test_a_run_that_kills_its_worker_has_failed(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
 def test_ctrl_c_stops_the_runs_where_they_are(tmp_path: Path) -> None:
     directory = tmp_path / "c"
-    process = start(directory)
-    deadline = time.monotonic() + 60
-    while simulations(directory) < 5 and time.monotonic() < deadline:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=60) == 0
+    campaign = Held(directory, tmp_path / "hold", 5)
+    campaign.process.send_signal(signal.SIGINT)
+    wait_until((directory / STOP).exists)
+    time.sleep(2 * _STOP_PERIOD)  # a run looks so often whether it should stop
+    campaign.release()
+    assert campaign.process.wait(timeout=HANG) == 0
     counts = Follower(directory).look().counts
     assert counts["interrupted"] > 0
     assert counts["running"] == 0

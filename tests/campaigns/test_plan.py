@@ -1,8 +1,7 @@
 import pytest
 
-from falsifier.campaigns import CampaignRequest, Method, cross, method_of, run_name, suite
+from falsifier.campaigns import CampaignRequest, Method, cross, method_of, run_name
 from falsifier.errors import SpecError
-from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings
@@ -71,21 +70,3 @@ def test_the_same_run_twice_is_refused() -> None:
     run = cross([AT1], [Method("uniform")], seeds=[0], budget=Budget(5))
     with pytest.raises(SpecError, match="the same run twice"):
         CampaignRequest(runs=run + run).named()
-
-
-def test_the_suite_has_the_published_requirements() -> None:
-    names = [r.target for r in suite("arch-comp")]
-    assert len(names) == 21
-    assert {"AT:AT1", "AT:AT6abc", "NN:NN", "CC:CCx", "F16:F16", "SC:SC"} < set(names)
-    assert [load_source(s).name for s in suite("arch-comp")] == [name.split(":")[1] for name in names]
-
-
-def test_instance_2_leaves_out_what_has_none() -> None:
-    names = [r.target for r in suite("arch-comp", profile="instance2")]
-    assert "F16:F16" not in names
-    assert len(names) == 20
-
-
-def test_an_unknown_suite_is_named() -> None:
-    with pytest.raises(SpecError, match="arch-comp"):
-        suite("archcomp")

@@ -1,6 +1,7 @@
 """Which runs are given out when, on executors that do as the test says."""
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
@@ -15,6 +16,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.manifest import describe
 from falsifier.search.request import LLMSettings, RunRequest
+from tests.patience import HANG
 from tests.problems import easy
 
 PROBLEM = easy()
@@ -47,32 +49,34 @@ def threads(slots: int) -> Workers:
 
 
 class Gauge:
-    """Counts how many calls are inside at a time."""
+    """Counts how many calls are inside at a time; they stay until as many as expected were."""
 
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
+    def __init__(self, expected: int) -> None:
+        self.expected = expected
+        self.changed = threading.Condition()
         self.inside = self.most = 0
 
     def __call__(self, task: Task, files: object) -> Done:
-        with self.lock:
+        with self.changed:
             self.inside += 1
             self.most = max(self.most, self.inside)
-        threading.Event().wait(0.02)
-        with self.lock:
+            self.changed.notify_all()
+            self.changed.wait_for(lambda: self.most >= self.expected, timeout=HANG)
+        time.sleep(0.02)  # for one too many to come in
+        with self.changed:
             self.inside -= 1
         return Done("not falsified", "")
 
 
 def test_never_more_runs_than_slots(monkeypatch: pytest.MonkeyPatch) -> None:
-    gauge = Gauge()
+    gauge = Gauge(3)
     done = run([task(str(i)) for i in range(9)], threads(3), monkeypatch, gauge)
     assert len(done) == 9
     assert gauge.most == 3
 
 
 def test_runs_with_a_language_model_have_a_limit_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    asking = Gauge()
-    together = Gauge()
+    asking, together = Gauge(2), Gauge(3)
 
     def work(task: Task, files: object) -> Done:
         return asking(task, files) if task.request.llm else together(task, files)
@@ -98,15 +102,14 @@ def test_a_missing_file_is_sent_once_it_is_asked_for(tmp_path: Path, monkeypatch
     assert sent == [{}, {"digest": b"content"}]
 
 
-def _finish(future: "Future[Done]") -> None:
-    if not future.done():
-        future.set_result(Done("not falsified", ""))
-
-
 class Mortal(Executor):
-    """Breaks like a process pool when it is given the deadly run: everything in it is lost."""
+    """Breaks like a process pool when it is given the deadly run: everything in it is lost.
 
-    def __init__(self) -> None:
+    While it is busy nothing else ends.
+    """
+
+    def __init__(self, *, busy: bool) -> None:
+        self.busy = busy
         self.pending: list[Future[Done]] = []
         self.broken = False
 
@@ -121,10 +124,8 @@ class Mortal(Executor):
             for each in self.pending:
                 if not each.done():
                     each.set_exception(BrokenExecutor("killed"))
-        elif len(self.pending) > 2 or task.name.startswith("last"):
+        elif not self.busy:
             future.set_result(Done("not falsified", ""))
-        else:
-            threading.Timer(0.02, _finish, [future]).start()
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -135,7 +136,7 @@ def test_only_the_run_that_kills_workers_fails(monkeypatch: pytest.MonkeyPatch) 
     made: list[Mortal] = []
 
     def make() -> Mortal:
-        made.append(Mortal())
+        made.append(Mortal(busy=not made))
         return made[-1]
 
     names = ["a", "b", "deadly", "c", "last"]

@@ -3,34 +3,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
 
 from falsifier.campaigns.directory import locked
-from falsifier.cli import cli
 from falsifier.errors import SpecError
-from tests.campaigns.support import work_in_threads
+from tests.cli.support import HARD, bench
 from tests.command import falsifier
-
-HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"
-
-
-@pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
-    """Call a command in this process, with threads for workers."""
-    work_in_threads(monkeypatch)
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> Result:
-        return CliRunner().invoke(cli, [str(a) for a in arguments])
-
-    return call
-
-
-def bench(command: Any, *more: str) -> Result:
-    result: Result = command(
-        "bench", HARD, NEVER, "--engine", "uniform", "--runs", "2", "--budget", "20", *more
-    )
-    return result
 
 
 def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None:
@@ -164,34 +141,6 @@ def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:
         result = command("watch", "c", "--once")
         assert "2 running" in result.stdout
         assert "stopped" not in result.stdout
-
-
-def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> None:
-    bench(command, "--out", "c", "--quiet")
-    written = command("report", "c", "--junit", "j.xml", "--arch-comp", "v.csv")
-    assert written.exit_code == 0, written.output
-    assert (tmp_path / "c" / "report.html").read_text().startswith("<!DOCTYPE html>")
-    assert "<testsuites" in (tmp_path / "j.xml").read_text()
-    assert (tmp_path / "v.csv").read_text().count("yes") == 2
-    assert command("report", "c", "--markdown").stdout.startswith("# Falsification report: c")
-    run = next((tmp_path / "c" / "runs").iterdir())
-    command("report", str(run), "-o", "one.html")
-    assert "1 requirement, 1 run," in (tmp_path / "one.html").read_text()
-
-
-def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "v.csv").write_text(
-        "system,property,instance,input,parameters,falsified,simulations\n"
-        'AT,AT2,2,"[0 100 0]",[],1,2\n'
-        'AT,AT2,2,"[0 0 0]",[],1,2\n'
-    )
-    result = command("validate", "v.csv")
-    assert result.exit_code == 1
-    assert "row 1, AT2: reproduced, robustness -" in result.stdout
-    assert "row 2, AT2: not reproduced, robustness +" in result.stdout
-    assert "1 of 2 counterexamples accepted" in result.stdout
-    (found, other) = json.loads(command("validate", "v.csv", "--json").stdout)
-    assert (found["holds"], other["holds"]) == (True, False)
 
 
 def test_a_campaign_as_a_user_starts_it(tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.explain import explain, narrate
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.scripted import ScriptedChat
-from tests.problems import Array, broken, lag_problem
+from falsifier.testing import Array, lag_problem
+from tests.problems import broken
 
 FREE = Freedom(10, 0.1)
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -55,13 +56,13 @@ def test_a_part_without_which_the_simulation_fails_is_said() -> None:
     ) -> Mapping[str, Array]:
         return broken(times, {"u": 1 - inputs["u"]}, parameters)
 
-    problem = lag_problem("G[0,10] (x >= 0.5)", function=fails_at_rest)
+    problem = lag_problem("G[0,10] (x >= 0.5)", response=fails_at_rest)
     explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
     assert "With u at rest (0 V) the simulation fails." in explanation.text
 
 
 def test_a_failed_simulation_cannot_be_explained() -> None:
-    problem = lag_problem(function=broken)
+    problem = lag_problem(response=broken)
     with pytest.raises(ValueError, match="failed"):
         explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
 

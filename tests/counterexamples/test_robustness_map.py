@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,8 +8,7 @@ from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.views.plotting import plot_robustness_map, save_figure
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 # x(10) of x' = u - x, x(0) = x0, by Euler with 0.1 s: u + (x0 - u) 0.9**100. The range of u is 2 wide.
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -52,15 +49,6 @@ def test_each_stretch_moves_alone() -> None:
     found = robustness_map(free, evaluate(free, Candidate({"u": signal})), samples=16, points=3)
     assert [(c.time, c.value) for c in found.coordinates] == [(0.0, 1.0), (2.0, 0.0), (6.0, 1.0)]
     assert found.axes[0] == 2  # what comes last decides x(10)
-
-
-@pytest.mark.parametrize("parameters", [(), (X0,)])
-def test_the_map_is_drawn(tmp_path: Path, parameters: tuple[ParameterRange, ...]) -> None:
-    lag = lag_problem(parameters=parameters)
-    start = evaluate(lag, lag.space.decode([1.0] * len(lag.space.dimensions)))
-    found = robustness_map(lag, start, samples=8, points=3)
-    save_figure(plot_robustness_map(found, "LAG"), tmp_path / "map.png")
-    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_settings_are_checked() -> None:

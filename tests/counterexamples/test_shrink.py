@@ -1,5 +1,4 @@
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,13 +7,13 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
-from falsifier.counterexamples.simplicity import digits, rest_value, rounder, simplicity
-from falsifier.errors import SpecError
+from falsifier.counterexamples.simplicity import digits, simplicity
+from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import half_step
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from tests.problems import STEP, Array, lag_problem
+from falsifier.testing import INTERVAL, Array, lag_problem
 from tests.stepped import euler_problem
 
 FREE = Freedom(max_control_points=20, min_interval=0.1)
@@ -23,7 +22,7 @@ FREE = Freedom(max_control_points=20, min_interval=0.1)
 def ramp(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Integrator of the input, from x0."""
     x0 = parameters.get("x0", 0.0)
-    return {"x": x0 + np.concatenate(([0.0], np.cumsum(inputs["u"][:-1]) * STEP))}
+    return {"x": x0 + np.concatenate(([0.0], np.cumsum(inputs["u"][:-1]) * INTERVAL))}
 
 
 def violation(problem: Problem, seed: int = 0) -> Evaluation:
@@ -44,7 +43,7 @@ def assert_local_minimum(problem: Problem, shrunk: Shrunk) -> None:
         for proposal in propose(problem, shrunk.evaluation.candidate):
             try:
                 candidate = problem.space.admit(proposal)
-            except Exception:
+            except CandidateError:
                 continue
             if simplicity(problem, candidate) < limit:
                 violated = evaluate(problem, candidate).violated
@@ -56,7 +55,7 @@ def assert_local_minimum(problem: Problem, shrunk: Shrunk) -> None:
 def test_the_result_is_a_violating_local_minimum(seed: int, free: Freedom | None) -> None:
     x0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
     problem = lag_problem(
-        "G[0,10] (x <= 2)  or F[0,10] (x < -1.5)", function=ramp, free=free, parameters=(x0,)
+        "G[0,10] (x <= 2)  or F[0,10] (x < -1.5)", response=ramp, free=free, parameters=(x0,)
     )
     shrunk = shrink(problem, violation(problem, seed), budget=2000)
     assert shrunk.minimal
@@ -68,7 +67,7 @@ def test_the_result_is_a_violating_local_minimum(seed: int, free: Freedom | None
 
 def test_what_does_not_matter_comes_to_rest_and_what_does_becomes_round() -> None:
     x0 = ParameterRange("x0", -1.0, 1.0, nominal=0.25)
-    problem = lag_problem("G[0,10] (x <= 5.1)", function=ramp, free=FREE, parameters=(x0,))
+    problem = lag_problem("G[0,10] (x <= 5.1)", response=ramp, free=FREE, parameters=(x0,))
     signal = Signal((0.0, 3.3, 7.1, 9.0), (0.81, 0.72, 0.93, 0.64), "pchip")
     original = evaluate(problem, problem.space.admit(Candidate({"u": signal}, {"x0": 0.777})))
     shrunk = shrink(problem, original)
@@ -79,7 +78,7 @@ def test_what_does_not_matter_comes_to_rest_and_what_does_becomes_round() -> Non
 
 
 def test_a_change_that_is_needed_stays() -> None:
-    problem = lag_problem("(F[0,4] (x >= 2)) -> (G[4,10] (x >= 1))", function=ramp, free=FREE)
+    problem = lag_problem("(F[0,4] (x >= 2)) -> (G[4,10] (x >= 1))", response=ramp, free=FREE)
     signal = Signal((0.0, 3.1, 5.2, 8.8), (0.9, 0.95, -0.7, -0.9), "linear")
     original = evaluate(problem, Candidate({"u": signal}, {}))
     assert original.violated
@@ -93,7 +92,7 @@ def test_a_change_that_is_needed_stays() -> None:
 
 
 def test_shrinking_is_deterministic_and_keeps_its_budget() -> None:
-    problem = lag_problem("G[0,10] (x <= 2)", function=ramp)
+    problem = lag_problem("G[0,10] (x <= 2)", response=ramp)
     original = violation(problem)
     first, second = shrink(problem, original), shrink(problem, original)
     assert first.evaluation.candidate.key == second.evaluation.candidate.key
@@ -106,7 +105,7 @@ def test_shrinking_is_deterministic_and_keeps_its_budget() -> None:
 
 
 def test_what_is_minimal_already_is_returned_as_it_was() -> None:
-    problem = lag_problem("G[0,10] (x <= 2)", function=ramp)
+    problem = lag_problem("G[0,10] (x <= 2)", response=ramp)
     once = shrink(problem, violation(problem)).evaluation
     again = shrink(problem, once)
     assert again.minimal
@@ -114,7 +113,7 @@ def test_what_is_minimal_already_is_returned_as_it_was() -> None:
 
 
 def test_a_demanded_margin_is_kept() -> None:
-    problem = lag_problem("G[0,10] (x <= 2)", function=ramp)
+    problem = lag_problem("G[0,10] (x <= 2)", response=ramp)
     original = evaluate(problem, problem.space.decode([0.9, 0.8, 0.95, 0.9]))
     shrunk = shrink(problem, original, margin=5.0)
     assert shrunk.evaluation.robustness is not None
@@ -133,44 +132,6 @@ def test_shrinking_does_not_end_at_a_fragile_one() -> None:
     shrunk = shrink(problem, original)
     assert shrunk.minimal
     assert shrunk.evaluation.candidate.signals["u"].values == (0.52,) * 4
-
-
-def test_the_order_of_simplicity() -> None:
-    problem = lag_problem(free=FREE)
-
-    def key(times: tuple[float, ...], values: tuple[float, ...], interpolation: str = "linear") -> object:
-        return simplicity(problem, Candidate({"u": Signal(times, values, interpolation)}))  # type: ignore[arg-type]
-
-    in_order = [
-        key((0.0,), (0.0,), "constant"),  # at rest
-        key((0.0,), (0.0,)),  # the same as a line
-        key((0.0, 5.0), (0.0, 0.0)),  # with a point more
-        key((0.0,), (1.0,)),  # at a bound
-        key((0.0,), (0.5,)),  # a round number
-        key((0.0,), (0.51,)),  # a longer one
-        key((0.0, 5.0), (0.0, 1.0)),  # a change
-        key((0.0, 5.1), (0.0, 1.0)),  # at a longer time
-        key((0.0, 5.0, 6.0), (0.0, 1.0, 0.0)),  # two changes between the same values
-        key((0.0, 5.0, 6.0), (0.0, 1.0, 0.5)),  # a third value
-    ]
-    assert in_order == sorted(in_order)  # type: ignore[type-var]
-    assert len(set(map(repr, in_order))) == len(in_order)
-
-
-def test_rest_is_the_start_value_within_the_range() -> None:
-    problem = lag_problem(parameters=(ParameterRange("x0", 0.5, 1.0, nominal=0.0),))
-    assert rest_value(problem, "u") == 0.0
-    assert rest_value(problem, "x0") is None
-    moved = replace(problem.space.inputs[0], low=0.2)
-    space = replace(problem.space, inputs=(moved,))
-    assert rest_value(replace(problem, space=space), "u") is None
-
-
-def test_digits_and_rounder_numbers() -> None:
-    assert [digits(v) for v in (0.0, 100.0, 0.05, -33.25, 1e-7)] == [1, 1, 1, 4, 1]
-    assert list(rounder(33.25)) == [30.0, 40.0, 33.0, 34.0, 33.2, 33.3]
-    assert list(rounder(-0.12)) == [-0.1, -0.2]
-    assert list(rounder(7.0)) == []
 
 
 def test_at6a_shrinks_to_one_change_of_throttle_without_brake() -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.counterexamples.regression import check
 from falsifier.counterexamples.store import Database, load, problem_of, replay, save, to_store
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
@@ -16,7 +15,8 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search.run import falsify
 from falsifier.stl import parse
-from tests.problems import lag_problem, never
+from falsifier.testing import lag_problem
+from tests.problems import never
 from tests.stepped import euler_problem
 
 SPEC = """
@@ -100,7 +100,7 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
     coarse = euler_problem("G[1,1] (x <= 0.65)")
     found = violation(coarse)
     assert replay(to_store(found), coarse).status == "fragile"
-    broken = lag_problem(function=never)
+    broken = lag_problem(response=never)
     with pytest.raises(SimulationError, match="out of order"):
         replay(to_store(found), broken)
 
@@ -149,26 +149,6 @@ def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
         problem_of(load(path))
 
 
-def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Path) -> None:
-    problem = lag_problem("G[0,10] (x <= 0.5)")
-    database = Database(tmp_path)
-    first = check(problem, engine="uniform", budget=100, database=database)
-    assert first.counterexample is not None
-    assert first.result is not None
-    assert first.counterexample.evaluation.candidate.signals["u"].values == (1.0,) * 4
-    assert first.file is not None
-    second = check(problem, engine="uniform", budget=100, database=database)
-    assert second.result is None
-    assert second.file == first.file
-    assert [r.status for r in second.replayed] == ["violates"]
-    mended = replace(problem, parameters={"gain": 0.4})
-    third = check(mended, engine="uniform", budget=5, database=database)
-    assert (third.counterexample, third.file) == (None, None)
-    assert [r.status for r in third.replayed] == ["does not violate"]
-    assert third.result is not None
-    assert third.result.spent.simulations == 5
-
-
 def test_databases_keep_requirements_of_one_name_apart(tmp_path: Path) -> None:
     database = Database(tmp_path)
     one = replace(lag_problem(), source=ProblemSource(target="a/one.toml:LAG"))
@@ -179,11 +159,6 @@ def test_databases_keep_requirements_of_one_name_apart(tmp_path: Path) -> None:
     assert [p for p, _ in database.fetch(one)] == [path]
     assert list(database.fetch(other)) == []
     assert list(database.fetch(lag_problem())) == []
-
-
-def test_a_check_that_cannot_simulate_is_an_error() -> None:
-    with pytest.raises(SimulationError, match="all 10 simulations failed"):
-        check(lag_problem(function=never), engine="uniform")
 
 
 def test_the_formula_is_kept_as_text() -> None:

@@ -1,41 +1,38 @@
-import numpy as np
-
+from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
-from falsifier.engines.corner_walk import CornerWalk
-from falsifier.testing import drive, lag_problem, simulated
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.stl import Verdict
+from falsifier.testing import START, drive, lag_problem, simulated
+from tests.engines.support import NamedEngine
+
+
+class TestContract(NamedEngine):
+    engine = "corners"
 
 
 def test_corners_come_first_and_each_once() -> None:
-    problem = lag_problem(inputs=2, parameters=1)
+    problem = lag_problem(inputs=2, parameters=[START])
     engine = make_engine("corners", problem, seed=1)
-    asked = drive(engine, simulated(problem, lambda y: float(3 - y.max())), rounds=9)
+    asked = drive(engine, simulated(problem, lambda x: float(3 - x.max())), rounds=9)
     corners = {(*(s.values for s in c.signals.values()), *c.parameters.values()) for c in asked[:8]}
     assert len(corners) == 8
-    assert all(abs(v) == 2.0 for c in asked[:8] for s in c.signals.values() for v in s.values)
-    assert any(abs(v) != 2.0 for s in asked[8].signals.values() for v in s.values)
+    assert all(abs(v) == 1.0 for c in asked[:8] for s in c.signals.values() for v in s.values)
+    assert any(abs(v) != 1.0 for s in asked[8].signals.values() for v in s.values)
 
 
-def test_additive_effects_are_found_within_one_simulation_per_input() -> None:
-    weights = np.array([3.0, 0.0, -1.0, 2.0])
-    best = float(np.minimum(weights, 0).sum())
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        walk = CornerWalk(4)
-        costs = []
-        for _ in range(5):
-            levels = walk.next(rng)
-            assert levels is not None
-            costs.append(float(weights @ np.array(levels)))
-            walk.learn(levels, costs[-1])
-        assert min(costs) == best
+def test_an_input_without_effect_costs_one_simulation() -> None:
+    problem = lag_problem(inputs=3)
+    engine = make_engine("corners", problem, seed=0)
+
+    def judge(candidate: Candidate) -> Evaluation:
+        u, _, w = (candidate.signals[name].values[0] for name in "uvw")
+        return Evaluation(candidate, verdict=Verdict(3.0 - u - w, 0.0, "u + w <= 3"))
+
+    asked = drive(engine, judge, rounds=4)
+    assert min(judge(c).robustness or 0.0 for c in asked) == 1.0
 
 
-def test_walk_ends_after_all_corners_and_knows_when_it_is_settled() -> None:
-    rng = np.random.default_rng(0)
-    walk = CornerWalk(2)
-    seen = set()
-    while (levels := walk.next(rng)) is not None:
-        seen.add(levels)
-        walk.learn(levels, float(sum(levels)))
-    assert len(seen) == 4
-    assert walk.settled
+def test_its_reason_names_the_levels() -> None:
+    (candidate,) = make_engine("corners", lag_problem(inputs=2), seed=0).ask()
+    levels = {name: "high" if s.values[0] > 0 else "low" for name, s in candidate.signals.items()}
+    assert candidate.rationale == f"constant extremes: u {levels['u']}, v {levels['v']}"

@@ -30,9 +30,8 @@ from falsifier.search.journal import holds_run, read_journal
 from falsifier.search.records import ExchangeRecord
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
-from falsifier.testing import EngineContract
+from falsifier.testing import EngineContract, lag_problem
 from tests.llm.server import Step, serving
-from tests.problems import lag_problem
 
 
 def reply(values: Sequence[float], rationale: str = "because") -> str:
@@ -89,12 +88,12 @@ def test_preview_is_what_is_sent() -> None:
 
 
 def test_the_road_to_a_valid_reply() -> None:
-    """Rate limit, timeout, bad JSON, a point out of range, a repetition, then success."""
+    """Rate limit, lost connection, bad JSON, a point out of range, a repetition, then success."""
     problem = lag_problem()
     script = (
         Step(reply([0.5, 0.5, 0.5, 0.5])),
         Step(status=429, headers={"Retry-After": "0.05"}),
-        Step(reply([1, 1, 1, 1]), delay=0.8),
+        Step(hang_up=True),
         Step('{"signals": [{"name": "u", "values": [1, 1'),
         Step(reply([0, 0, 0, 7])),
         Step(reply([0.5, 0.5, 0.5, 0.5])),
@@ -102,7 +101,7 @@ def test_the_road_to_a_valid_reply() -> None:
     )
     exchanges: list[Exchange] = []
     with serving(*script) as server:
-        client = LiteLLMChat("openai/m", api_base=server.url, timeout=0.4)
+        client = LiteLLMChat("openai/m", api_base=server.url)
         chat = RetryingChat(LadderChat(client), Gate(), first_delay=0.01)
         engine = make_llm_engine(problem, chat, variant="MP4", on_exchange=exchanges.append)
         engine.tell([evaluate(problem, *engine.ask())])
@@ -271,7 +270,7 @@ def test_a_cache_answers_the_same_question_of_another_run(tmp_path: Path) -> Non
 
 def test_runs_share_one_client() -> None:
     problem = lag_problem()
-    with serving(*(Step(reply([0.01 * i] * 4), delay=0.02) for i in range(12))) as server:
+    with serving(*(Step(reply([0.01 * i] * 4), together=3, delay=0.02) for i in range(12))) as server:
         chat = connect("openai/m", api_base=server.url, gate=Gate(concurrency=3))
         found: list[Evaluation] = []
 
@@ -347,7 +346,7 @@ def counting_script(seed: int) -> Callable[[ChatRequest], str]:
         for key in ("signals", "parameters"):
             if key in one["properties"]:
                 names = one["properties"][key]["items"]["properties"]["name"]["enum"]
-                value = 4 * share - 2
+                value = 2 * share - 1
                 found[key] = [
                     {"name": n, "values": [value, -value, value, 0]}
                     if key == "signals"

@@ -35,4 +35,4 @@ def test_a_wrong_name_is_an_error_with_a_suggestion() -> None:
 
 def test_nothing_to_vary_is_an_error() -> None:
     with pytest.raises(SpecError, match="nothing to search"):
-        make_engine("uniform", lag_problem(inputs=0, parameters=0), seed=0)
+        make_engine("uniform", lag_problem(inputs=0), seed=0)

@@ -11,7 +11,7 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.search.run import falsify
 from falsifier.stl import reference
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 from tests.stepped import euler_problem
 
 # x(1) of x' = 1 - x by explicit Euler: 1 - 0.9**10 with 0.1 s, 1 - 0.95**20 with 0.05 s.

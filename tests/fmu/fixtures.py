@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
+from tests.patience import HANG
 
+# How a model-exchange FMU is simulated, for type checkers.
+ME: Final = "model-exchange"
 FOLDER = Path(__file__).parents[1] / "fixtures" / "fmus"
 
 
@@ -36,7 +40,7 @@ def run(
     parameters: Mapping[str, float] | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
-    time_limit: float = 60.0,
+    time_limit: float = HANG,
 ) -> Trajectory:
     """Simulate once."""
     experiment = Experiment(stop, interval, tuple(outputs), step_size, tolerance, time_limit)

@@ -1,28 +1,16 @@
-"""Co-simulation of the test FMUs, compiled and plain, against what the models are by their equations."""
+"""Co-simulation of the test FMUs against what the models are by their equations."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import stepper
-from falsifier.fmu.description import Description, Slot
-from falsifier.fmu.ports import make_ports
 from tests.fmu import plain
 from tests.fmu.fixtures import local, ramp, run
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
-OUTPUTS = {
-    **{name: ("x", "y") for name in LAGS},
-    **{name: ("h", "v", "bounces") for name in ("Ball_2", "Ball_3")},
-    **{name: ("sampled", "count", "x") for name in ("Ticker_2", "Ticker_3")},
-    "Arrays_3": ("x[2]", "y[1]", "A[1,2]"),
-    "VanDerPol_3": ("x", "v"),
-}
-
-
 Floats = NDArray[np.float64]
 
 
@@ -56,21 +44,6 @@ def test_a_smaller_communication_step_keeps_the_output_grid(name: str) -> None:
 def test_start_values_and_parameters_are_set_before_the_start(name: str) -> None:
     got = run(local(name), ("x",), parameters={"x": 4.0, "T": 0.5})
     np.testing.assert_allclose(got["x"], 4.0 * np.exp(-got.times / 0.5), atol=1e-5)
-
-
-@pytest.mark.parametrize("name", sorted(OUTPUTS))
-def test_plain_loops_do_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = local(name)
-    inputs = {v.name: Signal.evenly((0.0, 2.0, -1.0, 1.0), stop_time=2.0) for v in model.info.inputs}
-
-    def outcome() -> Floats:
-        model.close()
-        got = run(model, OUTPUTS[name], stop=2.0, interval=0.05, signals=inputs, step_size=0.01)
-        return np.stack([got[n] for n in got.names])
-
-    compiled = outcome()
-    monkeypatch.setattr(stepper, "loops", lambda: plain)
-    np.testing.assert_array_equal(outcome(), compiled)
 
 
 @pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
@@ -130,16 +103,3 @@ def test_events_inside_of_steps(name: str) -> None:
     assert got["bounces"][got.index(0.45)] == 0 and got["bounces"][got.index(0.5)] == 1
     flight = 0.5 - np.sqrt(2 / 9.81)
     assert got["v"][got.index(0.5)] == pytest.approx(0.7 * np.sqrt(2 * 9.81) - 9.81 * flight, abs=0.12)
-
-
-def test_a_negated_alias_has_the_other_sign() -> None:
-    info = ModelInfo("M", fmi_version="1.0")
-    slots = {"a": Slot(0, "Real"), "b": Slot(0, "Real", negated=True)}
-    ports = make_ports(Description(info, "", {}, slots), ["a", "b"], {"Real": 1})
-    memory = ports.memory[1]
-    memory[0] = 2.5
-    loops, place = stepper.loops(), ports.table[2]
-    assert [loops.fetch(place + 32 * k) for k in (0, 1)] == [2.5, -2.5]
-    assert [plain.fetch(place + 32 * k) for k in (0, 1)] == [2.5, -2.5]
-    loops.put(place + 32, 4.0)
-    assert memory[0] == -4.0

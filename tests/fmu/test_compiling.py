@@ -1,6 +1,5 @@
 """What is said of compiling, and where machine code is kept."""
 
-import logging
 import os
 import subprocess
 import sys
@@ -10,22 +9,8 @@ from pathlib import Path
 import numba
 import pytest
 
-from falsifier.evaluation.workers import local_executor
-from falsifier.fmu import isolation
 from falsifier.fmu.compiling import on_long_compilation
-from falsifier.fmu.nursery import REAP
 
-# A nursery that says something, and then the exit code of the worker that it is asked for.
-TALKING = f"""
-import json, socket, sys
-sys.path[:] = json.loads(sys.argv[1])
-from falsifier.fmu.channel import Reply, receive_request, send_reply
-sock = socket.socket(fileno=int(sys.argv[2]))
-send_reply(sock, Reply())
-assert receive_request(sock)[0] == {REAP}
-send_reply(sock, Reply(text="compiling", more=True))
-send_reply(sock, Reply(text="7"))
-"""
 # As where neither the package's folder nor a home can be written.
 NO_FOLDER = """
 import numba.core.caching as caching
@@ -57,33 +42,6 @@ def test_what_is_compiled_already_is_not_told_of() -> None:
     with on_long_compilation(lambda: told.append("compiling"), 0.0):
         assert double(2.0) == 4.0
     assert told == []
-
-
-def test_what_the_nursery_says_is_logged_and_is_not_the_answer(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(isolation, "_BOOT", TALKING)
-    nursery = isolation.Nursery()
-    assert nursery.reap(1) == 7
-    nursery.close()
-    assert [record.getMessage() for record in caplog.records] == ["compiling"]
-
-
-def level() -> int:
-    """Level of the logger that says it, in the process that is asked."""
-    return logging.getLogger("falsifier.fmu").level
-
-
-def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
-    logger = logging.getLogger("falsifier.fmu")
-    before = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with local_executor(2) as executor:
-            assert executor is not None
-            assert executor.submit(level).result() == logging.ERROR
-    finally:
-        logger.setLevel(before)
 
 
 def test_the_loops_are_kept_in_a_temporary_folder_where_no_other_can_be_written(tmp_path: Path) -> None:

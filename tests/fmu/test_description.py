@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import FmuModel, read_info
+from falsifier.fmu import read_info
 from falsifier.fmu.description import Description, parse, read_description
 from tests.fmu import fixtures
 
@@ -130,15 +130,6 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
 def test_wrong_descriptions_are_named(text: str, message: str) -> None:
     with pytest.raises(ModelError, match=rf"test\.fmu: .*{message}"):
         described(text)
-
-
-def test_interfaces_that_are_not_there_name_the_one_that_is() -> None:
-    with pytest.raises(ModelError, match='does not offer co-simulation; set interface = "model-exchange"'):
-        FmuModel(fixtures.path("Stiff_2"))
-    with pytest.raises(ModelError, match="scheduled execution is not supported"):
-        FmuModel(fixtures.path("Scheduled_3"))
-    with pytest.raises(ModelError, match="would have to tick its clocks 'tick'"):
-        FmuModel(fixtures.path("Clocked_3"))
 
 
 def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:

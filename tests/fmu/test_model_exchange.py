@@ -1,68 +1,14 @@
 """Model exchange of the test FMUs against closed forms, scipy and co-simulation."""
 
-from typing import Any, Final
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu.integrators import _A, _C, _E, _GAMMA, _IA, _IB, _IC, _IE
-from tests.fmu.fixtures import local, ramp, run
+from tests.fmu.fixtures import ME, local, ramp, run
 
-ME: Final = "model-exchange"
 LAGS = ["Lag_1me", "Lag_2", "Lag_3"]
-BALLS = ["Ball_1me", "Ball_2", "Ball_3"]
 TICKERS = ["Ticker_1me", "Ticker_2", "Ticker_3"]
-
-
-def ball(time: float, *, g: float = 9.81, e: float = 0.7) -> tuple[float, float, int]:
-    """Height, velocity and bounces of the ball, flight by flight."""
-    height, speed, start, bounces = 1.0, 0.0, 0.0, 0
-    while True:
-        flight = (speed + np.sqrt(speed**2 + 2 * g * height)) / g
-        if start + flight > time:
-            rest = time - start
-            return height + speed * rest - g / 2 * rest**2, speed - g * rest, bounces
-        start, speed, height, bounces = start + flight, e * (g * flight - speed), 0.0, bounces + 1
-
-
-def order_residuals(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], order: int
-) -> float:
-    """Largest residual of the Runge-Kutta order conditions (Hairer, Norsett, Wanner I, table II.2.2)."""
-    ac = a @ c
-    conditions: list[list[tuple[Any, float]]] = [
-        [(b.sum(), 1)],
-        [(b @ c, 1 / 2)],
-        [(b @ c**2, 1 / 3), (b @ ac, 1 / 6)],
-        [(b @ c**3, 1 / 4), (b @ (c * ac), 1 / 8), (b @ a @ c**2, 1 / 12), (b @ a @ ac, 1 / 24)],
-        [
-            (b @ c**4, 1 / 5),
-            (b @ (c**2 * ac), 1 / 10),
-            (b @ ac**2, 1 / 20),
-            (b @ (c * (a @ c**2)), 1 / 15),
-            (b @ (c * (a @ ac)), 1 / 30),
-            (b @ a @ c**3, 1 / 20),
-            (b @ a @ (c * ac), 1 / 40),
-            (b @ a @ a @ c**2, 1 / 60),
-            (b @ a @ a @ ac, 1 / 120),
-        ],
-    ]
-    return max(abs(float(value) - exact) for group in conditions[:order] for value, exact in group)
-
-
-def test_coefficients_have_their_orders() -> None:
-    explicit = np.hstack([_A, np.zeros((7, 1))])
-    b = explicit[6]
-    assert order_residuals(explicit, b, _C, 5) < 1e-14
-    assert order_residuals(explicit, b - _E, _C, 4) < 1e-14
-    implicit = np.hstack([_IA, np.zeros((6, 1))]) + np.diag([0.0] + [_GAMMA] * 5)
-    assert order_residuals(implicit, _IB, _IC, 4) < 1e-14
-    assert order_residuals(implicit, _IB - _IE, _IC, 3) < 1e-14
-    np.testing.assert_allclose(implicit.sum(axis=1), _IC, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", LAGS)
@@ -90,15 +36,6 @@ def test_any_signal_is_followed(interpolation: str, hold: float | None) -> None:
     np.testing.assert_allclose(got["x"], expected, atol=2e-5)
 
 
-@pytest.mark.parametrize("name", BALLS)
-def test_state_events_are_located(name: str) -> None:
-    got = run(local(name, ME), ("h", "v", "bounces"), stop=2.0, interval=0.01, parameters={"e": 0.8})
-    exact = np.array([ball(t, e=0.8) for t in got.times])
-    np.testing.assert_allclose(got["h"], exact[:, 0], atol=1e-8)
-    np.testing.assert_allclose(got["v"], exact[:, 1], atol=1e-8)
-    assert got["bounces"].tolist() == exact[:, 2].tolist()
-
-
 @pytest.mark.parametrize("name", TICKERS)
 def test_time_events_are_met_exactly(name: str) -> None:
     """The sample of u = t at each multiple of 0.5 s is held; x integrates it."""
@@ -108,44 +45,6 @@ def test_time_events_are_met_exactly(name: str) -> None:
     assert got["count"].tolist() == (ticks + 1).tolist()
     exact = 0.25 * ticks * (ticks - 1) / 2 + 0.5 * ticks * (got.times - 0.5 * ticks)
     np.testing.assert_allclose(got["x"], exact, atol=1e-9)
-
-
-def test_stiff_models_are_solved_by_implicit_steps() -> None:
-    """x' = -1e6 (x - cos t) - sin t: an explicit method would need three million steps."""
-    got = run(local("Stiff_2", ME), ("x",), stop=10.0, interval=0.05, time_limit=10.0)
-    np.testing.assert_allclose(got["x"], np.cos(got.times), atol=1e-7)
-
-
-@pytest.mark.parametrize(("mu", "stop"), [(1.0, 10.0), (100.0, 100.0)])
-def test_van_der_pol_agrees_with_scipy(mu: float, stop: float) -> None:
-    got = run(
-        local("VanDerPol_2", ME),
-        ("x", "v"),
-        stop=stop,
-        interval=stop / 200,
-        parameters={"mu": mu},
-        tolerance=1e-8,
-    )
-    exact = solve_ivp(
-        lambda t, z: [z[1], mu * (1 - z[0] ** 2) * z[1] - z[0]],
-        (0, stop), [2.0, 0.0], method="Radau", rtol=1e-10, atol=1e-12, t_eval=got.times,
-    )  # fmt: skip
-    np.testing.assert_allclose(got["x"], exact.y[0], atol=1e-4)
-
-
-def test_tighter_tolerances_are_more_exact() -> None:
-    def error(tolerance: float) -> float:
-        got = run(
-            local("Arrays_3", ME),
-            ("x[1]",),
-            stop=20.0,
-            interval=2.0,
-            parameters={"x[1]": 1.0},
-            tolerance=tolerance,
-        )
-        return float(np.abs(got["x[1]"] - np.cos(got.times)).max())
-
-    assert error(1e-9) < 1e-7 < error(1e-3) < 1e-1
 
 
 @pytest.mark.parametrize("name", ["Lag_2", "Ball_2", "Ticker_3", "Arrays_3", "VanDerPol_3"])
@@ -166,11 +65,6 @@ def test_discrete_inputs_change_at_events_only() -> None:
     step = Signal((0.0, 0.5), (1.0, 3.0), "constant")
     got = run(local("Ticker_2", ME), ("sampled",), signals={"u": step})
     assert got["sampled"].tolist() == [1.0] * 5 + [3.0] * 6
-
-
-def test_events_that_pile_up_are_an_error() -> None:
-    with pytest.raises(SimulationError, match="its events never end at t = "):
-        run(local("Ticker_2", ME), ("x",), parameters={"period": 1e-9})
 
 
 def test_a_model_that_leaves_its_domain_fails_with_the_time() -> None:

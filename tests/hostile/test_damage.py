@@ -20,12 +20,12 @@ from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.search.journal import read_journal
 from falsifier.search.repair import repair
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
+from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
-from tests.problems import hard, impossible, lag_problem
+from tests.problems import hard, impossible
 
 Damage = Callable[[bytes, Random], bytes]
 
@@ -185,26 +185,6 @@ def test_a_damaged_counterexample_file_is_never_another_counterexample(tmp_path:
             assert load_counterexample(path) == whole
         except SpecError as error:
             one_line_of(error)
-
-
-def test_one_damaged_line_costs_one_simulation(tmp_path: Path) -> None:
-    Numeric().run(tmp_path)
-    path = tmp_path / "journal.jsonl"
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[3] = lines[3].replace(b'"status":"ok"', b'"status":"OK"')
-    path.write_bytes(b"".join(lines))
-    with pytest.raises(JournalError, match=r"line 4 is damaged: its checksum .* falsifier repair"):
-        read_journal(tmp_path)
-    done = CliRunner().invoke(cli, ["repair", str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    assert "line 4: its checksum does not match" in done.output
-    assert (tmp_path / "journal.jsonl.damaged-1").read_bytes() == b"".join(lines)
-    kept = [r.index for r in read_journal(tmp_path) if r.kind == "evaluated"]
-    assert 1 not in kept and len(kept) == len(load_runs(tmp_path)[0].robustness) - 1
-    before = len(read_journal(tmp_path))
-    assert Numeric().resume(tmp_path).falsified
-    assert [r.kind for r in read_journal(tmp_path)[before:]] == ["evaluated", "ended"]
-    assert CliRunner().invoke(cli, ["repair", str(tmp_path)]).output.endswith("nothing is damaged\n")
 
 
 def test_a_doubled_and_a_lost_line_shift_no_verdict(tmp_path: Path) -> None:

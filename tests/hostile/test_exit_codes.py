@@ -16,8 +16,9 @@ from falsifier.cli import run as command
 from falsifier.search.events import Confirmed, Event, RunEnded
 from falsifier.search.journal import Journal
 from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier
-from tests.problems import easy, impossible, lag_problem
+from tests.problems import easy, impossible
 
 Array = NDArray[np.float64]
 FALSIFIED = ("run", "python:tests.problems:easy", "--engine", "corners", "--quiet")
@@ -72,7 +73,7 @@ def overflowing(times: Array, inputs: dict[str, Array], parameters: dict[str, fl
 
 def overflow():  # type: ignore[no-untyped-def]
     """Falsified at once, by outputs whose difference overflows."""
-    return lag_problem("G[0,10] (x <= 1)", function=overflowing, name="OVERFLOW")
+    return lag_problem("G[0,10] (x <= 1)", response=overflowing, name="OVERFLOW")
 
 
 def test_outputs_at_the_end_of_the_range_of_floats_are_falsified_and_drawn(tmp_path: Path) -> None:

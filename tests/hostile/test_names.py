@@ -20,7 +20,6 @@ from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES
 from falsifier.campaigns.archcomp import export as arch_comp
 from falsifier.campaigns.plan import run_name
-from falsifier.core import literals
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.model import ModelInfo, Variable
@@ -38,45 +37,14 @@ from falsifier.search.result import Result
 from falsifier.search.run import falsify
 from falsifier.stl import parse
 from falsifier.stl.names import name_text
+from falsifier.testing import lag_problem
 from falsifier.views.plotting import plot_evaluation, save_figure
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
-from tests.counterexamples.export.test_export import confirmed
-from tests.problems import lag_problem
+from tests.counterexamples.export.support import confirmed
+from tests.hostile.names import HOSTILE, names
 
 PLAIN = "plain"
-HOSTILE = (
-    "../../x",
-    "/abs/dir",
-    "..",
-    ".",
-    "",
-    "CON.txt",
-    "a\0b",
-    "x" * 5000,
-    "~/.ssh/x",
-    "-rf",
-    'a"""; open("PWNED","w").write("x"); """',
-    "a'''\nimport os; os.system('touch PWNED')\n'''",
-    '\\"""+open("PWNED","w").write("x")#',
-    '"); system("touch PWNED"); ("',
-    "$(touch PWNED)`touch PWNED`'; touch PWNED; '",
-    '=HYPERLINK("http://x")',
-    "+1+cmd|' /C calc'!A0",
-    "@SUM(A1)",
-    "\t=1",
-    "<script>alert(1)</script>",
-    "]]><!--&amp;\"'",
-    "a|b\n# heading\n![x](http://x/y.png)",
-    "\x1b]0;owned\x07\x1b[2J",
-    "a\u202egnp.exe",
-    "{requirement}%s%(x)s{0}",
-    "$\\frac{a}{b$",
-    "umlaut ä, 漢字, \ud800",
-)
-names = st.one_of(
-    st.sampled_from(HOSTILE), st.text(max_size=60), st.text("'\"\\`$\n\r;:./=<>&|", max_size=20)
-)
 hostile = pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))
 
 
@@ -97,25 +65,6 @@ def test_different_names_are_different_files(several: list[str]) -> None:
     assert len({file_name(name) for name in several}) == len(several)
     assert len(set(matlab_names(several).values())) == len(several)
     assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name) for name in matlab_names(several).values())
-
-
-@given(names)
-def test_literals_are_read_back_as_the_same_text(name: str) -> None:
-    writable = re.sub("[\0\ud800-\udfff]", "\ufffd", name)
-    assert ast.literal_eval(literals.python_docstring(name)) == name
-    assert tomllib.loads(f"a = {literals.toml_string(name)}")["a"] == writable
-    assert tomllib.loads(f"{literals.toml_key(name)} = 1") == {writable: 1}
-    assert re.fullmatch(r'"(?:[^"\\]|\\.)*"', literals.modelica_string(name), re.DOTALL)
-    assert re.fullmatch(r"[\w.]+|'(?:[^'\\]|\\.)*'", literals.modelica_path(name), re.DOTALL)
-
-
-@given(names)
-def test_cells_and_lines_are_text(name: str) -> None:
-    assert not re.match(r"[=+@\t\n]|-(?![\d.])", literals.csv_cell(name))
-    line = literals.one_line(name)
-    assert len(line.splitlines()) <= 1 and not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", line)
-    assert "\n" not in literals.markdown_text(name) and "\n" not in literals.markdown_code(name)
-    assert not re.search(r"(?<!\\)(?:\\\\)*[<|`\[]", literals.markdown_text(name))
 
 
 @given(names)

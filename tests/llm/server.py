@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
+from tests.patience import HANG
+
 
 @dataclass(frozen=True)
 class Step:
@@ -32,6 +34,10 @@ class Step:
         }
     )
     hang_up: bool = False
+    # It never answers: the client must give up.
+    silent: bool = False
+    # It answers when so many requests are there at the same time.
+    together: int = 1
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,8 @@ class Server:
         self.asides: list[Received] = []
         self.most_at_once = 0
         self._at_once = 0
-        self._lock = threading.Lock()
+        self._lock = threading.Condition()
+        self._closing = threading.Event()
         outer = self
 
         class Handler(BaseHTTPRequestHandler):
@@ -73,6 +80,7 @@ class Server:
                     step = outer.script.pop(0) if outer.script else Step(status=410, message="script ended")
                     outer._at_once += 1
                     outer.most_at_once = max(outer.most_at_once, outer._at_once)
+                    outer._lock.notify_all()
                 try:
                     self._answer(step, body)
                 finally:
@@ -80,8 +88,12 @@ class Server:
                         outer._at_once -= 1
 
             def _answer(self, step: Step, body: dict[str, Any]) -> None:
+                with outer._lock:
+                    outer._lock.wait_for(lambda: outer.most_at_once >= step.together, timeout=HANG)
+                if step.silent:
+                    outer._closing.wait(HANG)
                 time.sleep(step.delay)
-                if step.hang_up:
+                if step.hang_up or step.silent:
                     self.close_connection = True
                     return
                 if step.raw is not None:
@@ -119,6 +131,7 @@ class Server:
         self._thread.start()
 
     def close(self) -> None:
+        self._closing.set()
         self._http.shutdown()
         self._http.server_close()
 

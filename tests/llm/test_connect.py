@@ -7,8 +7,6 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.connect import check_llm, connect, preflight
-from falsifier.llm.litellm_import import listed_price
-from falsifier.llm.providers import first_mode
 from falsifier.llm.retry import RetryingChat
 from falsifier.llm.usage import Price
 from tests.llm.server import Step, serving
@@ -56,23 +54,9 @@ def test_the_nearest_provider_is_suggested() -> None:
         preflight("opnai/gpt-5-mini")
 
 
-def test_grammars_that_break_gpt_oss_are_not_tried() -> None:
-    assert first_mode("ollama_chat/gpt-oss:20b") == "prompt"
-    assert first_mode("lm_studio/openai/gpt-oss-20b") == "prompt"
-    assert first_mode("huggingface/openai/gpt-oss-20b") == "json_schema"
-    assert first_mode("ollama_chat/qwen3") == "json_schema"
-
-
 def test_a_cache_is_opt_in(tmp_path: Path) -> None:
     assert isinstance(connect("ollama_chat/x"), RetryingChat)
     assert isinstance(connect("ollama_chat/x", cache=tmp_path), CachedChat)
-
-
-def test_prices() -> None:
-    listed = listed_price("openai/gpt-5-mini")
-    assert listed is not None and 0 < listed.prompt < listed.completion
-    assert listed_price("huggingface/openai/gpt-oss-20b") is None
-    assert listed_price("openai/never-heard-of") is None
 
 
 def test_check_of_a_model() -> None:

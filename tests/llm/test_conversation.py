@@ -6,6 +6,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.scripted import ScriptedChat
+from tests.llm.support import ADD, ask_with_tools, calling, wrong
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="a number, please"),))
 
@@ -96,5 +97,44 @@ def test_no_answer_is_not_asked_again_here() -> None:
 
 def test_exchanges_go_through_json() -> None:
     _, _, exchanges = asked("seven", "7")
-    for exchange in exchanges:
-        assert Exchange.model_validate_json(exchange.model_dump_json()) == exchange
+    assert [e.problem is None for e in exchanges] == [False, True]
+    assert [Exchange.model_validate_json(e.model_dump_json()) for e in exchanges] == exchanges
+
+
+class TestTools:
+    def test_a_call_is_answered_and_the_question_goes_on(self) -> None:
+        value, chat, exchanges = ask_with_tools(calling(1, 2), "3")
+        assert value == "3"
+        following = chat.requests[1]
+        assert following.tools == (ADD,)
+        assert [m.role for m in following.messages] == ["user", "assistant", "tool"]
+        assert following.messages[1].tool_calls[0].arguments == '{"terms": [1, 2]}'
+        assert following.messages[2] == Message(role="tool", content="3", tool_call_id="c1")
+        assert [e.problem for e in exchanges] == [None, None]
+
+    def test_several_calls_at_once_are_answered_one_by_one(self) -> None:
+        both = ChatReply(text="", tool_calls=calling(1, 2).tool_calls + calling(3, 4, id="c2").tool_calls)
+        _, chat, _ = ask_with_tools(both, "7")
+        answers = [(m.tool_call_id, m.content) for m in chat.requests[1].messages if m.role == "tool"]
+        assert answers == [("c1", "3"), ("c2", "7")]
+
+    def test_a_wrong_call_is_told_what_is_wrong_and_may_be_corrected(self) -> None:
+        value, chat, exchanges = ask_with_tools(wrong(), calling(1, 2), "3")
+        assert value == "3"
+        assert "no terms" in chat.requests[1].messages[-1].content
+        assert "no terms" in (exchanges[0].problem or "")
+
+    def test_wrong_calls_do_not_go_on_for_ever(self) -> None:
+        with pytest.raises(NoValidReplyError, match="no terms"):
+            ask_with_tools(wrong(), wrong(), wrong(), "3")
+
+    def test_a_rejected_answer_after_a_call_keeps_what_was_said(self) -> None:
+        value, chat, _ = ask_with_tools(calling(1, 2), "", "3")
+        assert value == "3"
+        assert [m.role for m in chat.requests[2].messages] == [
+            "user",
+            "assistant",
+            "tool",
+            "assistant",
+            "user",
+        ]

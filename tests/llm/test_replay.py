@@ -41,14 +41,6 @@ def test_a_recorded_failure_happens_again() -> None:
         RecordedChat([exchange(None)], ScriptedChat(["now there"])).complete(QUESTION)
 
 
-def test_script_of_a_function_and_its_end() -> None:
-    assert ScriptedChat(lambda request: request.messages[0].content).complete(QUESTION).text == "?"
-    with pytest.raises(ChatError, match="contains only 1 line, but request 2 was made"):
-        chat = ScriptedChat(["only"])
-        chat.complete(QUESTION)
-        chat.complete(QUESTION)
-
-
 def test_recordings_are_read_from_journals_and_from_plain_lines(tmp_path: Path) -> None:
     first, second = exchange("one"), exchange("two")
     lines = ['{"kind": "asked", "n": 1}', f'{{"kind": "exchange", "exchange": {first.model_dump_json()}}}']

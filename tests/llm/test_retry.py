@@ -1,13 +1,13 @@
 """Patience with passing failures, shared between runs."""
 
 import threading
+from types import SimpleNamespace
 
 import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
-from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
 from falsifier.llm.retry import Gate, RetryingChat
 from falsifier.llm.scripted import ScriptedChat
@@ -59,26 +59,42 @@ def test_ends_when_the_server_asks_for_too_long_a_wait() -> None:
         RetryingChat(inner, Gate(sleep=Naps())).complete(QUESTION)
 
 
-def test_a_rate_limit_holds_up_all_runs_of_a_gate() -> None:
-    gate = Gate()
-    limited = RetryingChat(
-        ScriptedChat([TransientChatError("limit", retry_after=0.3, for_all=True), "a"]), gate
-    )
-    answered: list[str] = []
-    thread = threading.Thread(target=lambda: answered.append(limited.complete(QUESTION).text))
-    thread.start()
-    while gate.remaining() <= 0:
-        pass
-    other = RetryingChat(ScriptedChat(["b"]), gate)
-    assert gate.remaining() > 0
-    other.complete(QUESTION)
-    assert gate.remaining() <= 0
-    thread.join()
-    assert answered == ["a"]
+@pytest.mark.parametrize(("for_all", "held_up"), [(True, 30.0), (False, 0.0)])
+def test_a_rate_limit_holds_up_all_runs_of_a_gate(
+    for_all: bool, held_up: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, others = 100.0, []
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        others.append(max(gate.remaining(), 0.0))
+        now += seconds
+
+    monkeypatch.setattr("falsifier.llm.retry.time", SimpleNamespace(monotonic=lambda: now))
+    gate = Gate(sleep=sleep)
+    limit = TransientChatError("limit", retry_after=30.0, for_all=for_all)
+    assert RetryingChat(ScriptedChat([limit, "a"]), gate).complete(QUESTION).text == "a"
+    assert others == [held_up]
+    assert now == 130.0
+
+
+def test_who_comes_during_a_pause_waits_for_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        now += seconds
+
+    monkeypatch.setattr("falsifier.llm.retry.time", SimpleNamespace(monotonic=lambda: now))
+    gate = Gate(sleep=sleep)
+    gate.pause(12.0)
+    gate.pause(5.0)
+    assert RetryingChat(ScriptedChat(["b"]), gate).complete(QUESTION).attempts == 1
+    assert now == 12.0
 
 
 def test_concurrency_is_limited() -> None:
-    with serving(*(Step("ok", delay=0.05) for _ in range(6))) as server:
+    with serving(*(Step("ok", together=2, delay=0.05) for _ in range(6))) as server:
         gate = Gate(concurrency=2)
         chats = [RetryingChat(LiteLLMChat("openai/m", api_base=server.url), gate) for _ in range(6)]
         replies: list[ChatReply] = []
@@ -107,21 +123,3 @@ def test_server_restarts_while_asked() -> None:
     assert reply.text == "back"
     assert reply.attempts == 4
     assert len(server.received) == 4
-
-
-def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
-    refused = Step(status=400, message="response_format is not supported")
-    with serving(refused, refused, Step("in words"), Step("again")) as server:
-        chat = LadderChat(LiteLLMChat("openai/m", api_base=server.url))
-        first, second = chat.complete(REQUEST), chat.complete(REQUEST)
-    kinds = [r.body.get("response_format", {}).get("type") for r in server.received]
-    assert kinds == ["json_schema", "json_object", None, None]
-    assert first.parameters["mode"] == "prompt"
-    assert second.text == "again"
-
-
-def test_ladder_ends_at_its_last_rung() -> None:
-    refused = Step(status=400, message="grammar is not supported")
-    with serving(refused, refused, refused) as server, pytest.raises(ChatError, match="grammar"):
-        LadderChat(LiteLLMChat("openai/m", api_base=server.url)).complete(REQUEST)
-    assert len(server.received) == 3

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import HANG
+
 ROOT = Path(__file__).parents[2]
 FEATURES = Path(__file__).parent / "Features"
 Build = Callable[..., Path]
@@ -29,7 +31,7 @@ def exporter_python() -> str:
 def run_exporter(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the exporter's command line."""
     command = [exporter_python(), str(ROOT / "modelica" / "export_fmu.py"), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG)
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.modelica.conftest import ROOT, exporter_python, run_exporter
+from tests.patience import HANG
 
 FOLDER = Path(__file__).parent / "refused"
 CASES = sorted(path.stem for path in FOLDER.glob("*.mo"))
@@ -38,7 +39,7 @@ print(json.dumps(found))
 def messages() -> dict[str, str]:
     """The exporter's message for every model, from one process."""
     command = [exporter_python(), "-c", PROGRAM, str(ROOT / "modelica"), str(FOLDER)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 0, done.stderr
     found: dict[str, str] = json.loads(done.stdout)
     return found

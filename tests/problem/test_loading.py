@@ -1,48 +1,13 @@
 import pickle
-import shutil
 from pathlib import Path
 
 import pytest
 
-from falsifier.core.files import bundled
-from falsifier.core.model import Variable
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem, load_problems
-from falsifier.problem.options import changes_from_options
 from falsifier.problem.problem import Problem
-from falsifier.problem.ranges import input_range
-from falsifier.problem.spec import InputSection
-from falsifier.problem.starter import starter_spec
-from tests.fmu.fixtures import path as fmu_path
-
-AT = bundled("fmus") / "AT.fmu"
-GOOD = """
-[model]
-fmu = "AT.fmu"
-interface = "co-simulation"
-[inputs.throttle]
-control_points = 7
-[inputs.brake]
-value = 0
-[parameters]
-finalDrive = 3.0
-rollingLoad.range = [30, 50]
-[requirements.R]
-formula = "G[0,20] (speed <= 120)"
-"""
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    shutil.copy(AT, tmp_path / "AT.fmu")
-    return tmp_path
-
-
-def spec(folder: Path, text: str) -> str:
-    (folder / "my.toml").write_text(text)
-    return str(folder / "my.toml")
+from tests.problem.support import GOOD, echo, spec
 
 
 def test_at_is_bundled_with_its_ten_requirements() -> None:
@@ -142,68 +107,9 @@ def test_no_spec_is_needed(folder: Path) -> None:
     assert [r.name for r in every.space.inputs] == ["throttle", "brake"]
 
 
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        ("throttle=", "expected NAME="),
-        ("=0:1", "expected NAME="),
-        ("throttle=0:x", "'x' is not a number"),
-        ("throttle=0:1:many", "not a number of control points"),
-        ("throttle=0:1:3:cubic", "Known: pchip, linear, constant"),
-        ("throttle=1:0:3", "low < high"),
-    ],
-)
-def test_options_that_cannot_be_read_are_named(option: str, message: str) -> None:
-    with pytest.raises(SpecError, match=message):
-        changes_from_options(inputs=[option])
-
-
 def test_an_input_by_its_name_alone_is_as_the_spec_says(folder: Path) -> None:
     target = spec(folder, GOOD)
     assert load_problem(target, inputs={"throttle": None}).space == load_problem(target).space
-
-
-def test_a_range_that_nobody_knows_must_be_given() -> None:
-    with pytest.raises(SpecError, match=r"or --input u=LOW:HIGH\[:POINTS\]"):
-        input_range(Variable("u"), InputSection(control_points=3), file="my.toml", key="inputs.u")
-
-
-def test_the_starter_spec_loads_as_it_is(folder: Path) -> None:
-    text = starter_spec(Path("AT.fmu"), read_info(folder / "AT.fmu"))
-    problem = load_problem(spec(folder, text))
-    assert problem.name == "R1"
-    assert {r.name for r in problem.space.inputs} == {"throttle", "brake"}
-
-
-def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) -> None:
-    text = starter_spec(fmu_path("Echo_3"), read_info(fmu_path("Echo_3")))
-    path = tmp_path / "echo.toml"
-    path.write_text(text)
-    ranges = {r.name: (r.low, r.high, r.kind) for r in load_problem(str(path)).space.inputs}
-    assert ranges["in_Enumeration"] == (1, 3, "enumeration")
-    assert ranges["in_Boolean"] == (0, 1, "boolean")
-    assert ranges["in_Int8"] == (0, 1, "integer")
-    assert "# 1 = first, 2 = second, 3 = third\n[inputs.in_Enumeration]\nrange = [1, 3]\n" in text
-    assert "[inputs.in_Boolean]\nrange = [0, 1]\n" in text
-    assert "[inputs.in_Int8]\nrange = [0, 1]  # the FMU specifies no min and max: replace" in text
-
-
-ECHO = """
-[model]
-fmu = "{fmu}"
-stop_time = 1.0
-output_interval = 0.1
-[inputs]
-{inputs}
-[requirements.R]
-formula = "G (out_Int8 <= 1000)"
-"""
-
-
-def echo(tmp_path: Path, inputs: str) -> Problem:
-    path = tmp_path / "echo.toml"
-    path.write_text(ECHO.format(fmu=fmu_path("Echo_3").as_posix(), inputs=inputs))
-    return load_problem(str(path))
 
 
 @pytest.mark.parametrize(

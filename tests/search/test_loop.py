@@ -1,4 +1,3 @@
-import shutil
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -9,32 +8,19 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import ValueKind
 from falsifier.engines import make_engine
-from falsifier.errors import ChatError, JournalError
+from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
-from falsifier.search.journal import holds_run, read_journal
+from falsifier.search.journal import read_journal
 from falsifier.search.loop import Live, search
 from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
-from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
-from tests.problems import broken, lag_problem, never
-
-
-def run(
-    problem: Problem,
-    directory: Path | None = None,
-    *,
-    engine: str = "uniform",
-    budget: int = 20,
-    seed: int = 1,
-) -> Result:
-    """Run, or continue where the directory holds a run already."""
-    if directory is not None and holds_run(directory):
-        return resume(directory, problems=[problem])[0]
-    return falsify(problem, engine, budget=budget, seed=seed, directory=directory)
+from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
+from tests.problems import broken, never
+from tests.search.support import run
 
 
 def test_stops_at_the_first_confirmed_violation() -> None:
@@ -70,7 +56,7 @@ def test_robustness_zero_is_no_violation() -> None:
 
 
 def test_failed_simulations_are_evaluations_with_a_reason() -> None:
-    result = run(lag_problem("G[0,10] (x <= 2)", function=broken), budget=12)
+    result = run(lag_problem("G[0,10] (x <= 2)", response=broken), budget=12)
     failed = [e for e in result.evaluations if e.status == "failed"]
     assert failed
     assert len(failed) < 12
@@ -78,7 +64,7 @@ def test_failed_simulations_are_evaluations_with_a_reason() -> None:
 
 
 def test_a_model_that_always_fails_ends_the_run_early() -> None:
-    result = run(lag_problem(function=never), budget=1000)
+    result = run(lag_problem(response=never), budget=1000)
     assert result.status == "failed"
     assert result.spent.simulations == 10
     assert "RuntimeError: out of order" in result.reason
@@ -98,32 +84,6 @@ def test_interruption_loses_nothing(tmp_path: Path) -> None:
     assert [e.candidate.key for e in resumed.evaluations] == [
         e.candidate.key for e in run(problem).evaluations
     ]
-
-
-@pytest.mark.parametrize("engine", ["uniform", "corners", "sobol"])
-@pytest.mark.parametrize("keep", [1, 8, 17])
-def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine: str, keep: int) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    whole = run(problem, tmp_path / "whole", engine=engine)
-    lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    cut = tmp_path / "cut"
-    shutil.copytree(tmp_path / "whole", cut)
-    torn = lines[keep][: len(lines[keep]) // 2]
-    (cut / "journal.jsonl").write_bytes(b"".join(lines[:keep]) + torn)
-    resumed = run(problem, cut, engine=engine)
-    assert [(e.candidate.key, e.robustness) for e in resumed.evaluations] == [
-        (e.candidate.key, e.robustness) for e in whole.evaluations
-    ]
-    kinds = [r.kind for r in read_journal(cut)]
-    assert kinds.count("evaluated") == 20
-    assert kinds.count("asked") == 20
-
-
-def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    run(problem, tmp_path, budget=3)
-    with pytest.raises(JournalError, match="candidate 0 of the engine 'uniform' differs from the journal"):
-        resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
 
 
 def test_batches_are_told_in_the_order_of_asking() -> None:

@@ -13,8 +13,9 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
+from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, junit_report, markdown_report
-from tests.problems import hard, impossible, lag_problem
+from tests.problems import hard, impossible
 
 PROBLEMS = (impossible(), hard(), lag_problem("G[0,10] (x <= 0.8)", name="HARDER"))
 BUDGET = 24
@@ -78,7 +79,7 @@ def test_what_was_recorded_is_what_each_would_have_judged(directory: Path, runs:
 
 def test_one_must_be_named(directory: Path, runs: dict[str, Run]) -> None:
     assert load_run(directory, "HARDER").simulations == runs["HARDER"].simulations
-    with pytest.raises(JournalError, match="name one of NEVER, HARD, HARDER"):
+    with pytest.raises(JournalError, match="choose one of NEVER, HARD, HARDER"):
         load_run(directory)
     with pytest.raises(JournalError, match="NEVER, HARD, HARDER, not OTHER"):
         load_run(directory, "OTHER")

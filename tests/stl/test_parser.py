@@ -254,7 +254,7 @@ WORDS = TEMPORAL + LOGICAL + ARITHMETIC
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=1500)
 def test_any_text_is_a_formula_or_an_error(text: str) -> None:
     try:
         formula = parse(text)
@@ -265,7 +265,7 @@ def test_any_text_is_a_formula_or_an_error(text: str) -> None:
 
 
 @given(st.text(max_size=20))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_characters_are_a_formula_or_an_error(text: str) -> None:
     try:
         formula = parse(text)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from falsifier.campaigns.analysis import columns, frame, histories, load, load_run
-from falsifier.campaigns.analysis.curves import falsification_curve, improvements, thinned
 from falsifier.errors import JournalError
 from falsifier.problem.source import ProblemSource
 from falsifier.search.journal import (
@@ -13,7 +12,14 @@ from falsifier.search.journal import (
     write_manifest,
 )
 from falsifier.search.manifest import describe
-from falsifier.search.records import AskedRecord, EvaluatedRecord, VerdictRecord, line_of
+from falsifier.search.records import (
+    AskedRecord,
+    EvaluatedRecord,
+    Record,
+    VerdictRecord,
+    line_of,
+    parse_line,
+)
 from falsifier.search.request import RunRequest
 from tests.problems import easy
 
@@ -57,28 +63,26 @@ def test_a_damaged_line_is_named(campaign: Path, tmp_path: Path) -> None:
         load_run(tmp_path)
 
 
-def test_curves(campaign: Path) -> None:
-    runs = [run for run in load(campaign) if run.method.engine == "uniform"]
-    counts, shares = falsification_curve(runs)
-    found = sorted(run.simulations for run in runs if run.falsified)
-    assert counts.tolist() == [0, *found, 20]
-    assert shares.tolist() == [0, 0.25, 0.5, 0.5]
-    values = np.array([3.0, np.nan, 4.0, 1.0, 1.0, 0.5])
-    assert [c.tolist() for c in improvements(values)] == [[1, 4, 6], [3, 1, 0.5]]
-    assert [c.tolist() for c in improvements(np.array([np.nan, 2.0]))] == [[2], [2]]
-    assert [c.tolist() for c in thinned(values, 2)] == [[4, 6], [1, 0.5]]
-    assert len(thinned(values, 10)[0]) == 5
-
-
-def test_a_journal_of_ten_thousand_simulations_is_loaded(tmp_path: Path) -> None:
+def test_loading_reads_each_line_once_and_passes_over_the_candidates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     problem = easy()
     request = RunRequest(problems=(ProblemSource(target="python:tests.problems:easy"),))
     write_manifest(tmp_path, describe(request, [problem], "corners").model_dump(mode="json"))
     candidate = problem.space.decode([0.5, 0.25, 0.1, -0.3], origin="uniform").to_json()
     verdict = VerdictRecord(robustness=0.1, critical_time=3.0, predicate="x <= 0.9", values={"x": 0.8})
     with (tmp_path / "journal.jsonl").open("wb") as file:
-        for i in range(10_000):
+        for i in range(1000):
             asked = AskedRecord(first=i, n=1, candidates=[candidate], seconds=1e-4, requirement="EASY")
             done = EvaluatedRecord(index=i, status="ok", verdicts={"EASY": verdict}, seconds=0.01)
             file.write(line_of(asked, 2 * i + 1) + line_of(done, 2 * i + 2))
-    assert load_run(tmp_path).simulations == 10_000
+    parsed: list[str] = []
+
+    def counted(line: bytes, number: int) -> Record:
+        record = parse_line(line, number)
+        parsed.append(record.kind)
+        return record
+
+    monkeypatch.setattr("falsifier.search.journal.parse_line", counted)
+    assert load_run(tmp_path).simulations == 1000
+    assert parsed == ["evaluated"] * 1000

@@ -1,22 +1,23 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from numpy.typing import NDArray
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines import make_engine
+from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings, Surrogate
-from falsifier.engines.surrogate.arms import choose_arm, quality
-from falsifier.engines.surrogate.opening import opening
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
-from falsifier.testing import lag_problem
+from falsifier.testing import BIAS, FREE, START, Array, EngineContract, lag, lag_problem
+from tests.engines.support import HASTY
 
-Array = NDArray[np.float64]
+
+class TestContract(EngineContract):
+    def make(self, problem: Problem, seed: int) -> Engine:
+        return make_engine("surrogate", problem, seed=seed, settings=HASTY)
 
 
 def simulations_until_violation(problem: Problem, *, seed: int, budget: int) -> int | None:
@@ -54,6 +55,20 @@ def _oscillator(
     return {"x": column}
 
 
+def switch_problem(formula: str) -> Problem:
+    """The lag, of which only ``mode`` is seen: 1 where x is above a half, else 0."""
+    problem = lag_problem(formula, free=FREE)
+    info = ModelInfo(
+        "switch", variables=(Variable("u", causality="input"), Variable("mode", "integer", "output"))
+    )
+    experiment = replace(problem.experiment, outputs=("mode",))
+    return replace(problem, model=FunctionModel(_switch, info), experiment=experiment)
+
+
+def _switch(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
+    return {"mode": (lag(times, inputs, parameters)["x"] > 0.5).astype(np.float64)}
+
+
 def test_finds_a_resonance_that_no_constant_excites() -> None:
     # A constant overshoots to 2 at most; only inputs that switch with the period reach 4.
     problem = oscillator_problem("G[0,20] (x <= 4)")
@@ -62,28 +77,26 @@ def test_finds_a_resonance_that_no_constant_excites() -> None:
 
 
 def test_violates_a_condition_on_two_times_at_once() -> None:
-    # High by 2 s although below 0.2 at 1 s, and low again at the end: no extreme does that.
-    problem = lag_problem(
-        "(F[0,1] (y > 0.2)) or (G[2,4] (y < 1)) or (F[6,10] (y > -1))", free=True, parameters=0
-    )
+    # High by 2 s although below 0.1 at 1 s, and low again at the end: no extreme does that.
+    problem = lag_problem("(F[0,1] (x > 0.1)) or (G[2,4] (x < 0.5)) or (F[6,10] (x > -0.5))", free=FREE)
     counts = [simulations_until_violation(problem, seed=seed, budget=40) for seed in range(2)]
     assert all(count is not None for count in counts), counts
 
 
 def test_parameters_alone_are_tried_at_their_corners_first() -> None:
-    problem = lag_problem("G[0,10] (y < 3.99)", inputs=0, parameters=2)
+    problem = lag_problem("(G[0,0] (x < 0.99)) or (G[10,10] (x < 0.99))", inputs=0, parameters=[START, BIAS])
     for seed in range(6):
         count = simulations_until_violation(problem, seed=seed, budget=5)
         assert count is not None and count <= 4
 
 
 def test_uses_the_budget_up_without_a_false_claim_where_nothing_can_be_violated() -> None:
-    problem = lag_problem("G[0,10] (y <= 2.5)", free=True, parameters=0)
+    problem = lag_problem("G[0,10] (x <= 1.25)", free=FREE)
     assert simulations_until_violation(problem, seed=0, budget=12) is None
 
 
 def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
-    problem = lag_problem("G[0,7] (F[0,3] (mode == 0))", free=True, parameters=0)
+    problem = switch_problem("G[0,7] (F[0,3] (mode == 0))")
     engine = make_engine("surrogate", problem, seed=0)
     assert isinstance(engine, Surrogate)
     (candidate,) = engine.ask()
@@ -92,46 +105,8 @@ def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
     assert simulations_until_violation(problem, seed=1, budget=20) is not None
 
 
-def test_opening_follows_the_form_of_the_requirement() -> None:
-    settings = Settings()
-    plain = opening(settings, has_inputs=True, windows=(), needs_several=False)
-    assert plain == ("constant", "constant")
-    nested = opening(settings, has_inputs=True, windows=(2.0,), needs_several=True)
-    assert nested == ("switching", "constant", "switching", "constant")
-    joint = opening(settings, has_inputs=True, windows=(), needs_several=True)
-    assert joint == ("stepping", "stepping")
-    assert opening(settings, has_inputs=False, windows=(), needs_several=True) == ()
-
-
-def test_arms_are_judged_by_their_latest_ranks() -> None:
-    arms = ["a", "a", "b", "b"]
-    costs = [4.0, 3.0, 1.0, 2.0]
-    assert quality("b", arms, costs, window=2) > 0.5 > quality("a", arms, costs, window=2)
-    assert quality("c", arms, costs, window=2) == 0.5
-    rng = np.random.default_rng(0)
-    drawn = [choose_arm({"a": 0.1, "b": 0.9}, rng, least=0.1) for _ in range(400)]
-    assert 0.05 < drawn.count("a") / 400 < 0.15
-
-
-def test_predictions_without_simulation_rank_inputs() -> None:
-    problem = lag_problem("G[0,10] (y <= 9)", free=True, parameters=0)
-    engine = Surrogate(problem, seed=0)
-    assert engine.foresee(engine.ask(2)) == []
-    for _ in range(6):
-        (candidate,) = engine.ask()
-        engine.tell([evaluate(problem, candidate)])
-    constants = [
-        engine.layout.candidate(engine.layout.constant([level]), origin="t", rationale="t")
-        for level in (0.0, 0.5, 1.0)
-    ]
-    predicted = [verdict.robustness for verdict in engine.foresee(constants)]
-    true = [evaluate(problem, c).robustness for c in constants]
-    assert predicted == pytest.approx(true, abs=1.0)
-    assert predicted == sorted(predicted, reverse=True)
-
-
 def test_parallel_candidates_differ() -> None:
-    problem = replace(lag_problem(free=True))
+    problem = lag_problem(free=FREE, parameters=[START])
     engine = Surrogate(problem, seed=0, settings=Settings(pool=60, children=30, generations=2))
     engine.tell([evaluate(problem, c) for c in engine.ask(3)])
     assert len({c.key for c in engine.ask(6)}) == 6

@@ -4,7 +4,7 @@ from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.prompts import Prompt, View, build_prompt, trimmed, variant_named
 from falsifier.llm.prompts.trim import size
-from tests.problems import lag_problem
+from falsifier.testing import lag_problem
 
 
 def long_prompt() -> Prompt:

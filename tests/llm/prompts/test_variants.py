@@ -1,8 +1,6 @@
 """What each variant tells, on the transmission and on small problems."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -16,26 +14,10 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
-from falsifier.problem.loading import load_problem
-from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
-from tests.problems import lag_problem
-
-FIRST = (100, 100, 100, 0, 0, 0, 0, 0, 0, 0)
-
-
-@cache
-def transmission(name: str = "AT1") -> tuple[Problem, Evaluation]:
-    problem = load_problem(name)
-    return problem, evaluate(problem, problem.space.decode(FIRST))
-
-
-def told(problem: Problem, variant: str, evaluations: Sequence[Evaluation] = ()) -> tuple[str, str]:
-    prompt = build_prompt(View.of(problem), variant_named(variant), evaluations)
-    standing, changing = render(prompt)
-    assert (standing.role, changing.role) == ("system", "user")
-    return standing.content, changing.content
+from falsifier.testing import lag_problem
+from tests.llm.prompts.support import told, transmission
 
 
 def test_variants_only_add_parts_up_to_mp4() -> None:
@@ -97,24 +79,6 @@ def test_mp4_adds_the_critical_time() -> None:
     _, changing = told(problem, "MP4", [evaluation])
     assert "decided at t = 20.0 s with speed = 119.6" in changing
     assert "82.5 at 8.3 s" in changing
-
-
-def test_published_variants_tell_the_ten_most_recent_in_order() -> None:
-    problem = lag_problem()
-    evaluations = [evaluate(problem, problem.space.decode([0.05 * i] * 4)) for i in range(14)]
-    evaluations[12] = replace(evaluations[12], verdict=None, status="failed", reason="diverged")
-    _, changing = told(problem, "MP4", evaluations)
-    numbers = [line.split()[1] for line in changing.splitlines() if line.startswith("Sample ")]
-    assert numbers == [f"{i}:" for i in (4, 5, 6, 7, 8, 9, 10, 11, 12, 14)]
-    assert "10 of 13" in changing
-    assert "diverged" not in changing
-
-
-def test_free_samples_are_told_at_the_fixed_times_by_published_variants() -> None:
-    problem = lag_problem(free=Freedom(50, 0.1))
-    candidate = problem.space.admit(Candidate({"u": Signal((0.0, 5.0), (0.25, -0.75), "constant")}))
-    _, changing = told(problem, "MP4", [evaluate(problem, candidate)])
-    assert "u = [0.25, 0.25, -0.75, -0.75]" in changing
 
 
 class TestMP5:

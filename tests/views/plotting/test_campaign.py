@@ -5,23 +5,32 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from falsifier.campaigns.analysis import load
-from falsifier.views.plotting import plot_comparison, plot_history, plot_rates, save_figure
+from falsifier.search.journal import read_journal, recorded_evaluations
+from falsifier.views.plotting import plot_comparison, plot_history, plot_rates
+from tests.views.plotting.support import xs, ys
 
 
-def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path, tmp_path: Path) -> None:
+def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path) -> None:
     found = next(run for run in load(campaign) if run.falsified)
     figure = plot_history(found)
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
-    assert np.array_equal(lines["robustness"].get_ydata(), found.robustness)
-    assert np.array_equal(lines["counterexample"].get_xdata(), [found.simulations])
-    save_figure(figure, tmp_path / "history.svg")
-    assert (tmp_path / "history.svg").stat().st_size > 1000
+    recorded = list(recorded_evaluations(found.directory, read_journal(found.directory)).values())
+    assert ys(lines["robustness"]).tolist() == [e.robustness for e in recorded]
+    best = ys(lines["smallest so far"])
+    assert (np.diff(best) <= 0).all() and best[-1] == min(e.robustness or 0.0 for e in recorded)
+    assert xs(lines["counterexample"]).tolist() == [len(recorded)]
+    assert ys(lines["counterexample"]).tolist() == [recorded[-1].robustness]
+    assert figure.axes[0].get_title() == "HARD: uniform"
 
 
 def test_rates_end_at_the_share_of_falsified_runs(campaign: Path) -> None:
     axes = plot_rates(load(campaign)).axes[0]
     assert [line.get_label() for line in axes.get_lines()] == ["uniform (4 runs)", "corners (4 runs)"]
-    assert [np.asarray(line.get_ydata())[-1] for line in axes.get_lines()] == [0.5, 0.5]
+    assert [ys(line)[-1] for line in axes.get_lines()] == [0.5, 0.5]
+
+
+def test_without_runs_there_are_no_rates() -> None:
+    assert plot_rates([]).axes[0].get_lines() == []
 
 
 def test_a_comparison_has_a_bar_for_each_requirement_and_method(campaign: Path) -> None:

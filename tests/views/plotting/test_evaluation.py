@@ -1,21 +1,17 @@
-import numpy as np
+from pathlib import Path
+
 import pytest
 from matplotlib.figure import Figure
 
-from falsifier import Evaluation, evaluate, falsify
+from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
-from falsifier.views.plotting import (
-    plot_diagnosis,
-    plot_predictions,
-    plot_requirement,
-    plot_signal,
-    plot_trajectory,
-)
-from tests.problems import hard
-
-
-def simulated() -> Evaluation:
-    return evaluate(hard(), falsify(hard(), "corners", budget=1).evaluations[0].candidate)
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.search.result import Result
+from falsifier.testing import START, lag_problem
+from falsifier.views.plotting import plot, plot_evaluation, plot_requirement, png, save_figure
+from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.problems import hard, unusable
+from tests.views.plotting.support import simulated, xs, ys
 
 
 def test_a_requirement_is_drawn_on_given_axes_up_to_its_critical_time() -> None:
@@ -23,31 +19,59 @@ def test_a_requirement_is_drawn_on_given_axes_up_to_its_critical_time() -> None:
     assert evaluation.verdict is not None
     assert plot_requirement(hard(), evaluation, ax) is ax.get_figure()
     dots = [line for line in ax.get_lines() if line.get_marker() == "o"]
-    assert [np.asarray(dot.get_xdata()).tolist() for dot in dots] == [[evaluation.verdict.critical_time]]
+    assert [xs(dot).tolist() for dot in dots] == [[evaluation.verdict.critical_time]]
+    assert f"decided at t = {evaluation.verdict.critical_time:.5g} s" in ax.get_title()
 
 
-def test_a_failed_simulation_has_nothing_to_draw() -> None:
-    with pytest.raises(ValueError, match="nothing to plot"):
-        plot_requirement(hard(), Evaluation(Candidate(), "failed"))
+def test_an_evaluation_has_a_panel_for_what_is_compared_and_for_each_input() -> None:
+    problem = lag_problem(parameters=[START])
+    evaluation = evaluate(problem, problem.space.decode([1.0, 1.0, 0.5, 1.0, 0.25]))
+    figure = plot_evaluation(problem, evaluation)
+    output, input_ = figure.axes
+    assert (output.get_ylabel(), input_.get_ylabel()) == ("x [m]", "u [V]")
+    bound = output.get_lines()[1]
+    assert set(ys(bound).tolist()) == {0.9}
+    points = [line for line in input_.get_lines() if line.get_marker() == "o"]
+    assert ys(points[0]).tolist() == [1.0, 1.0, 0.5, 1.0]
+    low, high = input_.get_ylim()
+    assert low < -1.0 and high > 1.0, "the whole range of the input is seen"
+    assert figure.get_suptitle().startswith("LAG: robustness ")
+    assert figure.get_suptitle().endswith("x0 = 0.25")
 
 
-def test_a_diagnosis_names_the_window_of_each_operator() -> None:
-    ax = Figure().subplots()
-    plot_diagnosis(hard(), simulated(), ax)
-    assert [text.get_text().split()[0] for text in ax.texts] == ["G"]
+def test_bounds_are_drawn_in_their_window_only() -> None:
+    problem = lag_problem("G[2,5] (x <= 0.9)")
+    figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
+    times = xs(figure.axes[0].get_lines()[1])
+    assert (times[0], times[-1]) == pytest.approx((2.0, 5.0))
 
 
-def test_a_trajectory_has_a_panel_for_each_signal_and_a_signal_its_unit() -> None:
-    trajectory = simulated().trajectory
+def test_plot_takes_results_counterexamples_and_trajectories() -> None:
+    result = falsify(hard(), "corners", budget=10)
+    assert result.counterexample is not None
+    titles = [plot(shown).get_suptitle() for shown in (result, result.counterexample)]
+    assert titles[0] == titles[1]
+    assert f"HARD: robustness {result.counterexample.evaluation.robustness:+.5g}" in titles[0]
+    trajectory = result.counterexample.evaluation.trajectory
     assert trajectory is not None
-    assert [ax.get_ylabel() for ax in plot_trajectory(trajectory).axes] == ["x [m]", "u [V]"]
-    ax = Figure().subplots()
-    plot_signal(trajectory, "x", ax, label="one")
-    assert ax.get_lines()[0].get_label() == "one"
+    assert len(plot(trajectory).axes) == 2
 
 
-def test_predictions_lie_on_the_diagonal_where_they_are_right() -> None:
-    ax = Figure().subplots()
-    plot_predictions([1.0, -2.0], [1.0, -2.0], ax)
-    points = next(line for line in ax.get_lines() if line.get_marker() == ".")
-    assert np.array_equal(points.get_xdata(), points.get_ydata())
+def test_what_failed_has_nothing_to_draw() -> None:
+    failed = Evaluation(Candidate(), "failed")
+    for draw in (plot_requirement, plot_evaluation):
+        with pytest.raises(ValueError, match="nothing to plot"):
+            draw(hard(), failed)
+    result: Result = falsify(unusable(), "corners", budget=10)
+    assert result.status == "failed"
+    with pytest.raises(ValueError, match="every simulation failed"):
+        plot(result)
+
+
+def test_pictures_show_output_input_and_what_decided(tmp_path: Path) -> None:
+    figure = plot_evaluation(hard(), simulated())
+    save_figure(figure, tmp_path / "a.png")
+    save_figure(figure, tmp_path / "a.svg")
+    assert {OUTPUT, INPUT, CRITICAL} <= colours(tmp_path / "a.png")
+    assert {OUTPUT, INPUT, CRITICAL} <= colours(png(figure, dpi=130))
+    assert all(colour in (tmp_path / "a.svg").read_text() for colour in (OUTPUT, INPUT, CRITICAL))

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.views.report import html_report
+from tests.patience import HANG
 
 CHROMIUM = os.environ.get("CHROMIUM") or next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None
@@ -49,7 +50,7 @@ def chromium(*arguments: str, profile: Path) -> str:
         f"--user-data-dir={profile}",
         *arguments,
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=True)
     return done.stdout
 
 

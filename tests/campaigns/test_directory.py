@@ -1,0 +1,80 @@
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns.directory import (
+    campaign_mark,
+    is_campaign,
+    is_worked_on,
+    locked,
+    read_campaign,
+    run_directories,
+    run_directory,
+    write_campaign,
+)
+from falsifier.errors import JournalError
+from falsifier.search.run import falsify
+from tests.problems import impossible
+
+
+def test_a_campaign_says_what_was_asked_for(campaign: Path, tmp_path: Path) -> None:
+    record = read_campaign(campaign)
+    assert is_campaign(campaign) and not is_campaign(tmp_path)
+    assert len(record.runs) == 8
+    assert list(record.runs) == [p.name for p in run_directories(campaign)], "in its order"
+    write_campaign(tmp_path, record)
+    assert read_campaign(tmp_path) == record
+
+
+def test_a_campaign_is_known_by_its_content(campaign: Path, tmp_path: Path) -> None:
+    assert campaign_mark(tmp_path) == ""
+    write_campaign(tmp_path, read_campaign(campaign))
+    assert campaign_mark(tmp_path) == campaign_mark(campaign) != ""
+    (tmp_path / "campaign.json").write_text("{}")
+    assert campaign_mark(tmp_path) != campaign_mark(campaign)
+
+
+@pytest.mark.parametrize(("content", "named"), [(None, "campaign.json"), ("{}", "falsifier"), ("{", "JSON")])
+def test_a_campaign_that_cannot_be_read_is_named(tmp_path: Path, content: str | None, named: str) -> None:
+    if content is not None:
+        (tmp_path / "campaign.json").write_text(content)
+    with pytest.raises(JournalError, match=named) as caught:
+        read_campaign(tmp_path)
+    assert str(tmp_path) in str(caught.value)
+
+
+def test_only_runs_that_have_begun_are_listed(campaign: Path, tmp_path: Path) -> None:
+    record = read_campaign(campaign)
+    write_campaign(tmp_path, record)
+    assert run_directories(tmp_path) == []
+    second = list(record.runs)[1]
+    place = run_directory(tmp_path, second)
+    place.mkdir(parents=True)
+    (place / "manifest.json").write_bytes((run_directory(campaign, second) / "manifest.json").read_bytes())
+    assert run_directories(tmp_path) == [place]
+
+
+def test_a_run_is_its_own_only_one_and_a_folder_has_those_in_it(tmp_path: Path) -> None:
+    for name in ("b", "a"):
+        falsify(impossible(), "uniform", budget=1, directory=tmp_path / name)
+    (tmp_path / "notes").mkdir()
+    assert run_directories(tmp_path / "a") == [tmp_path / "a"]
+    assert run_directories(tmp_path) == [tmp_path / "a", tmp_path / "b"]
+    with pytest.raises(JournalError, match="notes"):
+        run_directories(tmp_path / "notes")
+
+
+def test_one_process_works_on_a_campaign_and_others_can_see_it(tmp_path: Path) -> None:
+    directory = tmp_path / "c"
+    assert not is_worked_on(directory)
+    with locked(directory):
+        assert is_worked_on(directory)
+        with pytest.raises(JournalError, match="another process"), locked(directory):
+            pass
+    assert not is_worked_on(directory)
+
+
+def test_the_lock_is_released_whatever_happens(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), locked(tmp_path):
+        raise KeyboardInterrupt
+    assert not is_worked_on(tmp_path)

@@ -1,0 +1,89 @@
+import shutil
+from pathlib import Path
+
+from falsifier.core.files import bundled
+from falsifier.fmu import read_info
+from falsifier.fmu.archive import this_platform
+from tests.command import ROOT, falsifier
+from tests.fmu.fixtures import path as fixture
+
+
+def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
+    done = falsifier("info", "AT.fmu", cwd=tmp_path)
+    assert done.code == 0, done.err
+    for part in (
+        "FMI 2.0",
+        "throttle",
+        "%",
+        "325",
+        "ft.lbf",
+        "Vehicle speed",
+        "co-simulation, model-exchange",
+    ):
+        assert part in done.out
+    described = falsifier("info", "AT.fmu", "--json", cwd=tmp_path).json
+    assert {v["name"] for v in described["variables"]} >= {"throttle", "brake", "speed", "rpm", "gear"}
+
+
+def test_info_says_what_cannot_be_simulated(tmp_path: Path) -> None:
+    fixtures = ROOT / "tests" / "fixtures" / "fmus"
+    clocked = falsifier("info", str(fixtures / "Clocked_3.fmu"), cwd=tmp_path)
+    assert "cannot be simulated: its input clocks (tick) need external ticks" in clocked.out
+    scheduled = falsifier("info", str(fixtures / "Scheduled_3.fmu"), cwd=tmp_path)
+    assert "scheduled execution is not supported" in scheduled.out
+
+
+def test_info_takes_a_spec_for_its_fmu(tmp_path: Path) -> None:
+    spec = bundled("specs") / "AT.toml"
+    assert (
+        falsifier("info", str(spec), cwd=tmp_path).out
+        == falsifier("info", str(bundled("fmus") / "AT.fmu"), cwd=tmp_path).out
+    )
+
+
+def test_init_writes_a_spec_that_runs(tmp_path: Path) -> None:
+    shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
+    assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0
+    again = falsifier("init", "car.fmu", cwd=tmp_path)
+    assert (again.code, "--force" in again.err) == (2, True)
+    assert falsifier("check", "car.toml", cwd=tmp_path).code == 0
+    assert falsifier("run", "car.toml", "--engine", "uniform", "--budget", "2", cwd=tmp_path).code == 0
+
+
+def test_check_names_all_requirements(tmp_path: Path) -> None:
+    done = falsifier("check", "AT", cwd=tmp_path)
+    assert done.code == 0
+    assert done.out.count(": ok") == 10
+
+
+def test_schema_describes_spec_files(tmp_path: Path) -> None:
+    schema = falsifier("schema", cwd=tmp_path).json
+    assert set(schema["properties"]) == {"model", "inputs", "parameters", "requirements", "profiles"}
+
+
+def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "tests" / "fixtures" / "fmus" / "Scheduled_3.fmu", tmp_path)
+    done = falsifier("init", "Scheduled_3.fmu", cwd=tmp_path)
+    assert done.code == 3
+    assert "scheduled execution is not supported" in done.err
+    assert not (tmp_path / "Scheduled_3.toml").exists()
+
+
+def test_info_says_how_far_half_the_step_moves_the_outputs(tmp_path: Path) -> None:
+    done = falsifier("info", str(fixture("Lag_2")), "--check", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "y changes by at most" in done.out
+
+
+def test_build_writes_an_fmu_for_this_platform(tmp_path: Path) -> None:
+    shutil.copy(fixture("Lag_2sources"), tmp_path / "lag.fmu")
+    done = falsifier("build", "lag.fmu", "-o", "built.fmu", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert this_platform() in read_info(tmp_path / "built.fmu").platforms
+    missing = falsifier("build", "no.fmu", "-o", "x.fmu", cwd=tmp_path)
+    assert missing.code == 2 and not (tmp_path / "x.fmu").exists()
+
+
+def test_schemas_of_records_are_printed_too(tmp_path: Path) -> None:
+    for what in ("manifest", "journal", "campaign"):
+        assert falsifier("schema", "--of", what, cwd=tmp_path).json

@@ -1,0 +1,55 @@
+import json
+from pathlib import Path
+
+from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
+from tests.command import falsifier
+from tests.llm.server import Step, serving
+
+
+def test_the_printed_prompt_is_what_is_sent(tmp_path: Path) -> None:
+    printed = falsifier("prompt", "AT1", "--variant", "MP4", "--json", cwd=tmp_path)
+    with serving(reply(FULL)) as server:
+        falsifier(*at1(server.url), cwd=tmp_path, env=ENV)
+        sent = server.received[0].body["messages"]
+    assert json.loads(printed.out) == sent
+
+
+def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
+    with serving(reply(BRAKE_LATE), reply(FULL)) as server:
+        falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
+        sent = server.received[1].body["messages"]
+    printed = falsifier(
+        *("prompt", "AT1", "--variant", "MP4", "--run", "run", "--samples", "1", "--json"), cwd=tmp_path
+    )
+    assert json.loads(printed.out) == sent
+
+
+def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
+    first = falsifier("prompt", "AT1", "--engine", "hybrid", cwd=tmp_path)
+    assert "Propose the first 2 different samples" in first.out
+    assert "--- tool" not in first.out
+    falsifier("run", "AT1", "--engine", "corners", "--out", "run", cwd=tmp_path)
+    later = ("prompt", "AT1", "--engine", "hybrid", "--run", "run", "--anonymous")
+    text = falsifier(*later, cwd=tmp_path).out
+    assert "Propose the next 5 different samples" in text
+    assert "--- tool predict, offered while" in text and "At most 3 calls" in text
+    shown = falsifier(*later, "--json", cwd=tmp_path).json
+    assert [m["role"] for m in shown["messages"]] == ["system", "user"]
+    (tool,) = shown["tools"]
+    item = tool["parameters"]["properties"]["candidates"]["items"]
+    assert item["properties"]["signals"]["items"]["properties"]["name"]["enum"] == ["u1", "u2"]
+    assert "throttle" not in text
+
+
+def test_a_prompt_of_fewer_samples_needs_a_run(tmp_path: Path) -> None:
+    done = falsifier("prompt", "AT1", "--samples", "1", cwd=tmp_path)
+    assert (done.code, "--run" in done.err) == (2, True)
+
+
+def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:
+    with serving(Step("ready")) as server:
+        done = falsifier("llm", "check", "openai/mine", "--api-base", server.url, cwd=tmp_path, env=ENV)
+    assert done.code == 0, done.err
+    for part in ("openai/mine", "'ready'", "120 tokens", "OPENAI_API_KEY"):
+        assert part in done.out
+    assert ENV["OPENAI_API_KEY"] not in done.out + done.err

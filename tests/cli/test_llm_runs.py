@@ -1,0 +1,93 @@
+"""Runs led by a language model, their record and their resumption, against a server on this machine."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from falsifier.search.journal import read_journal, write_manifest
+from falsifier.search.records import ExchangeRecord
+from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
+from tests.command import falsifier
+from tests.llm.server import Step, serving
+
+
+def test_two_replies_falsify_at1(tmp_path: Path) -> None:
+    with serving(reply(BRAKE_LATE), reply(FULL, rationale="full throttle throughout")) as server:
+        done = falsifier(*at1(server.url, "--out", "run"), "--json", cwd=tmp_path, env=ENV)
+        first, second = (request.texts[-1] for request in server.received)
+    assert done.code == 1, done.err
+    found = done.json
+    assert found["spent"]["simulations"] == found["spent"]["calls"] == 2
+    assert found["counterexample"]["robustness"] == pytest.approx(-0.2133, abs=1e-3)
+    assert found["counterexample"]["rationale"] == "full throttle throughout"
+    assert "best robustness +0.418" in done.err
+    assert "Sample" not in first
+    for part in ("+0.419", "82.5", "81.5", "20.0 s", "119.6"):
+        assert part in second, part
+    records = [r for r in read_journal(tmp_path / "run") if isinstance(r, ExchangeRecord)]
+    assert records[1].exchange["messages"][-1]["content"] == second
+    assert "full throttle throughout" in records[1].exchange["reply"]["text"]
+    everything = b"".join(p.read_bytes() for p in (tmp_path / "run").rglob("*") if p.is_file())
+    assert b"sk-test-not-a-key" not in everything + done.err.encode() + done.out.encode()
+
+
+def test_points_between_tags_are_understood(tmp_path: Path) -> None:
+    point = Step(f"I go to the limit. <point>{', '.join(map(str, [*FULL, 0, 0, 0]))}</point>")
+    with serving(point) as server:
+        done = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
+    assert done.code == 1, done.err
+
+
+def test_bad_replies_are_answered_with_what_was_wrong(tmp_path: Path) -> None:
+    with serving(Step("no idea"), reply([120, *FULL[1:]]), reply(FULL)) as server:
+        done = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
+        second, third = (request.texts[-1] for request in server.received[1:])
+    assert done.code == 1, done.err
+    assert done.json["spent"]["simulations"] == 1
+    assert done.json["spent"]["calls"] == 3
+    assert "JSON" in second
+    assert "'throttle' at t = 0 s: 120 is outside its range [0, 100]" in third
+
+
+def test_three_bad_replies_end_the_run_with_everything_kept(tmp_path: Path) -> None:
+    repeated = reply(BRAKE_LATE)
+    with serving(repeated, repeated, repeated, repeated) as server:
+        done = falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
+        assert len(server.received) == 4
+    assert done.code == 3
+    assert "repeats sample 1" in done.out
+    kinds = [r.kind for r in read_journal(tmp_path / "run")]
+    assert kinds == ["exchange", "asked", "evaluated", "exchange", "exchange", "exchange", "ended"]
+
+
+def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
+    with serving(reply(BRAKE_LATE), Step(status=401)) as server:
+        broken = falsifier(*at1(server.url, "--out", "run", "--no-cache"), cwd=tmp_path, env=ENV)
+        assert broken.code == 3
+        assert "OPENAI_API_KEY" in broken.out
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    with serving(reply(FULL)) as server:
+        manifest["request"]["llm"]["api_base"] = server.url
+        write_manifest(tmp_path / "run", manifest)
+        resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
+        assert len(server.received) == 1
+        assert "+0.419" in server.received[0].texts[-1]
+    assert resumed.code == 1, resumed.err
+    assert resumed.json["spent"]["calls"] == 2
+
+
+def test_equal_questions_are_answered_from_disk(tmp_path: Path) -> None:
+    with serving(reply(FULL)) as server:
+        assert falsifier(*at1(server.url), cwd=tmp_path, env=ENV).code == 1
+        again = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
+        assert len(server.received) == 1
+    assert again.code == 1
+    assert again.json["spent"]["cost"] == 0
+
+
+def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> None:
+    done = falsifier("run", "AT1", "--llm", "openai/gpt-5-mini", cwd=tmp_path)
+    assert done.code == 2
+    assert "set OPENAI_API_KEY" in done.err
+    assert not (tmp_path / "runs").exists()

@@ -1,0 +1,33 @@
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.cli.support import bench
+
+
+def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> None:
+    bench(command, "--out", "c", "--quiet")
+    written = command("report", "c", "--junit", "j.xml", "--arch-comp", "v.csv")
+    assert written.exit_code == 0, written.output
+    assert (tmp_path / "c" / "report.html").read_text().startswith("<!DOCTYPE html>")
+    assert "<testsuites" in (tmp_path / "j.xml").read_text()
+    assert (tmp_path / "v.csv").read_text().count("yes") == 2
+    assert command("report", "c", "--markdown").stdout.startswith("# Falsification report: c")
+    run = next((tmp_path / "c" / "runs").iterdir())
+    command("report", str(run), "-o", "one.html")
+    assert "1 requirement, 1 run," in (tmp_path / "one.html").read_text()
+
+
+def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "v.csv").write_text(
+        "system,property,instance,input,parameters,falsified,simulations\n"
+        'AT,AT2,2,"[0 100 0]",[],1,2\n'
+        'AT,AT2,2,"[0 0 0]",[],1,2\n'
+    )
+    result = command("validate", "v.csv")
+    assert result.exit_code == 1
+    assert "row 1, AT2: reproduced, robustness -" in result.stdout
+    assert "row 2, AT2: not reproduced, robustness +" in result.stdout
+    assert "1 of 2 counterexamples accepted" in result.stdout
+    (found, other) = json.loads(command("validate", "v.csv", "--json").stdout)
+    assert (found["holds"], other["holds"]) == (True, False)

@@ -1,0 +1,133 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.files import bundled
+from falsifier.search.journal import read_journal, write_manifest
+from tests.command import ROOT, falsifier, listen_to_interrupts
+from tests.patience import HANG, wait_until
+from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+
+
+def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
+    done = falsifier("run", "AT1", "--engine", "corners", "--json", "--out", "run", cwd=tmp_path)
+    assert done.code == 1, done.err
+    found = done.json["counterexample"]
+    assert done.json["status"] == "falsified"
+    assert found["robustness"] == pytest.approx(-0.2133, abs=1e-3)
+    assert found["critical_time"] == 20
+    assert found["predicate"] == "speed <= 120"
+    assert set(found["signals"]["throttle"]["values"]) == {100}
+    assert set(found["signals"]["brake"]["values"]) == {0}
+    run = tmp_path / "run"
+    assert {p.name for p in run.iterdir()} >= {"manifest.json", "journal.jsonl", "counterexample.json"}
+    assert {OUTPUT, INPUT, CRITICAL} <= colours(run / "counterexample.png")
+    manifest = json.loads((run / "manifest.json").read_text())
+    assert len(manifest["hashes"]) == 2
+    assert manifest["request"]["seed"] == 0
+    assert "confirmed" in done.err
+    assert json.loads((run / "counterexample.json").read_text())["robustness"] == found["robustness"]
+
+
+def test_the_text_names_what_was_found_and_where_it_is(tmp_path: Path) -> None:
+    done = falsifier("run", "AT1", "--engine", "corners", "--quiet", "--out", "run", cwd=tmp_path)
+    assert done.err == ""
+    for part in (
+        "AT1: falsified after",
+        "-0.213",
+        "critical time  20 s",
+        "speed = 120.2",
+        "constant 100",
+        "run",
+    ):
+        assert part in done.out
+
+
+def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
+    done = falsifier(
+        "run", "AT1", "--engine", "uniform", "--budget", "3", "--param", "finalDrive=3", cwd=tmp_path
+    )
+    assert done.code == 0, done.err
+    assert "not falsified after 3 simulations" in done.out
+
+
+def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path) -> None:
+    """A stand-in for litellm that cannot be imported is never asked for."""
+    (tmp_path / "litellm.py").write_text("raise ImportError('this is imported')")
+    path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    wrong = {"--variant": "MP9", "--fallback": "corner", "--engine": "uniform"}
+    for option, value in wrong.items():
+        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path)
+        assert (done.code, "imported" in done.err) == (2, False), done.err
+    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path)
+    assert (done.code, "OPENAI_API_KEY" in done.err) == (2, True), done.err
+    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path)
+    assert (done.code, "imported" in done.err) == (3, True), done.err
+
+
+def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path) -> None:
+    fmu, stl = str(bundled("fmus") / "AT.fmu"), "G[0,20] (speed <= 200)"
+    common = ("--engine", "corners", "--budget", "1", "--quiet", "--json")
+    done = falsifier("run", fmu, "--stl", stl, "--input", "throttle", *common, cwd=tmp_path)
+    assert done.json["best"]["signals"].keys() == {"throttle"}
+    assert done.json["best"]["signals"]["throttle"]["values"] == [100.0] * 5
+    manifest = json.loads((Path(tmp_path) / done.json["directory"] / "manifest.json").read_text())
+    assert [(i["name"], i["low"], i["high"]) for i in manifest["inputs"]] == [("throttle", 0.0, 100.0)]
+
+
+def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:
+    (tmp_path / "bad.fmu").write_bytes(b"this is no archive")
+    done = falsifier("run", "bad.fmu", "--stl", "G (x >= 0)", cwd=tmp_path)
+    assert done.code == 3
+    assert "bad.fmu" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "from falsifier.cli import main; main()", "run", "AT1"]
+    options = ["--engine", "uniform", "--budget", "1000000", "--out", "run"]
+    process = subprocess.Popen(
+        [*command, *options],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        preexec_fn=listen_to_interrupts,
+    )
+    journal = tmp_path / "run" / "journal.jsonl"
+    wait_until(lambda: journal.exists() and journal.read_text().count('"evaluated"') > 5)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=HANG)
+    assert process.returncode == 130
+    assert "interrupted" in out
+    kept = sum(r.kind == "evaluated" for r in read_journal(tmp_path / "run"))
+    assert kept > 5
+    request = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    request["request"]["budget"]["simulations"] = kept + 2
+    write_manifest(tmp_path / "run", request)
+    resumed = falsifier("resume", "run", cwd=tmp_path)
+    assert resumed.code == 0, resumed.err
+    assert f"{kept} evaluations from the journal" in resumed.err
+    assert f"after {kept + 2} simulations" in resumed.out
+
+
+def test_a_run_directory_is_not_overwritten(tmp_path: Path) -> None:
+    options = ("run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "run", "--quiet")
+    assert falsifier(*options, cwd=tmp_path).code == 0
+    again = falsifier(*options, cwd=tmp_path)
+    assert again.code == 2
+    assert "falsifier resume run" in again.err
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = falsifier("run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "file/run", cwd=tmp_path)
+    assert done.code == 2
+    assert "file/run" in done.err
+    assert "Traceback" not in done.err

@@ -1,0 +1,48 @@
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.files import bundled, write_whole
+
+
+def test_text_and_bytes_are_written_into_folders_that_are_made(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "folder" / "a.txt"
+    assert write_whole(path, "grüß\n") == path
+    assert path.read_bytes() == "grüß\n".encode()
+    write_whole(path, b"\0\1")
+    assert path.read_bytes() == b"\0\1"
+    assert list(path.parent.iterdir()) == [path], "nothing else is left"
+
+
+def test_a_crash_while_writing_leaves_the_old_content(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_whole(tmp_path / "a.txt", "old")
+
+    def full(_: int) -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="no space"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+
+
+def test_specs_and_fmus_come_with_the_package() -> None:
+    spec = tomllib.loads((bundled("specs") / "AT.toml").read_text())
+    assert (bundled("specs") / spec["model"]["fmu"]).is_file()
+    assert (bundled("fmus") / "AT.fmu").is_file()
+
+
+def test_what_lies_inside_the_package_goes_before_what_lies_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "site" / "package"
+    for folder in (package / "core", package.parent / "specs"):
+        folder.mkdir(parents=True)
+    monkeypatch.setattr("falsifier.core.files.__file__", str(package / "core" / "files.py"))
+    assert bundled("specs") == package.parent / "specs"
+    (package / "specs").mkdir()
+    assert bundled("specs") == package / "specs"

@@ -1,0 +1,70 @@
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.space import Freedom
+from falsifier.counterexamples.export.inputs import InputTable, input_table
+from falsifier.counterexamples.export.tables import matlab_names, write_csv, write_json, write_mat, write_ssv
+from falsifier.testing import lag_problem
+
+
+def test_the_ssv_is_valid_and_reads_back(tmp_path: Path) -> None:
+    fmpy_ssd = pytest.importorskip("fmpy.ssp.ssd")
+    path = write_ssv({"x.y[1]": 0.1 + 0.2, "phi<0": -1.5}, "A & B", tmp_path / "s.ssv")
+    read = fmpy_ssd.read_ssv(str(path))  # validates against the schema of SSP 1.0
+    assert read.name == "A & B"
+    assert {p.name: float(p.value) for p in read.parameters} == {"x.y[1]": 0.1 + 0.2, "phi<0": -1.5}
+
+
+def test_the_mat_file_holds_time_and_value_by_names_that_matlab_accepts(tmp_path: Path) -> None:
+    problem = lag_problem(free=Freedom(10, 0.1))
+    table = input_table(problem, Candidate({"u": Signal((0.0, 5.0), (0.0, 1.0), "constant")}))
+    content = loadmat(write_mat(table, {"a.b[2]": 3.0}, tmp_path / "i.mat"))
+    assert content["u"].tolist() == [[0.0, 0.0], [5.0, 0.0], [5.0, 1.0], [10.0, 1.0]]
+    assert content["start_values"]["a_b_2_"][0, 0].item() == 3.0
+    assert [[cell.item() for cell in row] for row in content["names"]] == [["u", "u"], ["a_b_2_", "a.b[2]"]]
+    assert matlab_names(["1 x", "1_x", "end"]) == {"1 x": "x1_x", "1_x": "x1_x_2", "end": "end_2"}
+
+
+def test_the_csv_reads_back_exactly(tmp_path: Path) -> None:
+    table = InputTable(
+        np.array([0.0, 0.1 + 0.2, 1.0]), {"u": np.array([1 / 3, -0.0, 1e-300]), "a,b": np.ones(3)}
+    )
+    path = write_csv(table, tmp_path / "i.csv")
+    with path.open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == ["time", "u", "a,b"]
+    assert [[float(cell) for cell in row] for row in rows] == [
+        [0.0, 1 / 3, 1.0],
+        [0.1 + 0.2, 0.0, 1.0],
+        [1.0, 1e-300, 1.0],
+    ]
+
+
+def test_without_start_values_the_files_are_empty_and_valid(tmp_path: Path) -> None:
+    assert json.loads(write_json({}, tmp_path / "s.json").read_text()) == {}
+    table = InputTable(np.array([0.0, 1.0]), {})
+    content = loadmat(write_mat(table, {}, tmp_path / "i.mat"))
+    assert content["start_values"].size == 0
+    assert content["names"].size == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "accepted"),
+    [
+        ("u", "u"),
+        ("der(x)", "der_x_"),
+        ("_x", "x_x"),
+        ("1st", "x1st"),
+        ("größe", "gr__e"),
+        ("a" * 80, "a" * 63),
+    ],
+)
+def test_names_are_those_that_matlab_accepts(name: str, accepted: str) -> None:
+    assert matlab_names([name]) == {name: accepted}

@@ -1,0 +1,65 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.counterexamples.regression import check
+from falsifier.counterexamples.store import Database
+from falsifier.errors import SimulationError
+from falsifier.evaluation.confirm import Confirmation, confirm
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
+from falsifier.testing import lag_problem
+from tests.problems import never
+
+
+def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 0.5)")
+    database = Database(tmp_path)
+    first = check(problem, engine="uniform", budget=100, database=database)
+    assert first.counterexample is not None
+    assert first.result is not None
+    assert first.counterexample.evaluation.candidate.signals["u"].values == (1.0,) * 4
+    assert first.file is not None
+    second = check(problem, engine="uniform", budget=100, database=database)
+    assert second.result is None
+    assert second.file == first.file
+    assert [r.status for r in second.replayed] == ["violates"]
+    mended = replace(problem, parameters={"gain": 0.4})
+    third = check(mended, engine="uniform", budget=5, database=database)
+    assert (third.counterexample, third.file) == (None, None)
+    assert [r.status for r in third.replayed] == ["does not violate"]
+    assert third.result is not None
+    assert third.result.spent.simulations == 5
+
+
+def test_a_check_that_cannot_simulate_is_an_error() -> None:
+    with pytest.raises(SimulationError, match="all 10 simulations failed"):
+        check(lag_problem(response=never), engine="uniform")
+
+
+def test_without_a_database_nothing_is_stored(tmp_path: Path) -> None:
+    checked = check(lag_problem("G[0,10] (x <= 0.5)"), engine="corners", budget=10)
+    assert checked.counterexample is not None
+    assert (checked.file, checked.replayed) == (None, ())
+
+
+def test_a_requirement_that_holds_uses_its_budget_up() -> None:
+    checked = check(lag_problem("G[0,10] (x <= 2)"), engine="uniform", budget=Budget(4))
+    assert (checked.counterexample, checked.file) == (None, None)
+    assert checked.result is not None and checked.result.spent.simulations == 4
+
+
+def test_what_cannot_be_confirmed_when_shrunk_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Evaluation] = []
+
+    def refute_the_shrunk(problem: Problem, evaluation: Evaluation) -> Confirmation:
+        calls.append(evaluation)
+        return replace(confirm(problem, evaluation), outcome="refuted")
+
+    monkeypatch.setattr("falsifier.counterexamples.regression.confirm", refute_the_shrunk)
+    checked = check(lag_problem("G[0,10] (x <= 0.5)"), engine="uniform", budget=100)
+    assert checked.counterexample is not None and checked.result is not None
+    assert checked.counterexample == checked.result.counterexample
+    assert len(calls) == 1

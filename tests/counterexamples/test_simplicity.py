@@ -1,0 +1,47 @@
+from dataclasses import replace
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.space import Freedom, ParameterRange
+from falsifier.counterexamples.simplicity import digits, rest_value, rounder, simplicity
+from falsifier.testing import lag_problem
+
+FREE = Freedom(max_control_points=20, min_interval=0.1)
+
+
+def test_the_order_of_simplicity() -> None:
+    problem = lag_problem(free=FREE)
+
+    def key(times: tuple[float, ...], values: tuple[float, ...], interpolation: str = "linear") -> object:
+        return simplicity(problem, Candidate({"u": Signal(times, values, interpolation)}))  # type: ignore[arg-type]
+
+    in_order = [
+        key((0.0,), (0.0,), "constant"),  # at rest
+        key((0.0,), (0.0,)),  # the same as a line
+        key((0.0, 5.0), (0.0, 0.0)),  # with a point more
+        key((0.0,), (1.0,)),  # at a bound
+        key((0.0,), (0.5,)),  # a round number
+        key((0.0,), (0.51,)),  # a longer one
+        key((0.0, 5.0), (0.0, 1.0)),  # a change
+        key((0.0, 5.1), (0.0, 1.0)),  # at a longer time
+        key((0.0, 5.0, 6.0), (0.0, 1.0, 0.0)),  # two changes between the same values
+        key((0.0, 5.0, 6.0), (0.0, 1.0, 0.5)),  # a third value
+    ]
+    assert in_order == sorted(in_order)  # type: ignore[type-var]
+    assert len(set(map(repr, in_order))) == len(in_order)
+
+
+def test_rest_is_the_start_value_within_the_range() -> None:
+    problem = lag_problem(parameters=(ParameterRange("x0", 0.5, 1.0, nominal=0.0),))
+    assert rest_value(problem, "u") == 0.0
+    assert rest_value(problem, "x0") is None
+    moved = replace(problem.space.inputs[0], low=0.2)
+    space = replace(problem.space, inputs=(moved,))
+    assert rest_value(replace(problem, space=space), "u") is None
+
+
+def test_digits_and_rounder_numbers() -> None:
+    assert [digits(v) for v in (0.0, 100.0, 0.05, -33.25, 1e-7)] == [1, 1, 1, 4, 1]
+    assert list(rounder(33.25)) == [30.0, 40.0, 33.0, 34.0, 33.2, 33.3]
+    assert list(rounder(-0.12)) == [-0.1, -0.2]
+    assert list(rounder(7.0)) == []

@@ -1,0 +1,84 @@
+"""What engines are tested on: the contract by name, and a bowl over the box of a small problem."""
+
+import numpy as np
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines import make_engine
+from falsifier.engines.protocol import Engine
+from falsifier.engines.surrogate import Settings
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.testing import FREE, START, EngineContract, lag_problem
+
+# Neither the contract nor who proposes when depends on how thorough a plan is.
+HASTY = Settings(
+    cells=20, features=16, pool=40, children=20, generations=2, vertex_steps=1, region_start=3, trial=2
+)
+TARGET = np.array([0.6, -0.2, 0.15, -0.75, 0.35])
+
+
+class NamedEngine(EngineContract):
+    """The contract of the engine of this name."""
+
+    engine: str
+
+    def make(self, problem: Problem, seed: int) -> Engine:
+        return make_engine(self.engine, problem, seed=seed)
+
+
+def needs_botorch() -> None:
+    """Skip where botorch is not installed."""
+    pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
+
+
+def box_problem() -> Problem:
+    """Five coordinates: four control points and a parameter."""
+    return lag_problem(parameters=[START])
+
+
+def wide_problem(formula: str = "G[0,10] (x <= 9)", *, inputs: int = 1) -> Problem:
+    """Free inputs in [-2, 2] that cannot violate: x follows them with a lag of 1 s."""
+    return lag_problem(formula, limit=2.0, free=FREE, inputs=inputs)
+
+
+def bowl(problem: Problem, candidate: Candidate) -> Evaluation:
+    """Judge by the distance from a point of the box; the least robustness is 1."""
+    from falsifier.stl import Verdict
+
+    distance = problem.space.encode(candidate) - TARGET
+    return Evaluation(candidate, verdict=Verdict(1.0 + 4.0 * float(distance @ distance), 0.0, "bowl"))
+
+
+def best_of(name: str, *, simulations: int) -> float:
+    """Least robustness that an engine finds in the bowl."""
+    problem = box_problem()
+    engine = make_engine(name, problem, seed=1)
+    found = []
+    for _ in range(simulations):
+        evaluation = bowl(problem, *engine.ask())
+        engine.tell([evaluation])
+        assert evaluation.robustness is not None
+        found.append(evaluation.robustness)
+    return min(found)
+
+
+def assert_learns(name: str, *, simulations: int) -> None:
+    """It gets deeper into the bowl than random points do."""
+    assert best_of(name, simulations=simulations) < 1.3 < best_of("uniform", simulations=simulations)
+
+
+def assert_batch_differs(name: str) -> None:
+    """Candidates that are asked for at once are all different."""
+    assert len({c.key for c in make_engine(name, box_problem(), seed=3).ask(12)}) == 12
+
+
+def assert_batch_spreads(name: str) -> None:
+    """In a valley that it knows it does not ask for the same place several times at once."""
+    problem = box_problem()
+    engine = make_engine(name, problem, seed=2)
+    for _ in range(20):
+        engine.tell([bowl(problem, *engine.ask())])
+    batch = np.array([problem.space.encode(c) for c in engine.ask(4)])
+    distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
+    assert distances.min() > 5e-3

@@ -1,0 +1,44 @@
+import numpy as np
+
+from falsifier.engines.corner_walk import CornerWalk
+
+
+def test_additive_effects_are_found_within_one_simulation_per_input() -> None:
+    weights = np.array([3.0, 0.0, -1.0, 2.0])
+    best = float(np.minimum(weights, 0).sum())
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        walk = CornerWalk(4)
+        costs = []
+        for _ in range(5):
+            levels = walk.next(rng)
+            assert levels is not None
+            costs.append(float(weights @ np.array(levels)))
+            walk.learn(levels, costs[-1])
+        assert min(costs) == best
+
+
+def test_walk_ends_after_all_corners_and_knows_when_it_is_settled() -> None:
+    rng = np.random.default_rng(0)
+    walk = CornerWalk(2)
+    seen = set()
+    while (levels := walk.next(rng)) is not None:
+        seen.add(levels)
+        walk.learn(levels, float(sum(levels)))
+    assert len(seen) == 4
+    assert walk.settled
+
+
+def test_a_failed_corner_is_tried_once_and_never_built_upon() -> None:
+    rng = np.random.default_rng(3)
+    walk = CornerWalk(3)
+    assert not walk.settled
+    first = walk.next(rng)
+    assert first is not None
+    walk.learn(first, None)
+    second = walk.next(rng)
+    assert second is not None
+    walk.learn(second, 1.0)
+    third = walk.next(rng)
+    assert third not in (None, first, second)
+    assert sum(a != b for a, b in zip(second, third or (), strict=True)) == 1, "the best one is built upon"

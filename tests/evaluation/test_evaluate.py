@@ -1,0 +1,119 @@
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.errors import CandidateError, SimulationError
+from falsifier.evaluation.evaluate import evaluate, judge, monitor_for, simulate
+from falsifier.problem.loading import load_problem
+from falsifier.testing import START, lag_problem
+from tests.problems import broken, never
+
+FULL = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
+
+
+def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> None:
+    problem = lag_problem()
+    found = evaluate(problem, FULL)
+    assert (found.status, found.reason, found.violated) == ("ok", "", True)
+    # x(10) of x' = 1 - x by Euler with 0.1 s: 1 - 0.9**100
+    assert found.robustness == pytest.approx(0.9 - (1 - 0.9**100))
+    assert found.trajectory is not None
+    assert found.trajectory.names == ("x", "u")
+    assert found.trajectory.units == {"x": "m", "u": "V"}
+    assert found.seconds >= 0
+
+
+def test_it_is_pure_and_the_same_in_another_process() -> None:
+    problem = lag_problem()
+    one, other = (
+        replace(evaluate(p, FULL), seconds=0.0) for p in (problem, pickle.loads(pickle.dumps(problem)))
+    )
+    assert one.verdict == other.verdict
+    assert one.trajectory is not None and other.trajectory is not None
+    np.testing.assert_array_equal(one.trajectory["x"], other.trajectory["x"])
+
+
+def test_a_parameter_of_the_candidate_goes_before_the_problems() -> None:
+    problem = replace(lag_problem("G[0,0] (x <= 0.2)", parameters=[START]), parameters={"x0": 0.9})
+    assert evaluate(problem, Candidate(FULL.signals, {"x0": 0.1})).robustness == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("response", [broken, never])
+def test_a_simulation_that_fails_is_an_evaluation_with_a_reason(response: object) -> None:
+    found = evaluate(lag_problem(response=response), FULL)  # type: ignore[arg-type]
+    assert (found.status, found.verdict, found.trajectory) == ("failed", None, None)
+    assert (found.robustness, found.violated) == (None, False)
+    assert found.reason.startswith("lag: ")
+
+
+def test_how_a_simulation_ended_and_what_it_said_are_kept() -> None:
+    class Crashing:
+        info = lag_problem().info
+
+        def simulate(self, *_: object) -> None:
+            raise SimulationError("gone", status="crashed", log=("last words",))
+
+        def close(self) -> None:
+            pass
+
+    found = evaluate(replace(lag_problem(), model=Crashing()), FULL)  # type: ignore[arg-type]
+    assert (found.status, found.reason, found.log) == ("crashed", "gone", ("last words",))
+
+
+def test_what_cannot_be_judged_is_a_failed_evaluation() -> None:
+    found = evaluate(lag_problem("G[0,10] (log(x - 5) <= 0)"), FULL)
+    assert (found.status, found.trajectory) == ("failed", None)
+    assert found.reason
+
+
+def test_one_simulation_is_judged_for_several_requirements() -> None:
+    found = evaluate(lag_problem("G[0,10] (x <= 2)"), FULL)
+    again = judge(lag_problem(), found)
+    assert again.robustness == evaluate(lag_problem(), FULL).robustness
+    assert again.trajectory is found.trajectory
+    failed = replace(found, trajectory=None, status="failed", verdict=None)
+    assert judge(lag_problem(), failed) is failed
+    assert judge(lag_problem("G[0,10] (sqrt(x - 5) <= 0)"), found).status == "failed"
+
+
+def test_equal_problems_share_a_monitor() -> None:
+    assert monitor_for(lag_problem()) is monitor_for(lag_problem())
+    assert monitor_for(lag_problem()) is not monitor_for(lag_problem("G[0,10] (x <= 0.8)"))
+
+
+class TestSimulate:
+    """By values of one's own, without a search."""
+
+    def test_numbers_are_constants_and_other_inputs_rest(self) -> None:
+        found = simulate(lag_problem(inputs=2), {"u": 1.0})
+        assert found.trajectory is not None
+        assert set(found.trajectory["v"].tolist()) == {0.0}
+        assert found.trajectory["x"][-1] == pytest.approx(1 - 0.9**100)
+        assert found.candidate.origin == "user"
+
+    def test_signals_and_parameters_are_taken_beyond_the_searched_ranges(self) -> None:
+        found = simulate(lag_problem(), {"u": Signal((0.0, 5.0), (3.0, 0.0), "constant")}, {"gain": 2.0})
+        assert found.trajectory is not None
+        assert found.trajectory["x"].max() == pytest.approx(6.0 * (1 - 0.9**50))
+
+    def test_an_input_that_the_problem_keeps_constant_may_be_driven(self) -> None:
+        problem = load_problem("AT1", inputs={"brake": 300})
+        braking, free = (simulate(problem, {"throttle": 100.0, **more}) for more in ({}, {"brake": 0.0}))
+        assert free.robustness == pytest.approx(-0.2133, abs=1e-3)
+        assert braking.robustness is not None and braking.robustness > 10
+        assert braking.trajectory is not None
+        assert set(braking.trajectory["brake"].tolist()) == {300.0}
+
+    @pytest.mark.parametrize(
+        ("inputs", "parameters", "named"),
+        [({"uu": 1.0}, {}, "'u'"), ({}, {"gian": 1.0}, "'gain'"), ({}, {"x": 1.0}, "'x'")],
+    )
+    def test_unknown_names_are_refused(
+        self, inputs: dict[str, float], parameters: dict[str, float], named: str
+    ) -> None:
+        with pytest.raises(CandidateError, match=named):
+            simulate(lag_problem(), inputs, parameters)

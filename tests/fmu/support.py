@@ -1,0 +1,40 @@
+"""Processes that simulate an FMU which misbehaves as it is told to."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from tests import patience
+from tests.command import listen_to_interrupts
+from tests.fmu import fixtures
+
+NOTHING, CRASH, HANG, EXIT, ALLOCATE, NAN, DISCARD, END, ABORT, ERROR, TALK, PRINT = range(12)
+
+SCRIPT = """
+import os, sys, time
+from pathlib import Path
+from falsifier.fmu import FmuModel
+from falsifier.core.model import Experiment
+model = FmuModel(sys.argv[1])
+experiment = Experiment(1.0, 0.1, ("y",))
+def go(misdeed=0):
+    return model.simulate({}, {"misdeed": misdeed}, experiment)["y"][-1]
+go(); go()
+"""
+
+
+def script(body: str, **environment: str) -> subprocess.Popen[str]:
+    """Start a process that simulates."""
+    return subprocess.Popen(
+        [sys.executable, "-c", SCRIPT + body, str(fixtures.path("Misdeeds_2"))],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
+        preexec_fn=listen_to_interrupts,
+    )
+
+
+def assert_nothing_is_left(folder: Path) -> None:
+    """Wait until the folders of the processes are gone, which happens after the last of them has ended."""
+    patience.wait_until(lambda: not list(folder.glob("falsifier-fmu-*")))

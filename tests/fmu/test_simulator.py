@@ -1,0 +1,46 @@
+import pickle
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import ModelError
+from falsifier.fmu import FmuModel
+from tests.fmu import fixtures
+from tests.fmu.fixtures import isolated, run
+
+
+def test_models_travel_between_processes_and_are_equal_by_content(tmp_path: Path) -> None:
+    model = isolated("Lag_2")
+    twin = pickle.loads(pickle.dumps(model))
+    assert twin == model and hash(twin) == hash(model)
+    assert run(twin, ("y",))["y"].tolist() == run(model, ("y",))["y"].tolist()
+    assert isolated("Lag_3") != model
+    assert FmuModel(model.path, "model-exchange") != model
+
+
+def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
+    copy = tmp_path / "model.fmu"
+    copy.write_bytes(fixtures.path("Lag_3").read_bytes())
+    with zipfile.ZipFile(copy, "a") as archive:
+        archive.writestr("resources/note.txt", "another file than the others")
+    model = FmuModel(copy)
+    copy.write_bytes(fixtures.path("Ball_3").read_bytes())
+    with pytest.raises(ModelError, match=r"model\.fmu: the file has changed since the model was loaded"):
+        run(model, ("y",))
+
+
+def test_no_binary_for_this_platform_says_what_there_is_and_what_to_do() -> None:
+    with pytest.raises(
+        ModelError, match=r"no binary for .*no binaries at all; .*compile them with `falsifier build`"
+    ):
+        run(isolated("Lag_2sources"), ("y",))
+
+
+def test_interfaces_that_are_not_there_name_the_one_that_is() -> None:
+    with pytest.raises(ModelError, match='does not offer co-simulation; set interface = "model-exchange"'):
+        FmuModel(fixtures.path("Stiff_2"))
+    with pytest.raises(ModelError, match="scheduled execution is not supported"):
+        FmuModel(fixtures.path("Scheduled_3"))
+    with pytest.raises(ModelError, match="would have to tick its clocks 'tick'"):
+        FmuModel(fixtures.path("Clocked_3"))

@@ -1,0 +1,38 @@
+from falsifier.llm.prompts.advice import advice
+from falsifier.llm.prompts.variants import VARIANTS
+from falsifier.llm.prompts.view import View
+from falsifier.problem.loading import load_problem
+from falsifier.testing import FREE, lag_problem
+
+
+def lines(variant: str, formula: str = "G[0,10] (x <= 0.9)", *, free: bool = False) -> list[str]:
+    view = View.of(lag_problem(formula, free=FREE if free else None))
+    return list(advice(view, VARIANTS[variant]).lines)
+
+
+def test_each_variant_adds_what_it_tells_something_of() -> None:
+    counts = [len(lines(name)) for name in ("MP3", "MP4", "MP5")]
+    assert counts == sorted(set(counts))
+    assert lines("MP4")[: len(lines("MP3"))] == lines("MP3")
+
+
+def test_advice_on_shapes_is_given_where_shapes_may_be_chosen() -> None:
+    (shape,) = set(lines("MP5", free=True)) - set(lines("MP5"))
+    assert "pulses" in shape
+    assert lines("MP4", free=True) == lines("MP4")
+
+
+def test_advice_on_conditions_is_given_where_there_is_one() -> None:
+    (condition,) = (
+        set(lines("MP5", "G[0,10] (u >= 0.5 -> x <= 0.9)"))
+        - set(lines("MP5"))
+        - set(lines("MP5", "G[0,10] (u >= 0.5 and x <= 0.9)"))
+    )
+    assert "condition" in condition
+
+
+def test_units_are_spoken_of_where_they_differ() -> None:
+    one = advice(View.of(load_problem("AT1")), VARIANTS["MP5"]).lines
+    several = advice(View.of(load_problem("AT6a")), VARIANTS["MP5"]).lines
+    assert any("unit" in line for line in several)
+    assert not any("unit" in line for line in one)

@@ -1,0 +1,131 @@
+"""What is told, as values; how it reads is test_render.py's."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from falsifier.core.space import Freedom, InputRange
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.prompts import VARIANTS, Prompt, View, build_prompt
+from falsifier.llm.prompts.blocks import SampleLines
+from falsifier.testing import FREE, START, lag_problem
+
+PROBLEM = lag_problem(free=FREE, parameters=[START])
+SAMPLE = evaluate(PROBLEM, PROBLEM.space.decode([0.5, 0.5, 1.0, 1.0, 0.25]))
+PARTS = {"system", "requirement", "outputs", "advice"}
+
+
+def built(variant: str, *evaluations: Evaluation, **more: object) -> Prompt:
+    return build_prompt(View.of(PROBLEM), VARIANTS[variant], evaluations, **more)  # type: ignore[arg-type]
+
+
+def sample(variant: str) -> SampleLines:
+    history = built(variant, SAMPLE).history
+    assert history is not None
+    (only,) = history.samples
+    return only
+
+
+@pytest.mark.parametrize(
+    ("variant", "parts"),
+    [
+        ("MP1", set()),
+        ("MP2", {"requirement", "outputs"}),
+        ("MP3", {"requirement", "outputs", "advice"}),
+        ("MP4", {"requirement", "outputs", "advice"}),
+        ("MP5", PARTS),
+    ],
+)
+def test_a_variant_leaves_whole_blocks_out(variant: str, parts: set[str]) -> None:
+    prompt = built(variant)
+    assert {name for name in PARTS if getattr(prompt, name) is not None} == parts
+    assert prompt.task.knows_requirement == ("requirement" in parts)
+    assert prompt.history is None
+
+
+def test_numbers_are_told_with_their_meaning_from_the_second_variant_on() -> None:
+    meanings = {name: [d.meaning for d in built(name).inputs.dimensions] for name in ("MP1", "MP2")}
+    assert meanings["MP1"] == [""] * 5
+    assert meanings["MP2"][1] == "u at t = 3.33 s" and meanings["MP2"][4] == "x0"
+    assert [(d.low, d.high) for d in built("MP1").inputs.dimensions] == [("-1", "1")] * 5
+
+
+def test_the_default_variant_tells_signals_and_parameters_with_all_that_is_known() -> None:
+    inputs = built("MP5").inputs
+    assert inputs.dimensions == ()
+    (u,), (x0,) = inputs.inputs, inputs.parameters
+    assert (u.name, u.unit, u.description, u.control_points) == ("u", "V", "drive", 4)
+    assert u.times == ("0", "3.333333", "6.666667", "10")
+    assert (u.max_control_points, u.min_interval) == (100, 0.1)
+    assert (x0.low, x0.high, x0.nominal) == ("-1", "1", "0")
+
+
+def test_many_control_points_are_told_by_their_first_and_last_times() -> None:
+    space = replace(PROBLEM.space, inputs=(InputRange("u", -1.0, 1.0, control_points=101),))
+    prompt = build_prompt(View.of(replace(PROBLEM, space=space)), VARIANTS["MP5"], [])
+    (u,) = prompt.inputs.inputs
+    assert u.times == ("0", "0.1", "0.2", "...", "10")
+
+
+@pytest.mark.parametrize(("variant", "facts"), [("MP1", 0), ("MP2", 0), ("MP3", 1), ("MP4", 2)])
+def test_published_variants_tell_one_more_fact_each(variant: str, facts: int) -> None:
+    told = sample(variant)
+    assert (len(told.facts), told.details) == (facts, ())
+    assert told.robustness == f"{SAMPLE.robustness:+.3g}"
+
+
+def test_the_default_variant_tells_details_that_may_be_left_out() -> None:
+    told = sample("MP5")
+    assert told.facts and told.details
+    assert told.inputs[1] == "x0 = 0.25"
+
+
+def test_a_failed_sample_is_told_with_its_reason_by_the_default_variant_only() -> None:
+    failed = replace(SAMPLE, status="crashed", verdict=None, trajectory=None, reason="division by zero")
+    history = built("MP5", failed).history
+    assert history is not None
+    assert "crashed: division by zero" in history.samples[0].failure
+    assert history.samples[0].robustness == ""
+    assert built("MP4", failed).history is None
+
+
+def test_what_is_not_shown_is_counted() -> None:
+    history = built("MP4", *[SAMPLE] * 14).history
+    assert history is not None
+    assert (len(history.samples), history.omitted) == (10, 4)
+
+
+def test_pending_candidates_and_notes_are_told_even_without_samples() -> None:
+    history = built("MP5", pending=[SAMPLE.candidate], notes=["a note"]).history
+    assert history is not None
+    assert history.samples == ()
+    assert len(history.pending) == 1 and "x0 = 0.25" in history.pending[0]
+    assert history.notes == ("a note",)
+
+
+def test_a_flat_robustness_is_noted_once_there_are_two_samples() -> None:
+    flat, other = built("MP5", SAMPLE, SAMPLE).history, built("MP5", SAMPLE).history
+    assert flat is not None and other is not None
+    assert (len(flat.notes), other.notes) == (1, ())
+
+
+def test_the_example_reply_has_the_form_that_is_asked_for() -> None:
+    point = json.loads(built("MP1").reply.example)
+    assert point["point"] == [0.0] * 5
+    named = json.loads(built("MP4").reply.example)
+    assert named["signals"] == [{"name": "u", "values": [0.0] * 4}]
+    assert named["parameters"] == [{"name": "x0", "value": 0.0}]
+    free = json.loads(built("MP5", count=3).reply.example)
+    (one,) = free["candidates"]
+    assert one["signals"] == [{"name": "u", "interpolation": "linear", "times": [], "values": [0.0] * 4}]
+    assert built("MP5").reply.notes
+    fixed = build_prompt(View.of(replace(PROBLEM, space=PROBLEM.space.fixed)), VARIANTS["MP5"], [])
+    assert fixed.reply.notes == ()
+    assert fixed.inputs.inputs[0].max_control_points is None
+
+
+def test_freedom_is_told_as_far_as_it_goes() -> None:
+    problem = lag_problem(free=Freedom(7, 0.5))
+    (u,) = build_prompt(View.of(problem), VARIANTS["MP5"], []).inputs.inputs
+    assert (u.max_control_points, u.min_interval) == (7, 0.5)

@@ -1,0 +1,40 @@
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.llm.prompts.choices import as_point, as_signals, as_values, signal_text
+from falsifier.llm.prompts.view import View
+from falsifier.testing import FREE, START, lag_problem
+
+PROBLEM = lag_problem(inputs=2, free=FREE, parameters=[START])
+VIEW = View.of(PROBLEM)
+FIXED = PROBLEM.space.decode([0, 0.5, 0.5, 1, -1, -1, -1, -1, 0.25])
+STEP = PROBLEM.space.admit(
+    Candidate(
+        {"u": Signal((0.0, 4.0), (0.0, 1.0), "constant"), "v": Signal((0.0,), (-1.0,), "pchip")}, {"x0": 0.25}
+    )
+)
+
+
+def test_a_point_is_all_numbers_in_order() -> None:
+    assert as_point(VIEW, FIXED) == ("point = [0, 0.5, 0.5, 1, -1, -1, -1, -1, 0.25]",)
+
+
+def test_values_have_names_and_free_signals_are_read_at_the_fixed_times() -> None:
+    assert as_values(VIEW, FIXED) == ("u = [0, 0.5, 0.5, 1]", "v = [-1, -1, -1, -1]", "x0 = 0.25")
+    # Control points at 0, 3.33, 6.67 and 10 s; the step is at 4 s.
+    assert as_values(VIEW, STEP)[0] == "u = [0, 0, 1, 1]"
+
+
+def test_signals_are_told_with_their_own_control_points() -> None:
+    assert as_signals(VIEW, FIXED)[0] == "u: linear, 4 evenly spaced values [0, 0.5, 0.5, 1]"
+    assert as_signals(VIEW, STEP) == (
+        "u: constant pieces from [time, value] points [[0, 0], [4, 1]]",
+        "v: constant -1",
+        "x0 = 0.25",
+    )
+
+
+def test_repeated_values_of_constant_pieces_are_left_out() -> None:
+    signal = Signal((0.0, 1.0, 2.0, 5.0), (0.0, 0.0, 1.0, 1.0), "constant")
+    assert signal_text(signal, stop_time=10.0).endswith("[[0, 0], [2, 1]]")
+    line = Signal((0.0, 1.0, 2.0, 5.0), (0.0, 0.0, 1.0, 1.0), "linear")
+    assert signal_text(line, stop_time=10.0).endswith("[[0, 0], [1, 0], [2, 1], [5, 1]]")

@@ -1,0 +1,55 @@
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from falsifier.llm.messages import ChatRequest, Message, Usage
+from falsifier.llm.usage import Price, estimate_tokens, usage_of
+from tests.llm.support import QUESTION
+
+REQUEST = ChatRequest(messages=(Message(role="user", content="x" * 400),))
+COUNTED = SimpleNamespace(
+    prompt_tokens=100, completion_tokens=20, completion_tokens_details=SimpleNamespace(reasoning_tokens=12)
+)
+PRICE = Price(prompt=0.25, completion=2.0)
+
+
+def usage(response: Any, *, price: Price | None = None, reported: float | None = None) -> Usage:
+    return usage_of(response, request=REQUEST, text="y" * 41, price=price, reported_cost=reported)
+
+
+def test_counts_and_cost_are_the_providers() -> None:
+    found = usage(COUNTED, reported=0.5)
+    assert (found.prompt_tokens, found.completion_tokens, found.reasoning_tokens) == (100, 20, 12)
+    assert (found.cost, found.estimated) == (0.5, False)
+
+
+def test_a_price_of_ones_own_goes_before_what_is_reported() -> None:
+    assert usage(COUNTED, price=PRICE, reported=0.5).cost == pytest.approx(0.1 * 0.25 + 0.02 * 2.0)
+
+
+def test_an_unknown_price_is_none_and_never_zero() -> None:
+    assert usage(COUNTED).cost is None
+
+
+@pytest.mark.parametrize(
+    "sent", [None, SimpleNamespace(), SimpleNamespace(prompt_tokens=0, completion_tokens=None)]
+)
+def test_missing_counts_are_estimated_and_only_a_price_of_ones_own_makes_a_cost_of_them(sent: Any) -> None:
+    found = usage(sent, reported=0.0)
+    assert (found.prompt_tokens, found.completion_tokens, found.estimated) == (100, 11, True)
+    assert found.cost is None
+    assert usage(sent, price=PRICE).cost == pytest.approx(PRICE.cost(100, 11))
+
+
+def test_tools_and_calls_are_sent_too() -> None:
+    plain = QUESTION.model_copy(update={"tools": ()})
+    with_tools, without = (
+        usage_of(None, request=r, text="", price=None, reported_cost=None).prompt_tokens
+        for r in (QUESTION, plain)
+    )
+    assert with_tools > without + 20
+
+
+def test_tokens_are_estimated_by_characters() -> None:
+    assert [estimate_tokens(text) for text in ("", "abc", "abcd", "abcde")] == [0, 1, 1, 2]

@@ -1,0 +1,119 @@
+"""What is said in several places: which of them counts, and what must be said somewhere."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from falsifier.core.files import bundled
+from falsifier.errors import ModelError, SpecError
+from falsifier.problem.joining import Joined, join, join_fmu
+from falsifier.problem.options import changes_from_options
+from falsifier.problem.spec import parse_spec
+from tests.fmu.fixtures import path as fixture
+
+SPEC: dict[str, Any] = {
+    "model": {"fmu": "AT.fmu", "interface": "co-simulation", "stop_time": 40.0},
+    "inputs": {"throttle": {"control_points": 7}, "brake": {"value": 0}},
+    "parameters": {"finalDrive": {"range": [3.0, 3.5]}},
+    "requirements": {
+        "R": {"formula": "G[0,20] (speed <= 120)", "description": "slow"},
+        "S": {
+            "formula": "G[0,20] (speed <= 80)",
+            "stop_time": 30.0,
+            "inputs": {"throttle": {"range": [0, 50]}},
+        },
+    },
+    "profiles": {"coarse": {"inputs": {"throttle": {"control_points": 2, "interpolation": "constant"}}}},
+}
+FILE = bundled("fmus") / "my.toml"
+
+
+def joined(requirement: str = "R", *, options: dict[str, Any] | None = None, **more: Any) -> Joined:
+    changes = changes_from_options(**options) if options else None
+    return join(parse_spec(SPEC, file="my.toml"), requirement, path=FILE, changes=changes, **more)
+
+
+def test_what_the_spec_says_is_completed_from_the_fmu() -> None:
+    found = joined()
+    (throttle,) = found.space.inputs
+    assert (throttle.low, throttle.high, throttle.unit, throttle.control_points) == (0, 100, "%", 7)
+    assert found.parameters == {"brake": 0.0}
+    assert [(p.name, p.low, p.nominal) for p in found.space.parameters] == [("finalDrive", 3.0, 3.23)]
+    assert (found.experiment.stop_time, found.experiment.output_interval) == (40.0, 0.01)
+    assert (found.requirement.name, found.requirement.description) == ("R", "slow")
+
+
+def test_requirement_then_profile_then_option_override_the_spec() -> None:
+    narrowed = joined("S")
+    assert (narrowed.space.inputs[0].high, narrowed.experiment.stop_time) == (50.0, 30.0)
+    coarse = joined("S", profile="coarse").space.inputs[0]
+    assert (coarse.high, coarse.control_points, coarse.interpolation) == (50.0, 2, "constant")
+    options = {"inputs": ["throttle=10:20:3"], "parameters": ["finalDrive=3.1"], "stop_time": 25.0}
+    changed = joined("S", profile="coarse", options=options)
+    assert [(r.low, r.high, r.control_points) for r in changed.space.inputs] == [(10.0, 20.0, 3)]
+    assert changed.parameters == {"brake": 0.0, "finalDrive": 3.1}
+    assert changed.space.parameters == ()
+    assert changed.experiment.stop_time == 25.0
+
+
+def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
+    found = joined(stl="F[0,20] (rpm > 3000)")
+    assert (found.requirement.name, found.requirement.description) == ("stl", "")
+    assert found.requirement.formula.signals == ("rpm",)
+
+
+def test_internal_signals_that_a_formula_names_are_recorded_beside_the_outputs() -> None:
+    found = joined(stl="G[0,20] (speed <= 120 and finalDrive > 0 and throttle >= 0)")
+    assert found.experiment.outputs == ("speed", "rpm", "gear", "finalDrive")
+
+
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        ({"requirement": "T"}, "'T'"),
+        ({"profile": "fine"}, "'fine'"),
+        ({"stl": "G[0,50] (speed <= 1)"}, "--stl"),
+        ({"options": {"parameters": ["speed=3"]}}, "parameters.speed"),
+        (
+            {"options": {"inputs": ["throttle=3"], "parameters": ["finalDrive=3"]}},
+            "inputs",
+        ),  # nothing is left
+        ({"options": {"inputs": [], "output_interval": 0.03}}, "model.output_interval"),
+    ],
+)
+def test_what_does_not_fit_together_is_named(more: dict[str, Any], named: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        joined(**more)
+    assert named in str(caught.value)
+    assert str(FILE) in str(caught.value)
+
+
+def test_signals_to_record_must_be_there() -> None:
+    spec = SPEC | {"model": SPEC["model"] | {"record": ["sped"]}}
+    with pytest.raises(SpecError, match=r"model\.record: .*'speed'"):
+        join(parse_spec(spec, file="my.toml"), "R", path=FILE)
+
+
+def test_an_fmu_alone_is_searched_over_its_bounded_inputs() -> None:
+    found = join_fmu(bundled("fmus") / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
+    assert [r.name for r in found.space.inputs] == ["throttle", "brake"]
+    fixed = join_fmu(
+        bundled("fmus") / "AT.fmu",
+        "G[0,20] (speed <= 120)",
+        changes=changes_from_options(inputs=["brake=3"], parameters=["finalDrive=3:3.5"]),
+    )
+    assert (fixed.space.inputs, fixed.parameters) == ((), {"brake": 3.0})
+
+
+def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="--input"):
+        join_fmu(fixture("Ball_2"), "G[0,1] (h >= -9)", changes=changes_from_options(stop_time=1.0))
+    with pytest.raises(SpecError, match=r"gone\.fmu"):
+        join_fmu(tmp_path / "gone.fmu", "G (x >= 0)", changes=changes_from_options())
+
+
+def test_an_fmu_for_scheduled_execution_alone_cannot_be_used() -> None:
+    spec = SPEC | {"model": {"fmu": "Scheduled_3.fmu"}}
+    with pytest.raises(ModelError, match="scheduled execution"):
+        join(parse_spec(spec, file="my.toml"), "R", path=fixture("Scheduled_3").with_name("my.toml"))

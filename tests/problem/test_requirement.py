@@ -1,0 +1,29 @@
+import pytest
+
+from falsifier.core.model import Experiment
+from falsifier.errors import SpecError
+from falsifier.problem.requirement import parse_requirement
+from falsifier.testing import lag_problem
+
+INFO = lag_problem().info
+EXPERIMENT = Experiment(10.0, 0.1, ("x",))
+
+
+def test_outputs_and_inputs_may_be_named() -> None:
+    assert parse_requirement("G[0,10] (x <= u)", INFO, EXPERIMENT).signals == ("x", "u")
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("G[0,10] (xx <= 1)", "'x'"),  # the nearest signal
+        ("G[0,11] (x <= 1)", "11"),  # the window that reaches past the stop time
+        ("G[0,0.25] (x <= 1)", "0.25"),  # a bound between two samples
+        ("G[0,10] (x <= )", "x <= )"),  # where it cannot be read on
+    ],
+)
+def test_what_cannot_be_judged_names_file_key_and_place(text: str, named: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        parse_requirement(text, INFO, EXPERIMENT, file="my.toml", key="requirements.R.formula")
+    assert str(caught.value).startswith("my.toml: requirements.R.formula: ")
+    assert named in str(caught.value)

@@ -1,0 +1,54 @@
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.fmu import read_info
+from falsifier.problem.loading import load_problem
+from falsifier.problem.starter import starter_spec
+from tests.fmu.fixtures import path as fmu_path
+from tests.problem.support import spec
+
+
+def test_the_starter_spec_loads_as_it_is(folder: Path) -> None:
+    text = starter_spec(Path("AT.fmu"), read_info(folder / "AT.fmu"))
+    problem = load_problem(spec(folder, text))
+    assert problem.name == "R1"
+    assert {r.name for r in problem.space.inputs} == {"throttle", "brake"}
+
+
+def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) -> None:
+    text = starter_spec(fmu_path("Echo_3"), read_info(fmu_path("Echo_3")))
+    path = tmp_path / "echo.toml"
+    path.write_text(text)
+    ranges = {r.name: (r.low, r.high, r.kind) for r in load_problem(str(path)).space.inputs}
+    assert ranges["in_Enumeration"] == (1, 3, "enumeration")
+    assert ranges["in_Boolean"] == (0, 1, "boolean")
+    assert ranges["in_Int8"] == (0, 1, "integer")
+    assert "# 1 = first, 2 = second, 3 = third\n[inputs.in_Enumeration]\nrange = [1, 3]\n" in text
+    assert "[inputs.in_Boolean]\nrange = [0, 1]\n" in text
+    assert "[inputs.in_Int8]\nrange = [0, 1]  # the FMU specifies no min and max: replace" in text
+
+
+def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> None:
+    info = read_info(fmu_path("Ball_2"))
+    bare = replace(info, stop_time=None, step_size=None, description="")
+    text = starter_spec(fmu_path("Ball_2"), bare)
+    assert "# the FMU specifies none" in text
+    (tmp_path / "ball.toml").write_text(text)
+    problem = load_problem(str(tmp_path / "ball.toml"))
+    assert problem.space.inputs == ()
+    assert len(problem.space.parameters) == 1, "without inputs a parameter is searched"
+
+
+def test_an_fmu_without_outputs_has_nothing_to_require() -> None:
+    info = read_info(fmu_path("Lag_2"))
+    with pytest.raises(SpecError, match="no numeric output"):
+        starter_spec(fmu_path("Lag_2"), replace(info, variables=info.inputs))
+
+
+def test_names_that_toml_cannot_have_bare_are_quoted() -> None:
+    text = starter_spec(fmu_path("Arrays_3"), read_info(fmu_path("Arrays_3")))
+    assert set(tomllib.loads(text)["inputs"]) == {"u[1]", "u[2]"}

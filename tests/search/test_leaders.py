@@ -1,0 +1,81 @@
+"""Who leads a search, from the names that a user gives."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from falsifier.engines.hybrid import Hybrid
+from falsifier.engines.llm import LLMEngine
+from falsifier.errors import ChatError, SpecError
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.search.budget import Budget
+from falsifier.search.leaders import check_names, make_engines
+from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.testing import lag_problem
+
+PROBLEM = lag_problem()
+CHAT = ScriptedChat([], llm="script")
+
+
+def request(engine: str | None = None, llm: str | None = None, **settings: object) -> RunRequest:
+    named = LLMSettings(name=llm, **settings) if llm else None
+    return RunRequest(problems=(), engine=engine, llm=named, seed=3)
+
+
+@pytest.fixture(autouse=True)
+def no_keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    yield
+
+
+def test_without_names_the_default_engine_leads() -> None:
+    (engine,) = make_engines(request(), [PROBLEM], None)
+    assert engine.name == "surrogate"
+
+
+def test_a_language_model_alone_leads_and_with_the_hybrid_advises() -> None:
+    (llm,) = make_engines(request(llm="script", variant="MP4"), [PROBLEM], CHAT)
+    assert isinstance(llm, LLMEngine) and llm.name == "script MP4"
+    (hybrid,) = make_engines(request("hybrid", "script"), [PROBLEM], CHAT)
+    assert isinstance(hybrid, Hybrid)
+
+
+def test_several_requirements_have_engines_that_draw_different_points() -> None:
+    problems = [lag_problem(name="A"), lag_problem(name="B")]
+    one, other = make_engines(request("uniform"), problems, None)
+    (alone,) = make_engines(request("uniform"), problems[:1], None)
+    assert one.ask()[0].key == alone.ask()[0].key
+    assert one.ask()[0].key != other.ask()[0].key
+
+
+@pytest.mark.parametrize(
+    ("engine", "llm", "settings", "named"),
+    [
+        ("corner", None, {}, "'corners'"),
+        ("llm", None, {}, "--llm"),
+        ("hybrid", None, {}, "--llm"),
+        ("uniform", "script", {}, "uniform"),
+        (None, "script", {"variant": "MP9"}, "MP9"),
+        (None, "script", {"fallback": "hybrid"}, "hybrid"),
+        (None, "script", {"fallback": "corner"}, "'corners'"),
+    ],
+)
+def test_names_that_do_not_go_together_are_refused_before_anything_is_made(
+    engine: str | None, llm: str | None, settings: dict[str, str], named: str
+) -> None:
+    with pytest.raises(SpecError, match=named):
+        check_names(request(engine, llm, **settings))
+
+
+def test_a_missing_key_is_said_before_the_first_question() -> None:
+    with pytest.raises(ChatError, match="OPENAI_API_KEY"):
+        make_engines(request(llm="openai/gpt-5-mini"), [PROBLEM], None)
+
+
+def test_a_limit_on_money_needs_a_price() -> None:
+    asked = request(llm="hosted_vllm/mine").model_copy(update={"budget": Budget(cost=1.0)})
+    with pytest.raises(SpecError, match="--price"):
+        make_engines(asked, [PROBLEM], None)
+    priced = LLMSettings(name="hosted_vllm/mine", price=(0.25, 2.0), cache=False)
+    (engine,) = make_engines(asked.model_copy(update={"llm": priced}), [PROBLEM], None)
+    assert engine.name.startswith("hosted_vllm/mine")

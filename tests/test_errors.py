@@ -1,0 +1,56 @@
+import pickle
+
+import pytest
+
+from falsifier import errors
+from falsifier.errors import FalsifierError, SimulationError, SpecError, did_you_mean, rejected
+
+TREE = [
+    value for value in vars(errors).values() if isinstance(value, type) and issubclass(value, FalsifierError)
+]
+
+
+def test_every_error_is_of_one_tree_and_never_ends_like_a_falsification() -> None:
+    assert len(TREE) >= 10
+    assert {error.exit_code for error in TREE} == {2, 3}
+
+
+def test_a_spec_error_begins_with_its_file_and_key() -> None:
+    assert str(SpecError("what", file="a.toml", key="inputs.u")) == "a.toml: inputs.u: what"
+    assert str(SpecError("what", key="inputs.u")) == "inputs.u: what"
+    assert str(SpecError("what")) == "what"
+
+
+def test_a_failed_simulation_travels_between_processes_with_what_it_knows() -> None:
+    error = SimulationError("it crashed", status="crashed", time=1.5, log=("a", "b"))
+    read = pickle.loads(pickle.dumps(error))
+    assert (str(read), read.status, read.time, read.log) == ("it crashed", "crashed", 1.5, ("a", "b"))
+
+
+def test_known_names_are_listed_with_the_nearest_first() -> None:
+    assert "'speed'" in did_you_mean("sped", ["rpm", "speed"])
+    far = did_you_mean("xyz", ["rpm", "speed"])
+    assert "did you mean" not in far
+    assert "rpm, speed" in far
+    assert "none" in did_you_mean("x", [])
+    many = did_you_mean("name7", [f"name{i}" for i in range(100)])
+    assert "'name7'" in many
+    assert "name29" in many and "name30" not in many
+
+
+@pytest.mark.parametrize(
+    ("message", "given", "text"),
+    [
+        ("Value error, low < high", [1, 0], "low < high"),
+        ("Input should be 1 or 2", 3, "Input should be 1 or 2, got 3"),
+        ("Field required", None, "Field required"),
+    ],
+)
+def test_a_rejected_value_is_shown_where_only_the_expected_one_is_told(
+    message: str, given: object, text: str
+) -> None:
+    assert rejected(message, given) == text
+
+
+def test_long_rejected_values_are_cut() -> None:
+    assert len(rejected("Input should be short", "x" * 10_000)) < 120

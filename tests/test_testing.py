@@ -1,0 +1,168 @@
+"""What other people's tests are built of: that the contract catches engines which break it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines import make_engine
+from falsifier.engines.protocol import Engine
+from falsifier.errors import CandidateError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem, simulated
+
+
+class Refused(Exception):
+    """Some engine's own complaint."""
+
+
+class Wrapped:
+    """A uniform engine, to be broken."""
+
+    name = "wrapped"
+
+    def __init__(self, problem: Problem, seed: int) -> None:
+        self.inner = make_engine("uniform", problem, seed=seed)
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        return self.inner.ask(n)
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        self.inner.tell(evaluations)
+
+
+class OutOfRange(Wrapped):
+    def ask(self, n: int = 1) -> list[Candidate]:
+        far = {
+            name: replace(s, values=(9.0,) * len(s.values)) for name, s in self.inner.ask()[0].signals.items()
+        }
+        return [replace(c, signals=far) for c in self.inner.ask(n)]
+
+
+class WithoutReason(Wrapped):
+    def ask(self, n: int = 1) -> list[Candidate]:
+        return [replace(c, rationale="") for c in self.inner.ask(n)]
+
+
+class Unseeded(Wrapped):
+    def __init__(self, problem: Problem, seed: int) -> None:
+        super().__init__(problem, seed=int(np.random.default_rng().integers(2**31)))
+
+
+class SeedBlind(Wrapped):
+    def __init__(self, problem: Problem, seed: int) -> None:
+        super().__init__(problem, seed=0)
+
+
+class OneAtATime(Wrapped):
+    def ask(self, n: int = 1) -> list[Candidate]:
+        return self.inner.ask(1)
+
+
+class OwnOnly(Wrapped):
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        assert all(e.candidate.origin == "uniform" for e in evaluations)
+
+
+class Trusting(Wrapped):
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        for evaluation in evaluations:
+            if evaluation.verdict is None:
+                raise Refused("no verdict")
+
+
+class Stuck(Wrapped):
+    def __init__(self, problem: Problem, seed: int) -> None:
+        super().__init__(problem, seed)
+        self.first = self.inner.ask()[0]
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        return [self.first] * n
+
+
+def contract(engine: type[Wrapped]) -> EngineContract:
+    class Contract(EngineContract):
+        rounds = 4
+
+        def make(self, problem: Problem, seed: int) -> Engine:
+            return engine(problem, seed)
+
+    return Contract()
+
+
+TESTS = [name for name in vars(EngineContract) if name.startswith("test_")]
+
+
+def test_an_engine_that_keeps_it_passes_all_of_it() -> None:
+    for name in TESTS:
+        getattr(contract(Wrapped), name)()
+
+
+@pytest.mark.parametrize(
+    ("engine", "test"),
+    [
+        (OutOfRange, "test_candidates_are_admitted_by_the_space"),
+        (WithoutReason, "test_candidates_are_admitted_by_the_space"),
+        (Unseeded, "test_deterministic_for_a_seed"),
+        (SeedBlind, "test_deterministic_for_a_seed"),
+        (Unseeded, "test_resumes_by_replay"),
+        (OneAtATime, "test_asks_for_as_many_as_wanted"),
+        (OwnOnly, "test_accepts_foreign_evaluations"),
+        (Trusting, "test_survives_failures"),
+        (Stuck, "test_survives_a_plateau"),
+    ],
+)
+def test_an_engine_that_breaks_it_fails(engine: type[Wrapped], test: str) -> None:
+    with pytest.raises((AssertionError, CandidateError, Refused)):
+        getattr(contract(engine), test)()
+
+
+def test_the_contract_needs_an_engine() -> None:
+    with pytest.raises(NotImplementedError):
+        EngineContract().make(lag_problem(), 0)
+
+
+class TestLagProblem:
+    def test_it_is_the_lag_that_it_says_it_is(self) -> None:
+        problem = lag_problem(inputs=2, parameters=[START, BIAS])
+        found = evaluate(problem, problem.space.decode([1.0] * 4 + [-0.5] * 4 + [0.25, 0.125]))
+        assert found.trajectory is not None
+        # x' = 0.5 + 0.125 - x from 0.25, by Euler with 0.1 s.
+        expected = 0.625 + (0.25 - 0.625) * 0.9 ** np.arange(101)
+        np.testing.assert_allclose(found.trajectory["x"], expected, atol=1e-12)
+
+    def test_its_space_is_as_asked_for(self) -> None:
+        space = lag_problem(inputs=3, limit=2.5, points=2, free=FREE, parameters=[BIAS]).space
+        assert space.names == ("u", "v", "w", "bias")
+        assert {(r.low, r.high, r.control_points, r.free) for r in space.inputs} == {(-2.5, 2.5, 2, FREE)}
+        assert lag_problem(inputs=0, parameters=[START]).space.inputs == ()
+
+    def test_by_default_full_input_violates_and_rest_does_not(self) -> None:
+        problem = lag_problem()
+        assert evaluate(problem, problem.space.decode([1.0] * 4)).violated
+        assert not evaluate(problem, problem.space.decode([0.0] * 4)).violated
+
+
+def test_driving_an_engine_asks_and_tells_in_turn() -> None:
+    problem = lag_problem()
+    told: list[int] = []
+
+    class Counting(Wrapped):
+        def tell(self, evaluations: Sequence[Evaluation]) -> None:
+            told.append(len(evaluations))
+
+    asked = drive(Counting(problem, 0), simulated(problem, lambda x: float(x[-1])), rounds=3, n=2)
+    assert len(asked) == 6
+    assert told == [2, 2, 2]
+
+
+def test_simulations_are_judged_by_the_margin_that_is_given() -> None:
+    problem = lag_problem()
+    (candidate,) = make_engine("uniform", problem, seed=0).ask()
+    found = simulated(problem, lambda x: float(x[-1]))(candidate)
+    assert found.trajectory is not None
+    assert found.robustness == found.trajectory["x"][-1]
+    assert found.trajectory.names == ("x", "u")

@@ -1,0 +1,30 @@
+from falsifier.problem.options import changes_from_options
+from falsifier.problem.source import ProblemSource
+from falsifier.search.budget import Budget
+from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.views.report.content import run_command
+
+
+def test_a_search_can_be_repeated_from_its_command() -> None:
+    changes = changes_from_options(inputs=["u=0:1:3"], stop_time=5.0)
+    request = RunRequest(
+        problems=(ProblemSource(target="my.toml:R", stl="G[0,1] (x <= 1)", changes=changes),),
+        engine="uniform",
+        seed=3,
+        budget=Budget(7, cost=0.5),
+    )
+    assert run_command(request) == (
+        "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --input u=0:1:3 --stop-time 5.0 --engine uniform "
+        "--budget 7 --max-cost 0.5 --seed 3"
+    )
+
+
+def test_a_models_search_can_be_repeated_too() -> None:
+    model = LLMSettings(
+        name="openai/gpt-5-mini", effort="high", variant="MP4", price=(0.25, 2), anonymous=True
+    )
+    request = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model)
+    assert run_command(request) == (
+        "falsifier run AT1 --llm openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
+        "--budget 100 --seed 0"
+    )

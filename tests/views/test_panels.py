@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.stl import parse
+from falsifier.testing import lag_problem
+from falsifier.views.panels import Panel, judged_windows, panels
+
+STEP = Candidate({"u": Signal((0.0, 4.0), (1.0, 0.0), "constant")})
+
+
+def drawn(formula: str) -> list[Panel]:
+    problem = lag_problem(formula)
+    found = evaluate(problem, STEP)
+    assert found.trajectory is not None
+    return panels(problem.requirement.formula, found.trajectory, STEP, problem.space.inputs, found.verdict)
+
+
+@pytest.mark.parametrize(
+    ("formula", "windows"),
+    [
+        ("x <= 1", [(0.0, 0.0)]),
+        ("G[2,5] (x <= 1)", [(2.0, 5.0)]),
+        ("G[2,5] F[1,3] (x <= 1)", [(3.0, 8.0)]),
+        ("G (x <= 1)", [(0.0, np.inf)]),
+        ("(G[0,4] (x <= 1)) -> (F[2,6] (x > 0))", [(0.0, 4.0), (2.0, 6.0)]),
+        # The left side of until counts from its own time on.
+        ("(x >= 0) U[2,5] (u >= 1)", [(0.0, 5.0), (0.0, 5.0)]),
+    ],
+)
+def test_predicates_count_within_all_windows_around_them(
+    formula: str, windows: list[tuple[float, float]]
+) -> None:
+    assert [window for _, window in judged_windows(parse(formula))] == windows
+
+
+def test_each_compared_quantity_has_a_panel_and_then_each_input() -> None:
+    first, second, last = drawn("G[0,10] (x <= 0.9) and G[2,4] (x >= 0) and F[0,5] (x - u <= 0)")
+    assert [p.title for p in (first, second, last)] == ["x [m]", "x - u", "u [V]"]
+    assert [(b.predicate, b.start, b.end) for b in first.bounds] == [
+        ("x <= 0.9", 0.0, 10.0),
+        ("x >= 0", 2.0, 4.0),
+    ]
+    assert set(first.bounds[0].values.tolist()) == {0.9}
+    assert second.values.tolist() == (first.values - last.values).tolist()
+
+
+def test_a_quantity_on_the_right_side_is_the_one_that_is_drawn() -> None:
+    panel = drawn("G[0,10] (0.9 >= x)")[0]
+    assert (panel.title, set(panel.bounds[0].values.tolist())) == ("x [m]", {0.9})
+
+
+def test_the_critical_time_is_marked_on_what_decided_only() -> None:
+    first, second, last = drawn("G[0,10] (x <= 9) and G[0,10] (u <= 2)")
+    assert (first.critical, last.critical) == (None, None)
+    assert second.critical == 0.0, "u is nearest to its bound at the start"
+
+
+def test_an_input_is_drawn_with_its_control_points_and_its_range() -> None:
+    panel = drawn("G[0,10] (x <= 0.9)")[-1]
+    assert (panel.points, panel.limits, panel.steps) == (((0.0, 1.0), (4.0, 0.0)), (-1.0, 1.0), True)
+    assert panel.bounds == ()
+    assert panel.values[39] == 1.0 and panel.values[41] == 0.0
+
+
+def test_windows_without_an_end_are_drawn_to_the_end_of_the_simulation() -> None:
+    (bound,) = drawn("G (x <= 0.9)")[0].bounds
+    assert (bound.start, bound.end) == (0.0, 10.0)

@@ -1,0 +1,123 @@
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.search.budget import Spent
+from falsifier.search.events import Evaluated, Event
+from falsifier.search.result import Result
+from falsifier.search.run import falsify
+from falsifier.views.text import (
+    counterexample_name,
+    result_json,
+    result_text,
+    results_text,
+    seconds_text,
+)
+from tests.problems import easy, hard, impossible, unusable
+
+
+@pytest.fixture(scope="module")
+def found() -> Result:
+    return falsify(easy(), "corners", budget=10)
+
+
+def test_a_counterexample_is_told_with_its_verdict_inputs_and_reason(found: Result) -> None:
+    assert found.counterexample is not None
+    lines = result_text(found).splitlines()
+    assert lines[0].startswith(f"EASY: falsified after {found.spent.simulations} simulation")
+    text = "\n".join(lines)
+    for part in (
+        found.counterexample.reason,
+        "G[0,10] (x <= 0.9)",
+        f"{found.robustness:+.6g}",
+        "10 s",
+        "x = 0.999973 m, u = 1 V",
+        "u [V] constant 1",
+        "constant extremes: u high",
+    ):
+        assert part in text
+    assert "files" not in text, "nothing was recorded"
+
+
+def test_without_a_counterexample_the_best_is_told_and_why_it_ended() -> None:
+    result = falsify(impossible(), "uniform", budget=1)
+    text = result_text(result)
+    assert "not falsified after 1 simulation (" in text
+    assert result.reason in text
+    assert f"{result.robustness:+.6g}" in text
+
+
+def test_a_run_that_can_be_continued_says_how(tmp_path: Path) -> None:
+    def interrupt(event: Event) -> None:
+        if isinstance(event, Evaluated) and event.index == 1:
+            raise KeyboardInterrupt
+
+    result = falsify(impossible(), "uniform", budget=9, directory=tmp_path, listeners=[interrupt])
+    assert result.status == "interrupted"
+    assert f"falsifier resume {shlex.quote(str(tmp_path))}" in result_text(result)
+
+
+def test_where_every_simulation_failed_there_is_nothing_but_the_reason() -> None:
+    result = falsify(unusable(), "uniform", budget=20)
+    text = result_text(result)
+    assert "out of order" in text
+    assert "robustness" not in text
+
+
+def test_what_the_language_model_used_is_told(found: Result) -> None:
+    assert "language model" not in result_text(found)
+    spent = Spent(
+        simulations=1, calls=3, prompt_tokens=90, completion_tokens=10, reasoning_tokens=4, cost=0.25
+    )
+    text = result_text(replace(found, spent=spent))
+    assert "3 calls, 100 tokens" in text and "0.2500 US dollars" in text
+    unknown = result_text(replace(found, spent=replace(spent, cost=None)))
+    assert "unknown" in unknown
+
+
+def test_fragile_and_unconfirmed_violations_are_listed(found: Result) -> None:
+    assert found.counterexample is not None
+    fragile, refuted = (replace(found.counterexample, reason=r) for r in ("vanishes", "did not happen"))
+    text = result_text(replace(found, fragile=(fragile,), refuted=(refuted,)))
+    assert "vanishes" in text and "did not happen" in text
+
+
+def test_several_results_are_a_line_each(tmp_path: Path) -> None:
+    results = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path)
+    never, hard_line, last = results_text(results).splitlines()
+    assert never.startswith("NEVER  not falsified after 5")
+    assert hard_line.startswith("HARD   falsified after")
+    assert str(tmp_path / "counterexample-HARD.png") in hard_line
+    assert last.startswith("1 of 2 falsified")
+
+
+def test_a_shared_directory_has_a_counterexample_for_each_requirement(tmp_path: Path, found: Result) -> None:
+    shared = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path / "shared")
+    alone = falsify(easy(), "corners", budget=5, directory=tmp_path / "alone")
+    names = [counterexample_name(r) for r in (*shared, alone, found)]
+    assert names == [
+        "counterexample-NEVER.json",
+        "counterexample-HARD.json",
+        "counterexample.json",
+        "counterexample.json",
+    ]
+
+
+def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
+    import json
+
+    data = json.loads(json.dumps(result_json(found)))
+    assert (data["requirement"], data["status"]) == ("EASY", "falsified")
+    assert data["counterexample"]["robustness"] == found.robustness
+    assert data["counterexample"]["switches"] == {"u": 0}
+    assert data["spent"]["simulations"] == found.spent.simulations
+    assert data["directory"] is None
+    failed = json.loads(json.dumps(result_json(falsify(unusable(), "uniform", budget=20))))
+    assert (failed["counterexample"], failed["best"]) == (None, None)
+
+
+def test_seconds_say_where_they_went() -> None:
+    spent = Spent(seconds=12.34, simulation_seconds=10.0, engine_seconds=2.0)
+    assert seconds_text(spent) == "12.3 s; simulator 10.00 s, engine 2.00 s"
