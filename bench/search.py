@@ -33,6 +33,10 @@ SYSTEMS = {
     "CC": ("CC1", "CC2", "CC3", "CC4", "CC5", "CCx"),
     "F16": ("F16",),
     "SC": ("SC",),
+    "AFC": ("AFC27", "AFC29", "AFC33"),
+    "PulseMeter": ("PulseMeter",),
+    "ChargerHandshake": ("ChargerHandshake",),
+    "HeaterLimpHome": ("HeaterLimpHome",),
 }
 # Requirements for which the published tools need hundreds of simulations.
 LONG = {"CC4": 1500, "CCx": 1500}

@@ -54,6 +54,7 @@ _NAMES = {
     "NNx": ("NN", "NNx"),
     "F16": ("F16", "F16a"),
     "SC": ("SC", "SCa"),
+    "AFC27": ("AFC_normal", "(AFC27 0.008)"),
 }
 # A counterexample is accepted if its re-simulated robustness is below this value.
 _TOLERANCES = (
@@ -63,6 +64,8 @@ _TOLERANCES = (
     (r"NN.*", 0.1),
     (r"CC.*", 1.0),
     (r"SC", 0.05),
+    (r"AFC27", 8e-4),
+    (r"AFC29|AFC33", 7e-4),
 )
 # An input with at least this step in s is piecewise constant; all others are exported with the dense step.
 _COARSE = 1.0

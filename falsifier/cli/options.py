@@ -5,6 +5,7 @@ or add a remark, a function makes the option.
 """
 
 import logging
+import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -215,6 +216,8 @@ def _price(text: str | None) -> tuple[float, float] | None:
         sent, received = (float(part) for part in text.split(":"))
     except ValueError:
         raise click.UsageError(f"--price {text}: expected SENT:RECEIVED, for example 0.25:2") from None
+    if not all(math.isfinite(price) and price >= 0 for price in (sent, received)):
+        raise click.UsageError(f"--price {text}: prices must be finite and not negative, for example 0.25:2")
     return sent, received
 
 

@@ -1,18 +1,17 @@
 """Simulation in this process, for benchmarks and tests: a crash of the FMU crashes this process too."""
 
 import atexit
-import shutil
-import tempfile
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.printable import printable
 from falsifier.errors import SimulationError
 from falsifier.fmu import archive
 from falsifier.fmu.buffers import Room
+from falsifier.fmu.folders import WorkFolder
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.session import Session
 from falsifier.fmu.worker_order import Order, Reuse
@@ -24,12 +23,13 @@ class LocalFmu:
     def __init__(self, order: Order) -> None:
         self._lock = threading.Lock()
         self._log: list[str] = []
-        self._folder = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
+        self._folder = WorkFolder()
+        folder = self._folder.path
         try:
-            archive.extract(order.path, self._folder)
-            self._session = Session(order.description, self._folder, order.interface, self._log.append)
+            archive.extract(order.path, folder)
+            self._session = Session(order.description, folder, order.interface, self._say)
         except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.remove()
             raise
         self._plan: Plan | None = None
         self._reuse: Reuse | None = order.reuse
@@ -62,7 +62,10 @@ class LocalFmu:
     def close(self) -> None:
         """Unload the library and remove the folder."""
         self._session.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.remove()
+
+    def _say(self, line: str) -> None:
+        self._log.append(printable(line))
 
 
 _FMUS: dict[tuple[str, str], LocalFmu] = {}

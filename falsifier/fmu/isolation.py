@@ -7,40 +7,39 @@ a SimulationError.
 
 import atexit
 import contextlib
-import fcntl
 import json
 import logging
 import mmap
 import os
 import pickle
-import shutil
 import signal
-import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import FailureStatus, ModelError, SimulationError
-from falsifier.fmu import nursery
+from falsifier.fmu import folders, nursery, posix
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
     QUICK_SECONDS,
     Closed,
+    Garbled,
     Reply,
+    open_channel,
     receive_reply,
     send_request,
     watch,
 )
-from falsifier.fmu.environment import worker_environment
+from falsifier.fmu.environment import protect_secrets, worker_environment
+from falsifier.fmu.output import Output
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.worker import PREPARE, RUN
 from falsifier.fmu.worker_order import Order, Reuse
@@ -49,11 +48,8 @@ _LOG = logging.getLogger(__name__)
 
 # The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
 _GRACE_SECONDS = 0.1
-# Loading an FMU may start the runtime of a tool or contact a licence server.
-_LOADING_SECONDS = 120.0
 # The nursery imports numba and may compile the model-exchange solver, slowly on a busy machine.
 _STARTING_SECONDS = 300.0
-_MAX_LOG_BYTES = 64 << 10
 
 _BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
     "from falsifier.fmu.nursery import main; main(int(sys.argv[2]), Path(sys.argv[3]))"
@@ -65,8 +61,11 @@ class Nursery:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._root = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
-        self._sock, theirs = socket.socketpair()
+        protect_secrets(os.environ)
+        folders.sweep()
+        self._folder = folders.WorkFolder()
+        self._root = self._folder.path
+        self._sock, theirs = open_channel()
         paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
         with theirs:
             self._process = subprocess.Popen(
@@ -103,11 +102,12 @@ class Nursery:
             self._process.wait(5.0)
         self._process.kill()
         self._process.wait()
-        shutil.rmtree(self._root, ignore_errors=True)
+        self._folder.remove()
 
     def forget(self) -> None:
         """Close the connection in a forked copy of this process; the nursery belongs to the original."""
         self._sock.close()
+        self._folder.forget()
 
     def _ask(self, kind: int, payload: bytes, descriptors: tuple[int, ...]) -> str:
         with self._lock:
@@ -134,12 +134,11 @@ class _Worker:
 
     def __init__(self, owner: Nursery, order: Order) -> None:
         self._owner = owner
-        self.log = _anonymous_file()
-        # Append mode, so that output after take_log truncated the file starts at its new end.
-        fcntl.fcntl(self.log, fcntl.F_SETFL, fcntl.fcntl(self.log, fcntl.F_GETFL) | os.O_APPEND)
-        self.sock, theirs = socket.socketpair()
+        self._output = Output()
+        self.sock, theirs = open_channel()
         with theirs:
-            self.pid = owner.start_worker(order, theirs.fileno(), self.log.fileno())
+            self.pid = owner.start_worker(order, theirs.fileno(), self._output.fileno())
+        self._life = posix.open_life(self.pid)
         self.plan: Plan | None = None
         self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
         self.awaits_test = False
@@ -148,11 +147,10 @@ class _Worker:
     def prepare(self, plan: Plan) -> Reply:
         """Share memory for a plan with the worker, which then looks up the plan's variables."""
         size = max(Room.size(plan) * 8, 8)
-        with _anonymous_file() as file:
-            file.truncate(size)
+        with posix.sealed_file(size) as file:
             self.room = Room.over(plan, _floats(file, size))
             send_request(self.sock, PREPARE, pickle.dumps(plan), (file.fileno(),))
-        reply = receive_reply(self.sock, _LOADING_SECONDS)
+        reply = self.receive(plan.time_limit + _GRACE_SECONDS)
         self.plan = plan if reply.status == "ok" else None
         return reply
 
@@ -166,18 +164,17 @@ class _Worker:
         started = time.perf_counter()
         if self.is_quick:
             watch(self.sock, QUICK_SECONDS)
-        reply = receive_reply(self.sock, limit)
+        reply = self.receive(limit)
         self.is_quick = time.perf_counter() - started < QUICK_SECONDS
         return reply
 
+    def receive(self, limit: float) -> Reply:
+        """Wait for a reply; see receive_reply."""
+        return receive_reply(self.sock, limit, self._life)
+
     def take_log(self) -> tuple[str, ...]:
         """Return the lines that the FMU has written since the last call; only the end of long output."""
-        size = os.fstat(self.log.fileno()).st_size
-        if not size:
-            return ()
-        text = os.pread(self.log.fileno(), _MAX_LOG_BYTES, max(0, size - _MAX_LOG_BYTES))
-        self.log.truncate(0)
-        return tuple(text.decode("utf-8", "replace").splitlines())
+        return self._output.take()
 
     def kill(self) -> int:
         """End the process; return its exit code, negative for a signal."""
@@ -185,7 +182,10 @@ class _Worker:
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
         self.sock.close()
-        self.log.close()
+        self._output.close()
+        if self._life is not None:
+            os.close(self._life)
+            self._life = None
         try:
             return self._owner.reap(self.pid)
         except ModelError:
@@ -199,6 +199,7 @@ class IsolatedFmu:
     def __init__(self, owner: Callable[[], Nursery], order: Order) -> None:
         self._owner, self._order = owner, order
         self._worker: _Worker | None = None
+        self._has_loaded = False
         self._reuse: Reuse | None = None
         self._lock = threading.Lock()
 
@@ -229,6 +230,8 @@ class IsolatedFmu:
                     f"did not finish within the time limit of {plan.time_limit:g} s and was stopped",
                     "timeout",
                 ) from None
+            except Garbled:
+                raise self._end("the FMU disturbed the replies of its process", "crashed") from None
             except Closed:
                 raise self._end("", "crashed") from None
             except BaseException:
@@ -275,36 +278,52 @@ class IsolatedFmu:
         if self._worker is not None and self._worker.awaits_test:
             self._await_test(self._worker, plan)
         worker = self._worker
+        is_new = worker is None
         if worker is None:
             order = replace(self._order, reuse=self._reuse)
             worker = self._worker = _Worker(self._owner(), order)
-        if worker.plan is not plan:
-            self._prepare(worker, plan)
-        return worker
+        if worker.plan is plan or self._prepare(worker, plan, is_new=is_new):
+            return worker
+        return self._worker_for(plan)
 
-    def _prepare(self, worker: _Worker, plan: Plan) -> None:
+    def _prepare(self, worker: _Worker, plan: Plan, *, is_new: bool) -> bool:
+        """Prepare a worker; return False if an old one has died since its last simulation."""
         try:
             reply = worker.prepare(plan)
         except (Closed, TimeoutError) as error:
-            how = "hung" if isinstance(error, TimeoutError) else "crashed"
-            log = worker.take_log()
-            code = self._drop()
-            raise ModelError(
-                f"{self._order.path}: the FMU {how} while it was loaded ({_how_it_ended(code)})"
-                + "".join(f"\n  {line}" for line in log[-5:])
-            ) from None
+            if isinstance(error, Closed) and not is_new:
+                self._drop()
+                return False
+            raise self._not_loaded(worker, error, plan.time_limit) from None
         except BaseException:
             self._drop()
             raise
         if reply.status != "ok":
             self._drop()
-            raise ModelError(f"{self._order.path}: {reply.text}")
+            text = f"{self._order.path}: {reply.text}"
+            # What has loaded before is not unusable for that.
+            raise SimulationError(text) if reply.status == "failed" and self._has_loaded else ModelError(text)
+        self._has_loaded = True
+        return True
+
+    def _not_loaded(self, worker: _Worker, error: Exception, time_limit: float) -> Exception:
+        """Error of an FMU that crashed or hung while it was loaded: unusable if it has never been loaded."""
+        log = worker.take_log()
+        code = self._drop()
+        hangs = isinstance(error, TimeoutError)
+        how = f"hung for {time_limit:g} s (time_limit)" if hangs else "crashed"
+        text = f"{self._order.path}: the FMU {how} while it was loaded ({_how_it_ended(code)})" + "".join(
+            f"\n  {line}" for line in log[-5:]
+        )
+        if not self._has_loaded:
+            return ModelError(text)
+        return SimulationError(text, status="timeout" if hangs else "crashed", log=log)
 
     def _await_test(self, worker: _Worker, plan: Plan) -> None:
         """Receive the result of the worker's reuse test; if it crashed or hung, never reuse a process."""
         worker.awaits_test = False
         try:
-            reply = receive_reply(worker.sock, 5 * plan.time_limit + _GRACE_SECONDS)
+            reply = worker.receive(5 * plan.time_limit + _GRACE_SECONDS)
         except (Closed, TimeoutError):
             self._reuse = "process"
             self._drop()
@@ -313,7 +332,7 @@ class IsolatedFmu:
             self._drop()
             raise
         worker.take_log()
-        self._reuse = cast(Reuse, reply.text)
+        self._reuse = cast(Reuse, reply.text) if reply.text in get_args(Reuse) else "process"
         if reply.leaving:
             self._drop()
 
@@ -348,13 +367,6 @@ def _how_it_ended(code: int) -> str:
         return f"signal {signal.Signals(-code).name}"
     except ValueError:
         return f"signal {-code}"
-
-
-def _anonymous_file() -> IO[bytes]:
-    """Open a file without a name, in memory if the system supports that."""
-    if hasattr(os, "memfd_create"):
-        return os.fdopen(os.memfd_create("falsifier-fmu"), "w+b")
-    return tempfile.TemporaryFile()
 
 
 def _floats(file: IO[bytes], size: int) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from falsifier.core.model import Interface
-from falsifier.errors import FalsifierError
+from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.co_simulation import CoSimulation
 from falsifier.fmu.description import Description
@@ -60,7 +60,7 @@ class Session:
         deadline = time.perf_counter() + self._plan.time_limit
         if self._state != "new" and not self._is_brought_back():
             self._saved.forget()
-            self._library.renew()
+            self._renew()
             self._state = "new"
         if self._state == "new" and self.reuse == "state" and not self._saved.take():
             self.reuse = "instance"
@@ -104,6 +104,13 @@ class Session:
         """Free the instance and unload the library."""
         self._saved.forget()
         self._library.close()
+
+    def _renew(self) -> None:
+        """Replace the instance; that this fails says nothing about simulations with other inputs."""
+        try:
+            self._library.renew()
+        except ModelError as error:
+            raise SimulationError(str(error)) from error
 
     def _is_brought_back(self) -> bool:
         """Reset the instance after a finished simulation or restore its state; return whether that worked."""

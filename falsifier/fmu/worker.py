@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from falsifier.core.model import Interface
-from falsifier.errors import FalsifierError, SimulationError
+from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
     QUICK_SECONDS,
@@ -91,12 +91,21 @@ class _Worker:
         try:
             memory = mmap.mmap(descriptor, 0)
             self._plan, self._room = plan, Room.over(plan, np.frombuffer(memory, dtype=np.float64))
-            if self._session is None:
-                self._session = Session(self._description, self._folder, self._interface, _log)
-            self._session.prepare(self._plan, self._room)
+            session = self._session or self._load()
+            session.prepare(self._plan, self._room)
+        except SimulationError as error:
+            return Reply("failed", str(error))
         except FalsifierError as error:
             return Reply("unusable", str(error))
         return Reply()
+
+    def _load(self) -> Session:
+        """Load the library and make an instance, which may succeed at another time."""
+        try:
+            self._session = Session(self._description, self._folder, self._interface, _log)
+        except ModelError as error:
+            raise SimulationError(str(error)) from error
+        return self._session
 
     def run(self) -> Reply:
         assert self._session is not None, "prepare must be called before run"

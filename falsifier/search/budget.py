@@ -1,9 +1,14 @@
 """What a run may spend, and what it has spent."""
 
 from dataclasses import dataclass, replace
+from math import isfinite
 
 from falsifier.core.words import counted
-from falsifier.errors import SpecError
+from falsifier.errors import FalsifierError, SpecError
+
+
+class LimitReached(FalsifierError):
+    """A limit of the run is reached in the middle of an engine's turn; the message says which."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +73,8 @@ class Budget:
     def __post_init__(self) -> None:
         for name in ("simulations", "seconds", "tokens", "cost"):
             limit = getattr(self, name)
-            if limit is not None and not limit > 0:
-                raise SpecError(f"budget: {name} must be positive, got {limit}")
+            if limit is not None and not (limit > 0 and isfinite(limit)):
+                raise SpecError(f"budget: {name} must be positive and finite, got {limit}")
         if all(getattr(self, name) is None for name in ("simulations", "seconds", "tokens", "cost")):
             raise SpecError("budget: give at least one limit: simulations, seconds, tokens or cost")
 
@@ -94,6 +99,10 @@ class Budget:
             if spent.cost >= self.cost:
                 return f"the budget of {self.cost:g} US dollars is used up"
         return None
+
+    def seconds_left(self, spent: Spent) -> float | None:
+        """Seconds that the budget still allows; None without a limit."""
+        return None if self.seconds is None else max(0.0, self.seconds - spent.seconds)
 
     def remaining(self, spent: Spent, wanted: int) -> int:
         """Number of the wanted simulations that the budget still allows."""

@@ -16,7 +16,8 @@ from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.evaluation.workers import evaluate_all
 from falsifier.llm.messages import Chat, Exchange
 from falsifier.problem.problem import Problem
-from falsifier.search.budget import Budget, Spent
+from falsifier.search.bounded import BoundedChat
+from falsifier.search.budget import Budget, LimitReached, Spent
 from falsifier.search.events import (
     Asked,
     Confirmed,
@@ -184,9 +185,13 @@ class _Loop:
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
+
+        def wrap(chat: Chat) -> Chat:
+            return self.steps.chat(BoundedChat(chat, self.budget, self.clock))
+
         for target in self.targets:
             if isinstance(target.engine, AsksLLM):
-                target.engine.attach(self.exchanged, self.steps.chat)
+                target.engine.attach(self.exchanged, wrap)
 
     def run(self, batch: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
@@ -209,8 +214,12 @@ class _Loop:
             turn = standing[turns % len(standing)]
             turns += 1
             told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
+            try:
+                candidates = self.ask(turn, batch)
+            except LimitReached as reached:
+                return self.failure_text() if self.all_failed() else str(reached)
             # One by one, as they finish: what an interruption leaves of a batch is counted and recorded.
-            for evaluation in self.steps.evaluate(turn.problem, self.ask(turn, batch)):
+            for evaluation in self.steps.evaluate(turn.problem, candidates):
                 judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
                 self.note(turn, evaluation, judged)
                 for target, seen in judged:
@@ -293,11 +302,7 @@ class _Loop:
             self.emit(event)
 
     def exchanged(self, exchange: Exchange) -> None:
-        """Count and announce an exchange with a language model.
-
-        Raises:
-            ChatError: if the budget is used up in the middle of the LLM's turn.
-        """
+        """Count and announce an exchange with a language model."""
         usage = exchange.usage
         self.spent = self.spent.plus_call(
             prompt=usage.prompt_tokens,
@@ -306,11 +311,6 @@ class _Loop:
             cost=usage.cost,
         )
         self.emit(Exchanged(exchange=exchange, spent=self.clock()))
-        # run() checks the budget between turns; a turn with tool calls takes several paid requests.
-        continues = exchange.reply is not None and bool(exchange.reply.tool_calls)
-        is_new = exchange.reply is not None and exchange.reply.source != "recording"
-        if continues and is_new and (limit := self.budget.exceeded(self.clock())):
-            raise ChatError(f"the language model's turn was cut short: {limit}")
 
     def clock(self) -> Spent:
         """Update and return what has been spent."""

@@ -59,7 +59,9 @@ def export(source: Path, name: str, target: Path, *, version: int, platforms: tu
     """
     system, code = translate(source, name)
     description = fmi2(system, c_files(2)) if version == 2 else fmi3(system)
-    build(Contents(model_identifier(system), version, description, code, sizes_h(system)), target, platforms)
+    identifier = model_identifier(system)
+    contents = Contents(identifier, version, description, code, sizes_h(system), system.implicit)
+    build(contents, target, platforms)
 
 
 def export_all(folder: Path, names: list[str], platforms: tuple[str, ...]) -> None:

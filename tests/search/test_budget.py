@@ -33,7 +33,7 @@ def test_an_unknown_price_stays_unknown_and_forbids_a_limit_on_money() -> None:
 def test_a_budget_needs_a_positive_limit() -> None:
     with pytest.raises(SpecError, match="at least one limit"):
         Budget(None)
-    with pytest.raises(SpecError, match="simulations must be positive, got 0"):
+    with pytest.raises(SpecError, match="simulations must be positive and finite, got 0"):
         Budget(0)
 
 

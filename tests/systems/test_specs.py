@@ -6,15 +6,21 @@ import pytest
 from falsifier.problem.loading import load_problem, load_problems
 from tests.systems.driving import ROOT
 
-# Requirements and coordinates of the default parameterization, then of instance 2 where there is one.
+# Requirements and coordinates of the default parameterization, then of instance 2 if there is one; one more
+# for AFC27.
 SYSTEMS = {
+    "AFC": ("AFC27 AFC29 AFC33", 11, 11),
     "AT": ("AT1 AT2 AT51 AT52 AT53 AT54 AT6a AT6b AT6c AT6abc", 10, 10),
     "CC": ("CC1 CC2 CC3 CC4 CC5 CCx", 20, 40),
     "NN": ("NN NNb NNx", 8, 3),
     "F16": ("F16", 3, None),
     "SC": ("SC", 18, 20),
     "PM": ("PM", 10, 5),
+    "PulseMeter": ("PulseMeter", 24, None),
+    "ChargerHandshake": ("ChargerHandshake", 16, None),
+    "HeaterLimpHome": ("HeaterLimpHome", 20, None),
 }
+PUBLISHED = ("AT", "CC", "NN", "F16", "SC")
 
 
 def published() -> dict[str, Any]:
@@ -27,11 +33,11 @@ def test_spec_loads(system: str) -> None:
     problems = load_problems(system)
     assert [p.name for p in problems] == names.split()
     for problem in problems:
-        assert len(problem.space.dimensions) == coordinates
+        assert len(problem.space.dimensions) == coordinates + (problem.name == "AFC27")
         assert problem.requirement.description.endswith(".")
     if coordinates_of_instance_2 is not None:
         for problem in load_problems(system, profile="instance2"):
-            assert len(problem.space.dimensions) == coordinates_of_instance_2
+            assert len(problem.space.dimensions) == coordinates_of_instance_2 + (problem.name == "AFC27")
             assert all(r.interpolation == "constant" and r.free is None for r in problem.space.inputs)
 
 
@@ -43,6 +49,9 @@ def test_fmu_speaks_for_itself(system: str) -> None:
     for variable in (*info.inputs, *info.outputs, *info.parameters):
         assert variable.description, variable.name
     for variable in info.inputs:
+        if variable.kind != "real":
+            assert variable.literals or variable.kind == "boolean", variable.name
+            continue
         assert variable.unit, variable.name
         assert variable.low is not None and variable.high is not None, variable.name
 
@@ -53,6 +62,21 @@ def test_instance_2_of_nnx_is_over_after_three_seconds() -> None:
     assert problem.space.stop_time == 3
     assert [d.time for d in problem.space.dimensions] == [0, 1, 2]
     assert problem.space.bounds.tolist() == [[1.95, 2.05]] * 3
+
+
+def test_each_piece_of_the_pedal_lasts_five_seconds() -> None:
+    for name, last in (("AFC27", 50), ("AFC29", 45), ("AFC33", 45)):
+        for profile in (None, "instance2"):
+            space = load_problem(name, profile=profile).space
+            assert [d.time for d in space.dimensions if d.name == "pedal"] == list(range(0, last + 5, 5))
+    assert load_problem("AFC33").space.bounds[0].tolist() == [61.2, 81.2]
+
+
+def test_commands_are_those_of_the_enumeration() -> None:
+    [command] = load_problem("ChargerHandshake").space.inputs
+    names = ["Wait", "Lock", "Unlock", "Precharge", "Close", "Open", "Reset"]
+    assert [name for name, _ in command.items] == names
+    assert (command.low, command.high) == (1, 7)
 
 
 def test_requirement_named_as_its_system_is_meant_by_that_name() -> None:
@@ -68,7 +92,7 @@ def test_samples_of_f16_are_those_of_its_autopilot() -> None:
 
 def test_published_tables_cover_the_specs() -> None:
     tables = published()
-    names = {name for system, (text, *_) in SYSTEMS.items() if system != "PM" for name in text.split()}
+    names = {name for system in PUBLISHED for name in SYSTEMS[system][0].split()}
     columns = [tables["best"], tables["uniform"], tables["llm_falsifier"]]
     columns += [*tables["ablation"].values(), *tables["llms"].values()]
     for column in columns:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..flat.ir import Assert, Branch, Condition, Outputs, Reinit, Section, Set, Statement
+from ..flat.ir import Assert, Branch, Condition, DelayLine, Outputs, Reinit, Section, Set, Statement
 from ..order.contents import Solved
-from ..order.layout import C_TYPES, System
+from ..order.layout import System, c_type
 from ..order.sort import Block
 from ..read.syntax import ExportError
 from .expressions import Mode, Printer, c_name, c_string
@@ -30,6 +30,10 @@ class Emitter:
                 return [line for name in block.defines for line in self.entry(name)] + self.statements(
                     statements
                 )
+            case DelayLine(position=position, out=out):
+                line = self.system.layout.lines.index(item)
+                slot = self.system.layout.slots[out.name]
+                return [f"{slot} = line_read(m, {line}, {self.printer.text(position)});"]
             case Assert():
                 return self.statement(item) if self.mode != "initial" else []
             case _:
@@ -95,7 +99,7 @@ class Emitter:
             c for c in self.system.model.functions[item.function].components if c.causality == "output"
         ]
         for k, (target, component) in enumerate(zip(item.targets, components, strict=True)):
-            ctype = C_TYPES[component.type_name]  # type: ignore[index]
+            ctype = c_type(component.type_name)
             if target is None:
                 if component.dimensions:
                     raise ExportError(item.place, "an array output cannot be omitted")

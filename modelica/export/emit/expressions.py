@@ -24,7 +24,7 @@ from ..flat.ir import (
     Type,
     Var,
 )
-from ..order.layout import C_TYPES, Layout, literal
+from ..order.layout import Layout, c_type, literal
 
 Mode = Literal["continuous", "event", "initial"]
 """Mode of the generated code: relations are frozen in continuous mode, evaluated in the other two."""
@@ -142,7 +142,7 @@ class Printer:
         first = places[0]
         if first and all(p == (first[0], first[1] + k) for k, p in enumerate(places)):
             return f"&{first[0]}[{first[1]}]"
-        return f"(const {C_TYPES[value.type]}[]){{{', '.join(self.text(item) for item in value.items)}}}"
+        return f"(const {c_type(value.type)}[]){{{', '.join(self.text(item) for item in value.items)}}}"
 
 
 def _time_after(node: Relation) -> bool:
@@ -168,6 +168,8 @@ def operation_text(name: str, args: list[str], kind: Type, types: list[Type]) ->
             return f"({a} / (double){b})"
         case "^", [a, b]:
             return f"square({a})" if b in ("2", "2.0") else f"pow({a}, {b})"
+        case "ordinal", [a]:
+            return a
         case "real", [a]:
             return f"((double){a})"
         case "integer", [a]:

@@ -8,7 +8,7 @@ from ..flat import builtin, fold
 from ..flat.evaluate import Evaluator
 from ..flat.ir import FlatModel, Lit, Type
 from ..flat.tensors import type_of
-from ..order.layout import C_TYPES, Layout, literal
+from ..order.layout import Layout, c_type, literal
 from ..read.library import find_class, find_constant
 from ..read.syntax import (
     ArrayOf,
@@ -130,7 +130,7 @@ class Expressions:
         if wanted == "Real" and kind == "Integer":
             kind = wanted
         texts = ", ".join(row.text for row in rows)
-        return Value(f"(const {C_TYPES[kind]}[]){{{texts}}}", kind, (str(len(rows)),))
+        return Value(f"(const {c_type(kind)}[]){{{texts}}}", kind, (str(len(rows)),))
 
     def whole(self, name: str, place: Place) -> Value:
         """Return a variable of the function as a whole, without subscripts."""

@@ -6,8 +6,9 @@ from ..flat import builtin
 from ..flat.evaluate import Evaluator
 from ..flat.instance import Scope
 from ..flat.ir import FlatModel, Type
+from ..flat.parts import assertion_message
 from ..flat.tensors import type_of
-from ..order.layout import C_TYPES, Layout
+from ..order.layout import Layout, c_type
 from ..read.syntax import (
     Assign,
     Body,
@@ -26,7 +27,6 @@ from ..read.syntax import (
     Ref,
     Run,
     Several,
-    Text,
     While,
 )
 from .expressions import c_name, c_string
@@ -70,7 +70,7 @@ class FunctionWriter(Expressions):
         parameters = ["Model *m"]
         lines: list[str] = []
         for item in self.cls.components:
-            ctype = C_TYPES[type_of(item)]
+            ctype = c_type(type_of(item))
             if item.variability == "constant":
                 continue
             if item.causality == "input":
@@ -87,7 +87,7 @@ class FunctionWriter(Expressions):
         if "goto" in "\n".join(lines):
             lines.append("finish:;")
         lines += self.results()
-        result = C_TYPES[type_of(self.single)] if self.single else "void"
+        result = c_type(type_of(self.single)) if self.single else "void"
         text = "    (void)m;\n" + "".join(f"    {line}\n" for line in lines)
         return f"static {result} {c_name(self.cls.full_name)}({', '.join(parameters)})", text
 
@@ -140,8 +140,8 @@ class FunctionWriter(Expressions):
                 return [f"while ({self.boolean(condition)}) {{", *self.indented(body), "}"]
             case Jump(kind, _):
                 return ["break;"] if kind == "break" else ["goto finish;"]
-            case Run(call, place) if call.name == "assert" and isinstance(call.arguments[1], Text):
-                message = c_string(f"{place}: {call.arguments[1].value}")
+            case Run(call, place) if call.name == "assert":
+                message = c_string(f"{place}: {assertion_message(call)}")
                 return [f"if (!{self.boolean(call.arguments[0])}) model_fail(m, {message});"]
         raise ExportError(item.place, "this statement is not supported in a function")
 
@@ -195,7 +195,7 @@ class FunctionWriter(Expressions):
             raise ExportError(place, "the two sides of ':=' have different numbers of dimensions")
         size = " * ".join(value.dims)
         check = f"same_size(m, {count}, {size});"
-        source, goal = C_TYPES[value.type], C_TYPES[target.type]
+        source, goal = c_type(value.type), c_type(target.type)
         return [
             check,
             f"{{ const {source} *from = {value.text}; {goal} *to = {target.text}; int n = {count};",
@@ -219,7 +219,7 @@ class FunctionWriter(Expressions):
             if ref is None:
                 if output.dimensions:
                     raise ExportError(place, "an array output cannot be omitted here")
-                lines.append(f"{C_TYPES[type_of(output)]} unused_{k};")
+                lines.append(f"{c_type(type_of(output))} unused_{k};")
                 pointers.append(f"&unused_{k}")
                 continue
             target = self.target(ref)

@@ -7,9 +7,13 @@ from ..flat.ir import Lit, Scalar, Time, Variable, names_in
 from ..order.layout import System, discrete_outputs, kinds_of, literal
 from ..order.parameters import calculated_starts, sorted_parameters
 from ..order.sort import Block
+from ..order.sparsity import depend_on_time, dependences, groups
 from .blocks import Emitter
-from .expressions import Printer
+from .expressions import Printer, c_string
 from .functions import functions_text
+
+DELAY_POINTS = 4096
+"""Number of points that a delay line can hold, unless the model specifies it."""
 
 REPEAT_TICKS = {"never": 0, "unseen": 1, "always": 2}
 
@@ -25,13 +29,14 @@ def model_c(system: System, evaluator: Evaluator) -> str:
         Emitter(system, "event"),
         Emitter(system, "initial"),
     )
-    lively = [block for block in system.blocks if not block.discrete]
-    slopes = needed_for({f"der({name})" for name in system.states}, lively)
+    lively, slopes = _lively(system), slope_blocks(system)
     rest = [block for block in lively if block not in slopes]
     crossing_names = {n for r in layout.relations for n in names_in(r)} | {
         n for f in layout.floors for n in names_in(f)
     }
     operands = [block for block in needed_for(crossing_names, lively) if block not in slopes]
+    delayed = {v.name for line in layout.lines for v in (line.key, line.value)}
+    into_lines = [block for block in needed_for(delayed, lively) if block not in slopes]
     parts = [
         _function("model_defaults", _defaults(system)),
         _function("model_parameters", _parameters(system)),
@@ -42,6 +47,7 @@ def model_c(system: System, evaluator: Evaluator) -> str:
         _function("model_rest", [line for b in rest for line in continuous.block(b)]),
         _function("model_operands", [line for b in operands for line in continuous.block(b)]),
         *_crossing_functions(system),
+        *_line_functions(system, [line for b in into_lines for line in continuous.block(b)]),
     ]
     functions = functions_text(model, evaluator, layout)
     body = "\n\n".join(parts)
@@ -57,6 +63,15 @@ def model_c(system: System, evaluator: Evaluator) -> str:
         )
         + "\n"
     )
+
+
+def _lively(system: System) -> list[Block]:
+    return [block for block in system.blocks if not block.discrete]
+
+
+def slope_blocks(system: System) -> list[Block]:
+    """Return the blocks that compute the derivatives."""
+    return needed_for({f"der({name})" for name in system.states}, _lively(system))
 
 
 def needed_for(names: set[str], blocks: list[Block]) -> list[Block]:
@@ -135,6 +150,31 @@ def _crossing_functions(system: System) -> list[str]:
     ]
 
 
+def _line_functions(system: System, inputs: list[str]) -> list[str]:
+    printer = Printer(system.layout, "event")
+    seeds, ends = [], []
+    for k, line in enumerate(system.layout.lines):
+        key = printer.text(line.key)
+        for distance, value in line.seeds:
+            seeds.append(f"line_seed(m, {k}, {key} - {printer.text(distance)}, {printer.text(value)});")
+        entered, span = printer.text(line.value), printer.text(line.span)
+        ends += [f"now->key[{k}] = {key};", f"now->value[{k}] = {entered};", f"now->span[{k}] = {span};"]
+    return [
+        _function("model_line_seeds", seeds),
+        _function("model_lines", ["(void)now;", *inputs, *ends], "Model *m, Entries *now"),
+    ]
+
+
+def _implicit(system: System) -> list[str]:
+    """Return the tables that the implicit method needs."""
+    rows = dependences(system)
+    depends = [str(int(j in row)) for row in rows for j in range(len(rows))]
+    return [
+        f"const int model_group[] = {{{', '.join(map(str, groups(rows))) or '0'}}};",
+        f"const unsigned char model_depends[] = {{{', '.join(depends) or '0'}}};",
+    ]
+
+
 def _tables(system: System) -> str:
     layout, model = system.layout, system.model
     kinds = kinds_of(system)
@@ -158,6 +198,8 @@ def _tables(system: System) -> str:
             array("int model_output_reals", [str(k) for k in discrete_outputs(system, system.reals)]),
             array("unsigned char model_crossing_op", operators),
             array("double model_nominal", nominal),
+            array("char *const model_line_names", [c_string(str(line.place)) for line in layout.lines]),
+            *(_implicit(system) if system.implicit else ()),
         ]
     )
 
@@ -179,10 +221,16 @@ def sizes_h(system: System) -> str:
         "MODEL_TIME_RELATIONS": len(layout.time_relations),
         "MODEL_FLOORS": len(layout.floors),
         "MODEL_TICKS": len(layout.ticks),
+        "SOLVER_METHOD": '"implicit.h"' if system.implicit else '"explicit.h"',
         "SOLVER_STEP": repr(float(solver.get("step", system.model.interval or 0.01))) if fixed else "0.0",
         "SOLVER_TOLERANCE": repr(float(system.model.tolerance or 1e-6)),
         "SOLVER_MAX_STEP": repr(float(solver["maxStep"])) if "maxStep" in solver else "HUGE_VAL",
         "SOLVER_CHECKS": int(solver.get("checks", 1 if fixed else 4)),
         "SOLVER_REPEAT_TICKS": REPEAT_TICKS[str(solver.get("repeatTicks", "unseen"))],
+        "MODEL_LINES": len(layout.lines),
+        "LINE_POINTS": int(solver.get("delayPoints", DELAY_POINTS)) if layout.lines else 1,
     }
+    if system.implicit:
+        sizes["MODEL_GROUPS"] = max(groups(dependences(system)), default=-1) + 1
+        sizes["MODEL_SLOPES_OF_TIME"] = int(depend_on_time(slope_blocks(system)))
     return "".join(f"#define {name} {value}\n" for name, value in sizes.items())

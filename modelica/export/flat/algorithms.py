@@ -6,7 +6,21 @@ from dataclasses import replace
 
 from ..read.syntax import Assign, Body, ExportError, For, If, Item, Place, Ref, Run, Several, When
 from .evaluate import Evaluator
-from .ir import Branch, Flat, FlatModel, Scalar, Section, Set, Statement, Tensor, Var, names_in
+from .ir import (
+    Branch,
+    DelayLine,
+    Equation,
+    Flat,
+    FlatModel,
+    Outputs,
+    Scalar,
+    Section,
+    Set,
+    Statement,
+    Tensor,
+    Var,
+    names_in,
+)
 from .parts import TRUE, assertion, loop_values, name_of, outputs, refuse_when, reinit, with_index
 from .tensors import fitted
 from .whens import when_condition
@@ -21,7 +35,13 @@ def section(body: Body, place: Place, here: Evaluator, model: FlatModel) -> None
 def statements(body: Body, here: Evaluator, model: FlatModel, guard: Scalar) -> list[Statement]:
     """Return statements with loops unrolled."""
     made: list[Statement] = []
-    local = here.at(here.scope, events=here.events, sink=made.append)
+
+    def keep(part: Outputs | Equation | DelayLine) -> None:
+        if not isinstance(part, Outputs):
+            raise ExportError(part.place, "'delay' in an algorithm is not supported; use an equation")
+        made.append(part)
+
+    local = here.at(here.scope, events=here.events, sink=keep)
     for item in body:
         _statement(item, local, model, made, guard)
     return made

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..read.syntax import Call, ExportError, Place
 from . import fold
-from .ir import Der, Floor, Initial, Lit, Op, Pre, Scalar, Tensor, Var
+from .delays import delay
+from .ir import NUMBERS, Der, Floor, Initial, Lit, Op, Pre, Scalar, Tensor, Var
 from .tensors import scalar_tensor, tensor
 
 if TYPE_CHECKING:
@@ -103,6 +104,8 @@ def recompute(name: str, known: tuple[Lit, ...], place: Place) -> Scalar:
         return fold.real(known[0].value)
     if name == "integer":
         return Lit(int(known[0].value // 1), "Integer")
+    if name == "ordinal":
+        return Lit(known[0].value, "Integer")
     return fold.arithmetic(name, known, place)
 
 
@@ -153,6 +156,8 @@ def _rounding(evaluator: Evaluator, node: Call) -> Tensor:
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
         arg, place = args[0], node.place
+        if arg.type not in NUMBERS:
+            raise ExportError(place, f"'{node.name}' expects a number, not {arg.type}")
         if arg.type == "Integer":
             return arg
         if node.name == "ceil":
@@ -219,12 +224,24 @@ def _pre(evaluator: Evaluator, node: Call) -> Tensor:
 def _change(evaluator: Evaluator, node: Call) -> Tensor:
     item = _variable(evaluator, node).items[0]
     assert isinstance(item, Var)
-    if item.type == "Real":
-        raise ExportError(node.place, f"'{node.name}' of a Real is not supported")
+    if item.type == "Real" or (node.name == "edge" and item.type != "Boolean"):
+        raise ExportError(node.place, f"'{node.name}' of {item.type} is not supported")
     before = Pre(item.name, item.type)
     if node.name == "edge":
         return scalar_tensor(Op("and", (item, Op("not", (before,), "Boolean")), "Boolean"))
     return scalar_tensor(Op("<>", (item, before), "Boolean"))
+
+
+def _ordinal(evaluator: Evaluator, node: Call) -> Tensor:
+    """The position of an item in its enumeration, starting at 1."""
+
+    def make(args: tuple[Scalar, ...]) -> Scalar:
+        arg = args[0]
+        if arg.type not in evaluator.model.enumerations:
+            raise ExportError(node.place, f"'Integer' expects an enumeration, not {arg.type}")
+        return Lit(arg.value, "Integer") if isinstance(arg, Lit) else Op("ordinal", (arg,), "Integer")
+
+    return _map(evaluator, node, make)
 
 
 def _without_events(evaluator: Evaluator, node: Call) -> Tensor:
@@ -299,6 +316,7 @@ def _sample(evaluator: Evaluator, node: Call) -> Tensor:
 
 
 _CALLS: dict[str, Known] = {
+    "delay": delay,
     "abs": _plain,
     "sign": _plain,
     "floor": _rounding,
@@ -312,6 +330,7 @@ _CALLS: dict[str, Known] = {
     "der": _der,
     "pre": _pre,
     "edge": _change,
+    "Integer": _ordinal,
     "change": _change,
     "noEvent": _without_events,
     "smooth": _without_events,
@@ -330,10 +349,9 @@ _CALLS: dict[str, Known] = {
 
 
 _REFUSED = {
-    "delay": "'delay' is not supported; sample the signal and store its values in an array",
     "terminate": "'terminate' is not supported",
     "terminal": "'terminal' is not supported",
-    "spatialDistribution": "'spatialDistribution' is not supported",
+    "spatialDistribution": "'spatialDistribution' is only allowed in '(a, b) = spatialDistribution(...)'",
     "homotopy": "'homotopy' is not supported",
     "semiLinear": "'semiLinear' is not supported",
     "cardinality": "'cardinality' is not supported",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ..read.syntax import Body, Equal, ExportError, For, If, Item, Place, Run, Several, When
+from ..read.syntax import Body, Call, Equal, ExportError, For, If, Item, Place, Run, Several, When
 from . import fold
+from .delays import spatial_distribution
 from .evaluate import Evaluator
-from .ir import Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var
+from .ir import DelayLine, Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var, alike, is_delayed
 from .parts import TRUE, assertion, loop_values, outputs, refuse_when, with_index
 from .whens import when_equation
 
@@ -15,6 +16,8 @@ def equation(item: Item, here: Evaluator, model: FlatModel) -> None:
     match item:
         case Equal(left, right, place):
             _equal(here.value(left), here.value(right), place, model)
+        case Several(right=Call(name="spatialDistribution")):
+            model.equations.extend(spatial_distribution(here, item))
         case Several():
             model.equations.append(outputs(item, here))
         case For(index, over, body, place):
@@ -38,7 +41,7 @@ def _equal(left: Tensor, right: Tensor, place: Place, model: FlatModel) -> None:
     if left.dims != right.dims:
         raise ExportError(place, f"the two sides of '=' have sizes {list(left.dims)} and {list(right.dims)}")
     for a, b in zip(left.items, right.items, strict=True):
-        if (a.type == "Boolean") != (b.type == "Boolean"):
+        if not alike(a.type, b.type):
             raise ExportError(place, f"'=' between {a.type} and {b.type}")
         for one, other in ((a, b), (b, a)):
             real = other.type == "Real" and not isinstance(other, (Var, Der))
@@ -86,7 +89,9 @@ def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str
     made, found = model.equations[before:], {}
     del model.equations[before:]
     for item in made:
-        if isinstance(item, Equation) and isinstance(item.left, (Var, Der)):
+        if isinstance(item, DelayLine) or (isinstance(item, Equation) and _of_a_delay(item)):
+            model.equations.append(item)
+        elif isinstance(item, Equation) and isinstance(item.left, (Var, Der)):
             key = item.left.name if isinstance(item.left, Var) else f"der({item.left.name})"
             found[key] = item
         elif isinstance(item, Outputs) and all(t and t[0].startswith("$call") for t in item.targets):
@@ -96,3 +101,7 @@ def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str
                 item.place, "an equation inside 'if' must have the form 'x = ...' or 'der(x) = ...'"
             )
     return found
+
+
+def _of_a_delay(item: Equation) -> bool:
+    return isinstance(item.left, Var) and is_delayed(item.left.name)

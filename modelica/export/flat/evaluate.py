@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import prod
 
-from ..read.library import find_class, find_constant
+from ..read.library import enumeration, find_class, find_constant, lookup
 from ..read.syntax import (
     ArrayOf,
     Call,
@@ -31,6 +31,8 @@ from .calls import arguments, function_outputs, lifted
 from .instance import Bound, Leaf, Node, NodeArray, Scope
 from .ir import (
     Cond,
+    DelayLine,
+    Equation,
     FlatModel,
     FunctionCall,
     Lit,
@@ -46,7 +48,7 @@ from .ir import (
 )
 from .tensors import element, fitted, scalar_tensor, selected, stacked, tensor, type_of
 
-Sink = Callable[[Outputs], None]
+Sink = Callable[[Outputs | Equation | DelayLine], None]
 
 
 class Evaluator:
@@ -54,8 +56,8 @@ class Evaluator:
 
     Attributes:
         events: whether relations create events (not inside `noEvent`, when bodies and initial values).
-        sink: receives calls of functions with array results or several outputs, which are taken out of
-            expressions.
+        sink: receives what is taken out of expressions: calls of functions with array results or several
+            outputs, and delay lines with their equations.
     """
 
     def __init__(
@@ -180,6 +182,8 @@ class Evaluator:
             return self.member(self.scope.node, ref.parts, ref.place)
         if str(ref) == "time":
             return scalar_tensor(Time())
+        if (item := self.enumeration_item(ref)) is not None:
+            return item
         found = find_constant(str(ref), self.scope.cls)
         if found is None or any(part.subscripts for part in ref.parts[:-1]):
             raise ExportError(ref.place, f"there is no variable '{ref}' in '{self.scope.cls.full_name}'")
@@ -187,6 +191,18 @@ class Evaluator:
         if component.variability != "constant":
             raise ExportError(ref.place, f"'{ref}' is neither a variable of the model nor a constant")
         return self.subscript(self.package_constant(component, owner), ref.parts[-1].subscripts, ref.place)
+
+    def enumeration_item(self, ref: Ref) -> Tensor | None:
+        """Return `Colour.red`, or None if the name before the last dot is not an enumeration."""
+        names = [part.name for part in ref.parts]
+        cls = enumeration(lookup(".".join(names[:-1]), self.scope.cls)) if len(names) > 1 else None
+        if cls is None:
+            return None
+        items = [name for name, _ in cls.literals]
+        if names[-1] not in items or any(part.subscripts for part in ref.parts):
+            raise ExportError(ref.place, f"'{cls.name}' has no item '{names[-1]}'; it has {', '.join(items)}")
+        self.model.enumerations[cls.full_name] = cls
+        return scalar_tensor(Lit(items.index(names[-1]) + 1, cls.full_name))
 
     def package_constant(self, component: Component, owner: Class) -> Tensor:
         """Return the value of a constant that is declared in a package."""
@@ -330,6 +346,17 @@ class Evaluator:
             case Cond(condition, then, otherwise, _):
                 return self.static(then if self.static(condition, place).value else otherwise, place)
         raise ExportError(place, "this value must be known before simulation")
+
+    def parametric(self, value: Scalar) -> bool:
+        """Whether a value is known when the simulation starts, being made of parameters and literals."""
+        match value:
+            case Lit():
+                return True
+            case Var(name, _):
+                return name in self.leaves and self.leaves[name][0].variability in ("parameter", "constant")
+            case Op(_, args, _):
+                return all(self.parametric(arg) for arg in args)
+        return False
 
     def static_integer(self, expr: Expr, place: Place) -> int:
         """Compute a size or other integer that must be known before simulation."""

@@ -12,10 +12,11 @@ from .ir import Equation, FlatModel, Lit, Pre, Tensor, Type, Var, Variable
 from .tensors import fitted
 
 SOLVER_SETTINGS = {
-    "method": ("fixed", "adaptive"),
+    "method": ("fixed", "adaptive", "implicit"),
     "step": None,
     "maxStep": None,
     "checks": None,
+    "delayPoints": None,
     "repeatTicks": ("never", "unseen", "always"),
 }
 """Names of solver settings with their allowed words; None means a number."""
@@ -65,10 +66,17 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
     parametric = leaf.variability in ("parameter", "constant")
     binding = evaluator.binding(leaf).items if parametric else None
     starts = _attribute(leaf, "start", leaf.type, evaluator)
+    lowest = Lit(1, leaf.type) if leaf.type in model.enumerations else None
     numbers = {key: _attribute(leaf, key, leaf.type, evaluator) for key in ("min", "max", "nominal")}
     texts = {key: _text(leaf, key) for key in ("unit", "displayUnit", "quantity")}
     fixed = _attribute(leaf, "fixed", "Boolean", evaluator)
     discrete = leaf.variability == "discrete" or leaf.type != "Real"
+    if parametric and fixed and not all(evaluator.static(item, place).value for item in fixed.items):
+        raise ExportError(
+            place, f"the parameter '{leaf.name}' needs a value: 'fixed = false' is not supported"
+        )
+    if leaf.causality == "input" and not leaf.public:
+        raise ExportError(place, f"the input '{leaf.name}' is protected and could never be set")
     for k, name in enumerate(leaf.scalars()):
         known = {
             key: evaluator.static(value.items[k], place).value if value else None
@@ -80,7 +88,7 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
             variability="parameter" if parametric else "discrete" if discrete else "continuous",
             causality=leaf.causality or "local",  # type: ignore[arg-type]
             public=leaf.public and leaf.variability != "constant",
-            final=leaf.component.final or leaf.variability == "constant",
+            final=leaf.component.final or leaf.mods.final or leaf.variability == "constant",
             place=place,
             description=leaf.description,
             unit=texts["unit"],
@@ -90,7 +98,7 @@ def _declare(leaf: Leaf, evaluator: Evaluator, model: FlatModel) -> None:
             maximum=known["max"],
             nominal=known["nominal"],
             fixed=bool(fixed and evaluator.static(fixed.items[k], place).value),
-            start=starts.items[k] if starts else None,
+            start=starts.items[k] if starts else lowest,
             binding=binding[k] if binding else None,
         )
 
@@ -166,6 +174,8 @@ def _initial_equation(made: object, model: FlatModel) -> Equation:
 def _experiment(cls: Class, model: FlatModel) -> None:
     settings = {name: mod for name, mod in cls.annotation.inner}
     experiment = dict(settings.get("experiment", Modifier()).inner)
+    if _number(experiment, "StartTime"):
+        raise ExportError(experiment["StartTime"].place, "'StartTime' must be 0")
     model.stop_time = _number(experiment, "StopTime")
     model.interval = _number(experiment, "Interval")
     model.tolerance = _number(experiment, "Tolerance")
@@ -176,10 +186,10 @@ def _experiment(cls: Class, model: FlatModel) -> None:
             )
         value = _literal(mod.value, mod.place)
         words = SOLVER_SETTINGS[name]
-        if (words is None and isinstance(value, (str, bool))) or (words and value not in words):
-            raise ExportError(
-                mod.place, f"'{name}' must be " + (f"one of {', '.join(words)}" if words else "a number")
-            )
+        positive = not isinstance(value, (str, bool)) and value > 0
+        if value not in words if words else not positive:
+            allowed = f"one of {', '.join(words)}" if words else "a number above 0"
+            raise ExportError(mod.place, f"'{name}' must be {allowed}")
         model.solver[name] = value
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from ..read.syntax import ExportError, Place
-from .ir import Cond, Lit, Op, Relation, Scalar, Type
+from .ir import NUMBERS, Cond, Lit, Op, Relation, Scalar, Type, alike
 
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": lambda a, b: a < b,
@@ -43,8 +43,8 @@ def real(value: float) -> Lit:
 
 def _joined(args: tuple[Scalar, ...], place: Place, name: str) -> Type:
     types = {arg.type for arg in args}
-    if "Boolean" in types:
-        raise ExportError(place, f"'{name}' needs numbers, not Booleans")
+    if others := sorted(types - NUMBERS):
+        raise ExportError(place, f"'{name}' expects numbers, not {others[0]}")
     return "Integer" if types == {"Integer"} else "Real"
 
 
@@ -134,8 +134,8 @@ def logic(name: str, args: tuple[Scalar, ...], place: Place) -> Scalar:
 
 def comparison(name: str, left: Scalar, right: Scalar, place: Place, *, events: bool) -> Scalar:
     """A relation; with `events`, a comparison of Reals is frozen between events."""
-    if (left.type == "Boolean") != (right.type == "Boolean"):
-        raise ExportError(place, f"'{name}' compares a Boolean with a number")
+    if not alike(left.type, right.type):
+        raise ExportError(place, f"'{name}' compares {left.type} with {right.type}")
     if isinstance(left, Lit) and isinstance(right, Lit):
         return Lit(COMPARISONS[name](left.value, right.value), "Boolean")
     reals = "Real" in (left.type, right.type)
@@ -150,7 +150,7 @@ def choose(condition: Scalar, then: Scalar, otherwise: Scalar, place: Place) -> 
     """An if-expression."""
     if condition.type != "Boolean":
         raise ExportError(place, "the condition after 'if' must be Boolean")
-    if (then.type == "Boolean") != (otherwise.type == "Boolean"):
+    if not alike(then.type, otherwise.type):
         raise ExportError(place, "the branches of 'if' have different types")
     if isinstance(condition, Lit):
         return then if condition.value else otherwise

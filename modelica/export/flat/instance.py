@@ -51,6 +51,7 @@ class Mods:
     value: Bound | None = None
     inner: dict[str, Mods] = field(default_factory=dict)
     each: bool = False
+    final: bool = False
     place: Place | None = None
 
     def element(self, indices: tuple[int, ...]) -> Mods:
@@ -60,18 +61,22 @@ class Mods:
         value = self.value and Bound(
             self.value.expr, self.value.scope, self.value.place, self.value.indices + indices
         )
-        return Mods(value, {k: m.element(indices) for k, m in self.inner.items()}, place=self.place)
+        inner = {k: m.element(indices) for k, m in self.inner.items()}
+        return Mods(value, inner, final=self.final, place=self.place)
 
 
 def scoped(modifier: Modifier, scope: Scope, place: Place) -> Mods:
     """Attach a scope to a modifier."""
     at = modifier.place or place
     value = Bound(modifier.value, scope, at) if modifier.value is not None else None
-    return Mods(value, {n: scoped(m, scope, at) for n, m in modifier.inner}, modifier.each, modifier.place)
+    inner = {n: scoped(m, scope, at) for n, m in modifier.inner}
+    return Mods(value, inner, modifier.each, modifier.final, modifier.place)
 
 
 def merge(outer: Mods, inner: Mods) -> Mods:
-    """Merge two modifiers; the outer one overrides the inner one."""
+    """Merge two modifiers; the outer one overrides the inner one, unless that is final."""
+    if inner.final and (outer.value or outer.inner):
+        raise ExportError(outer.place, "this is final and cannot be modified")
     names = {**inner.inner, **outer.inner}
     merged = {
         name: merge(outer.inner[name], inner.inner[name])
@@ -79,7 +84,8 @@ def merge(outer: Mods, inner: Mods) -> Mods:
         else names[name]
         for name in names
     }
-    return Mods(outer.value or inner.value, merged, outer.each, outer.place or inner.place)
+    final = outer.final or inner.final
+    return Mods(outer.value or inner.value, merged, outer.each, final, outer.place or inner.place)
 
 
 @dataclass(slots=True)
@@ -119,13 +125,22 @@ class Node:
     """An instance of a model."""
 
     def __init__(
-        self, cls: Class, prefix: str, mods: Mods, evaluator: Evaluator, *, public: bool = True
+        self,
+        cls: Class,
+        prefix: str,
+        mods: Mods,
+        evaluator: Evaluator,
+        *,
+        public: bool = True,
+        place: Place | None = None,
     ) -> None:
         self.cls = cls
         self.prefix = prefix
         self.evaluator = evaluator
         self.public = public
         self.elements: dict[str, tuple[Component, Class, Mods]] = {}
+        if cls.partial:
+            raise ExportError(place or cls.place, f"'{cls.full_name}' is partial and cannot be instantiated")
         self.classes: list[Class] = []
         self._children: dict[str, Leaf | Node | NodeArray] = {}
         self._open: set[str] = set()
@@ -137,6 +152,10 @@ class Node:
                 )
 
     def _collect(self, cls: Class, mods: Mods) -> None:
+        if cls.alias_of:
+            raise ExportError(
+                cls.place, f"the short definition of '{cls.name}' is only supported as the type of components"
+            )
         if cls.kind not in ("model", "block", "class", "record", "package", "function"):
             raise ExportError(cls.place, f"'{cls.kind} {cls.name}' cannot be instantiated")
         for base, modifier in base_classes(cls):
@@ -181,8 +200,11 @@ class Node:
                 if type_name in BUILTIN_TYPES:
                     break
                 cls = find_class(type_name, cls.parent or cls, component.place)
+            if cls.literals:
+                type_name = cls.full_name
+                self.evaluator.model.enumerations[type_name] = cls
         public = self.public and component.public
-        if type_name in BUILTIN_TYPES:
+        if type_name in BUILTIN_TYPES or type_name in self.evaluator.model.enumerations:
             return self._leaf(
                 component, type_name, self._dims(dims_text, mods, scope, component), mods, public=public
             )
@@ -193,11 +215,13 @@ class Node:
         dims = self._dims(dims_text, mods, scope, component)
         flat = self.prefix + name
         if not dims:
-            return Node(cls, flat + ".", mods, self.evaluator, public=public)
+            return Node(cls, flat + ".", mods, self.evaluator, public=public, place=component.place)
         nodes = []
         for index in product(*(range(1, n + 1) for n in dims)):
             label = f"{flat}[{','.join(map(str, index))}]."
-            nodes.append(Node(cls, label, mods.element(index), self.evaluator, public=public))
+            nodes.append(
+                Node(cls, label, mods.element(index), self.evaluator, public=public, place=component.place)
+            )
         return NodeArray(dims, nodes)
 
     def _leaf(
@@ -209,10 +233,9 @@ class Node:
             if name not in ATTRIBUTES:
                 raise ExportError(mod.place or component.place, f"'{type_name}' has no attribute '{name}'")
         top = self.prefix == ""
-        kind: Type = type_name  # type: ignore[assignment]
         leaf = Leaf(
             name=self.prefix + component.name,
-            type=kind,
+            type=type_name,
             dims=dims,
             component=component,
             variability=component.variability,

@@ -8,7 +8,15 @@ from typing import Literal
 
 from ..read.syntax import Class, Place
 
-Type = Literal["Real", "Integer", "Boolean"]
+Type = str
+"""`Real`, `Integer`, `Boolean`, or the full name of an enumeration."""
+
+NUMBERS = frozenset(["Real", "Integer"])
+
+
+def alike(one: Type, other: Type) -> bool:
+    """Whether two types can be compared, equated or be branches of one `if`: numbers, or the same type."""
+    return one == other or {one, other} == NUMBERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +234,35 @@ class Assert:
 
 
 @dataclass(frozen=True, slots=True)
+class DelayLine:
+    """`out` is the value that `value` had when `key` was at `position`.
+
+    Attributes:
+        span: maximum distance of `position` behind `key`.
+        seeds: initial content of the line as pairs of distance behind the first key and value, beginning
+            with what comes out first. Without seeds, the first value comes out.
+    """
+
+    key: Var
+    value: Var
+    position: Var
+    out: Var
+    span: Scalar
+    seeds: tuple[tuple[Scalar, Scalar], ...]
+    place: Place
+
+    @property
+    def first(self) -> Scalar:
+        """The value that comes out at the start."""
+        return self.seeds[0][1] if self.seeds else self.value
+
+
+def is_delayed(name: str) -> bool:
+    """Whether a variable belongs to a delay line."""
+    return name.startswith("$delay")
+
+
+@dataclass(frozen=True, slots=True)
 class Set:
     """Statement `name := value`."""
 
@@ -254,7 +291,7 @@ class Section:
     place: Place
 
 
-Flat = Equation | Condition | Outputs | Reinit | Assert | Section
+Flat = Equation | Condition | Outputs | DelayLine | Reinit | Assert | Section
 
 
 @dataclass(slots=True)
@@ -290,6 +327,7 @@ class FlatModel:
     equations: list[Flat] = field(default_factory=list)
     initial_equations: list[Equation] = field(default_factory=list)
     functions: dict[str, Class] = field(default_factory=dict)
+    enumerations: dict[str, Class] = field(default_factory=dict)
     structural: set[str] = field(default_factory=set)
     conditions: int = 0
     stop_time: float | None = None

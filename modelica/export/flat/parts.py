@@ -9,7 +9,7 @@ from ..read.syntax import Body, Call, ExportError, Expr, Place, Several, Text, W
 from . import fold
 from .calls import arguments, function_outputs, lifted
 from .evaluate import Evaluator
-from .ir import Assert, Lit, Outputs, Reinit, Scalar, Tensor, Var
+from .ir import Assert, DelayLine, Equation, Lit, Outputs, Reinit, Scalar, Tensor, Var
 from .tensors import fitted
 
 TRUE = Lit(value=True, type="Boolean")
@@ -42,15 +42,17 @@ def outputs(item: Several, here: Evaluator) -> Outputs:
     args = arguments(here, function, item.right)
     model = here.model
     model.functions[function.full_name] = function
-    made: list[Outputs] = []
+    made: list[Outputs | Equation | DelayLine] = []
     auxiliary = lifted(here.at(here.scope, sink=made.append), function, args, item.place)
-    for name in (n for target in made[0].targets if target for n in target):
+    call = made[0]
+    assert isinstance(call, Outputs)
+    for name in (n for target in call.targets if target for n in target):
         del model.variables[name]
     targets: list[tuple[str, ...] | None] = []
     for k, result in enumerate(auxiliary):
         ref = item.left[k] if k < len(item.left) else None
         targets.append(None if ref is None else _target_names(here.value(ref), result, item.place))
-    return replace(made[0], targets=tuple(targets))
+    return replace(call, targets=tuple(targets))
 
 
 def _target_names(target: Tensor, result: Tensor, place: Place) -> tuple[str, ...]:
@@ -90,10 +92,16 @@ def reinit(call: Call, here: Evaluator, guard: Scalar) -> list[Reinit]:
 
 def assertion(call: Call, here: Evaluator, guard: Scalar) -> Assert:
     """`assert(condition, message)`."""
-    if len(call.arguments) < 2 or not isinstance(call.arguments[1], Text):
-        raise ExportError(call.place, "'assert' needs a condition and a literal message")
+    message = assertion_message(call)
     with here.without_events():
         condition = here.scalar(call.arguments[0])
     if guard is not TRUE:
         condition = fold.logic("or", (fold.logic("not", (guard,), call.place), condition), call.place)
-    return Assert(condition, call.arguments[1].value, call.place)
+    return Assert(condition, message, call.place)
+
+
+def assertion_message(call: Call) -> str:
+    """Return the message of an assert."""
+    if len(call.arguments) != 2 or call.named or not isinstance(call.arguments[1], Text):
+        raise ExportError(call.place, "'assert' expects a condition and a literal message, and no level")
+    return call.arguments[1].value

@@ -6,7 +6,7 @@ from itertools import product
 from math import prod
 
 from ..read.syntax import Component, ExportError, Place
-from .ir import Lit, Op, Scalar, Tensor, Type
+from .ir import Lit, Op, Scalar, Tensor, Type, alike
 
 
 def scalar_tensor(item: Scalar) -> Tensor:
@@ -24,8 +24,10 @@ def tensor(dims: tuple[int, ...], items: list[Scalar], kind: Type | None = None)
 def type_of(component: Component) -> Type:
     """Return the built-in type of a component of a function or package."""
     if component.type_name not in ("Real", "Integer", "Boolean"):
-        raise ExportError(component.place, f"type '{component.type_name}' is not supported in functions")
-    return component.type_name  # type: ignore[return-value]
+        raise ExportError(
+            component.place, f"type '{component.type_name}' is not supported in functions and packages"
+        )
+    return component.type_name
 
 
 def cast(item: Scalar, kind: Type, place: Place) -> Scalar:
@@ -53,6 +55,8 @@ def stacked(parts: list[Tensor], place: Place) -> Tensor:
         raise ExportError(place, "an empty array literal has no type; use zeros(0)")
     if any(part.dims != parts[0].dims for part in parts):
         raise ExportError(place, "the rows of the array have different sizes")
+    if any(not alike(part.type, parts[0].type) for part in parts):
+        raise ExportError(place, "the elements of the array have different types")
     return tensor((len(parts), *parts[0].dims), [item for part in parts for item in part.items])
 
 

@@ -20,7 +20,7 @@ from ..read.syntax import (
 )
 from . import fold
 from .evaluate import Evaluator
-from .ir import Condition, Edge, Equation, FlatModel, Initial, Lit, Op, Pre, Scalar, Tick, Var
+from .ir import Condition, Edge, Equation, FlatModel, Initial, Lit, Pre, Scalar, Tick, Var
 from .parts import TRUE, assertion, loop_values, name_of, reinit, with_index
 from .tensors import cast, fitted
 
@@ -55,20 +55,9 @@ def _tick(call: Call, here: Evaluator) -> Tick:
         raise ExportError(call.place, "'sample' expects two arguments: sample(start, interval)")
     start, interval = (cast(here.scalar(text), "Real", call.place) for text in call.arguments)
     for value in (start, interval):
-        if not _parametric(value, here):
+        if not here.parametric(value):
             raise ExportError(call.place, "the arguments of 'sample' must be parameters or literals")
     return Tick(start, interval)
-
-
-def _parametric(value: Scalar, here: Evaluator) -> bool:
-    match value:
-        case Lit():
-            return True
-        case Var(name, _):
-            return name in here.leaves and here.leaves[name][0].variability in ("parameter", "constant")
-        case Op(_, args, _):
-            return all(_parametric(arg, here) for arg in args)
-    return False
 
 
 def when_equation(item: When, here: Evaluator, model: FlatModel) -> None:

@@ -9,6 +9,7 @@ from ..flat.ir import (
     Assert,
     Branch,
     Condition,
+    DelayLine,
     Der,
     Edge,
     Equation,
@@ -36,7 +37,7 @@ class Solved:
     discrete: bool = False
 
 
-Computed = Solved | Condition | Outputs | Section | Reinit | Assert
+Computed = Solved | Condition | Outputs | DelayLine | Section | Reinit | Assert
 
 
 def bare_name(node: Scalar) -> str:
@@ -60,6 +61,8 @@ def values(item: Flat | Computed | Statement) -> Iterator[Scalar]:
         case Outputs():
             for tensor in item.args:
                 yield from tensor.items
+        case DelayLine():
+            yield item.position
         case Reinit():
             yield item.condition
             yield item.value
@@ -84,6 +87,8 @@ def targets(item: Flat | Computed | Statement) -> tuple[str, ...]:
             return (item.target,)
         case Set():
             return (item.name,)
+        case DelayLine():
+            return (item.out.name,)
         case Condition():
             return (f"when({item.index})",)
         case Outputs():

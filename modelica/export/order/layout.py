@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ..flat.ir import (
     Condition,
+    DelayLine,
     FlatModel,
     Floor,
     Lit,
@@ -26,7 +27,10 @@ from .contents import Solved, values, when_targets
 from .parameters import fixed_names
 from .sort import Block
 
-C_TYPES: dict[Type, str] = {"Real": "double", "Integer": "int", "Boolean": "int"}
+
+def c_type(kind: Type) -> str:
+    """Return the C type of a value."""
+    return "double" if kind == "Real" else "int"
 
 
 def literal(value: float, kind: Type) -> str:
@@ -48,11 +52,12 @@ class Layout:
     time_relations: dict[Relation, int] = field(default_factory=dict)
     floors: dict[Scalar, int] = field(default_factory=dict)
     ticks: dict[tuple[Scalar, Scalar], int] = field(default_factory=dict)
+    lines: list[DelayLine] = field(default_factory=list)
     tables: dict[tuple[str, ...], str] = field(default_factory=dict)  # constant arrays
 
     def table(self, texts: tuple[str, ...], kind: Type) -> str:
         """Return the name of a constant array with these elements."""
-        key = (C_TYPES[kind], *texts)
+        key = (c_type(kind), *texts)
         return self.tables.setdefault(key, f"table_{len(self.tables) + 1}")
 
     def table_text(self) -> str:
@@ -85,6 +90,11 @@ class System:
     layout: Layout = field(default_factory=Layout)
 
     @property
+    def implicit(self) -> bool:
+        """Whether the model is integrated by the implicit method."""
+        return self.model.solver.get("method") == "implicit"
+
+    @property
     def crossings(self) -> int:
         """The number of event indicators."""
         return len(self.layout.relations) + 2 * len(self.layout.floors)
@@ -109,6 +119,10 @@ def lay_out(model: FlatModel, states: list[str], blocks: list[Block], initial_bl
     }
     discrete |= _section_memory(blocks, model)
     system.discrete_reals = [n for n in system.reals if n in discrete]
+    for name, variable in model.variables.items():
+        wanted = variable.variability == "discrete" and variable.causality != "input"
+        if variable.type == "Real" and wanted and name not in discrete:
+            raise ExportError(variable.place, f"the discrete variable '{name}' is not set in a when clause")
     _check_pre(system)
     extra = [n for n in system.reals if n in needed and n not in set(system.discrete_reals)]
     system.before = system.discrete_reals + extra
@@ -155,6 +169,8 @@ def _events(system: System) -> None:
     layout = system.layout
     varying = _varying(system)
     for block in system.blocks:
+        if isinstance(block.item, DelayLine):
+            layout.lines.append(block.item)
         for value in values(block.item):
             for part in walk(value):
                 if isinstance(part, Tick):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..flat.ir import FlatModel, Lit, Pre, Scalar, Tick, Time, Variable, names_in, walk
+from ..flat.ir import DelayLine, FlatModel, Lit, Pre, Scalar, Tick, Time, Variable, names_in, walk
 from ..read.syntax import ExportError
 from .contents import values
 
@@ -38,6 +38,10 @@ def calculated_starts(model: FlatModel) -> list[Variable]:
             and variable.start is not None
             and not isinstance(variable.start, Lit)
         ):
+            if variable.causality == "input":
+                raise ExportError(
+                    variable.place, f"the start value of the input '{variable.name}' must be a literal"
+                )
             _known_names(variable.start, variable, model)
             found.append(variable)
     return found
@@ -65,6 +69,9 @@ def fixed_names(model: FlatModel) -> set[str]:
     for equation in model.initial_equations:
         seeds |= names_in(equation.right)
     for item in model.equations:
+        if isinstance(item, DelayLine):
+            for value in (item.span, *(seed for _, seed in item.seeds)):
+                seeds |= names_in(value)
         for value in values(item):
             for part in walk(value):
                 if isinstance(part, Tick):

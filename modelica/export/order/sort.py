@@ -8,6 +8,7 @@ from ..flat.ir import (
     Assert,
     Branch,
     Condition,
+    DelayLine,
     Der,
     FlatModel,
     Floor,
@@ -83,6 +84,8 @@ def sort_initial(model: FlatModel, states: list[str]) -> list[Block]:
         if isinstance(item, Solved) and item.target in starts and item.discrete:
             equation = starts.pop(item.target)
             items.append(Solved(item.target, equation.right, equation.place, discrete=True))
+        elif isinstance(item, DelayLine):
+            items.append(Solved(item.out.name, item.first, item.place))
         elif isinstance(item, (Reinit, Assert)):
             continue
         else:

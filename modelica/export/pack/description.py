@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ..flat.ir import Lit, Variable
+from ..flat.ir import Lit, Type, Variable
 from ..order.layout import System, kinds_of
 from .units import base_unit
 
@@ -22,7 +21,7 @@ class Entry:
 
     name: str
     reference: int
-    type: Literal["Real", "Integer", "Boolean"]
+    type: Type
     causality: str
     variability: str
     initial: str | None
@@ -111,6 +110,24 @@ def _typed(variable: Variable | None, kind: str) -> dict[str, str]:
     return found
 
 
+def _enumerations(parent: Element, system: System, shown: list[Entry], *, version: int) -> None:
+    """Write the definitions of the enumerations that are types of variables."""
+    used = [name for name in system.model.enumerations if any(entry.type == name for entry in shown)]
+    if not used:
+        return
+    definitions = SubElement(parent, "TypeDefinitions")
+    for name in sorted(used):
+        cls = system.model.enumerations[name]
+        head = {"name": name} | ({"description": cls.description} if cls.description else {})
+        if version == 2:
+            owner = SubElement(SubElement(definitions, "SimpleType", head), "Enumeration")
+        else:
+            owner = SubElement(definitions, "EnumerationType", head)
+        for k, (item, description) in enumerate(cls.literals):
+            attributes = {"name": item, "value": str(k + 1)}
+            SubElement(owner, "Item", attributes | ({"description": description} if description else {}))
+
+
 def _units(parent: Element, shown: list[Entry]) -> None:
     used: dict[str, set[str]] = {}
     for entry in shown:
@@ -170,6 +187,7 @@ def fmi2(system: System, sources: list[str]) -> str:
         for source in sources:
             SubElement(files, "File", name=source)
     _units(root, shown)
+    _enumerations(root, system, shown, version=2)
     categories = SubElement(root, "LogCategories")
     SubElement(categories, "Category", name="logStatusError", description="Reason why a call failed")
     _experiment(root, system)
@@ -184,11 +202,14 @@ def fmi2(system: System, sources: list[str]) -> str:
             attributes["initial"] = entry.initial
         element = SubElement(variables, "ScalarVariable", attributes)
         typed = _typed(entry.variable, entry.type)
+        tag = "Enumeration" if entry.type in system.model.enumerations else entry.type
+        if tag == "Enumeration":
+            typed = {"declaredType": entry.type} | typed
         if entry.start is not None:
             typed["start"] = entry.start
         if entry.derivative_of:
             typed["derivative"] = str(index[entry.derivative_of])
-        SubElement(element, entry.type, typed)
+        SubElement(element, tag, typed)
     structure = SubElement(root, "ModelStructure")
     for name, chosen in _structure(shown, system).items():
         if chosen:
@@ -236,6 +257,7 @@ def fmi3(system: System) -> str:
     SubElement(root, "ModelExchange", flags)
     SubElement(root, "CoSimulation", {**flags, "canHandleVariableCommunicationStepSize": "true"})
     _units(root, shown)
+    _enumerations(root, system, shown, version=3)
     categories = SubElement(root, "LogCategories")
     SubElement(categories, "Category", name="logStatusError", description="Reason why a call failed")
     _experiment(root, system)
@@ -256,12 +278,14 @@ def fmi3(system: System) -> str:
         attributes |= {"causality": entry.causality, "variability": entry.variability}
         if entry.initial:
             attributes["initial"] = entry.initial
+        if entry.type in system.model.enumerations:
+            attributes["declaredType"] = entry.type
         attributes |= _typed(entry.variable, entry.type)
         if entry.start is not None:
             attributes["start"] = entry.start
         if entry.derivative_of:
             attributes["derivative"] = str(references[entry.derivative_of])
-        SubElement(variables, names[entry.type], attributes)
+        SubElement(variables, names.get(entry.type, "Enumeration"), attributes)
     indicators = [str(time + 1 + k) for k in range(system.crossings)]
     for k, reference in enumerate(indicators):
         attributes = {"name": f"_indicator_{k + 1}", "valueReference": reference, "causality": "local"}

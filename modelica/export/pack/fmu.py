@@ -17,10 +17,10 @@ from .description import GUID_MARK
 RUNTIME = Path(__file__).parent.parent / "runtime"
 
 
-_COMMON = ("model.h", "instance.h", "events.c", "integrate.c", "cosimulation.c", "instance.c")
+_HEADERS = ("model.h", "instance.h", "step.h")
 
 
-SOURCES = {2: (*_COMMON, "fmi2.c"), 3: (*_COMMON, "fmi3.c")}
+_COMMON = ("events.c", "lines.c", "integrate.c", "cosimulation.c", "instance.c")
 
 
 _WARNINGS = ("-Wall", "-Wextra", "-Werror", "-Wno-parentheses-equality", "-Wno-unused", "-Wno-type-limits")
@@ -57,10 +57,18 @@ class Contents:
     description: str
     model_c: str
     sizes_h: str
+    implicit: bool
+
+    @property
+    def c_files(self) -> list[str]:
+        """The names of the files to compile."""
+        return c_files(self.version)
 
     def sources(self) -> dict[str, str]:
         """Return all C files by name."""
-        files = {name: (RUNTIME / name).read_text(encoding="utf-8") for name in SOURCES[self.version]}
+        method = "implicit.h" if self.implicit else "explicit.h"
+        names = (*_HEADERS, method, *(name for name in self.c_files if name != "model.c"))
+        files = {name: (RUNTIME / name).read_text(encoding="utf-8") for name in names}
         return files | {"model.c": self.model_c, "sizes.h": self.sizes_h}
 
     def guid(self) -> str:
@@ -74,7 +82,7 @@ class Contents:
 
 def c_files(version: int) -> list[str]:
     """Return the names of the files to compile."""
-    return sorted(["model.c", *(name for name in SOURCES[version] if name.endswith(".c"))])
+    return sorted(["model.c", *_COMMON, f"fmi{version}.c"])
 
 
 def build(contents: Contents, target: Path, platforms: tuple[str, ...]) -> None:
@@ -110,7 +118,7 @@ def build(contents: Contents, target: Path, platforms: tuple[str, ...]) -> None:
 def _compile(contents: Contents, work: Path, platform: Platform) -> Path:
     binary = work / (contents.identifier + platform.suffix)
     command = [sys.executable, "-m", "ziglang", "cc", "-target", platform.target, *_FLAGS]
-    command += [*_WARNINGS, *c_files(contents.version), "-o", binary.name, *platform.extra]
+    command += [*_WARNINGS, *contents.c_files, "-o", binary.name, *platform.extra]
     done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=False)
     if done.returncode or not binary.is_file():
         keep = Path(tempfile.mkdtemp(prefix="export-failed-"))
@@ -122,7 +130,7 @@ def _compile(contents: Contents, work: Path, platform: Platform) -> Path:
 
 
 def _build_description(contents: Contents) -> str:
-    files = "\n".join(f'      <SourceFile name="{name}"/>' for name in c_files(3))
+    files = "\n".join(f'      <SourceFile name="{name}"/>' for name in contents.c_files)
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiBuildDescription fmiVersion="3.0">
   <BuildConfiguration modelIdentifier="{contents.identifier}">

@@ -6,6 +6,7 @@ would result in wrong FMUs.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,10 +52,15 @@ class ClassReader(BodyReader):
         """Read one class with its contents."""
         place = self.place(ctx)
         kind = ctx.class_prefixes().class_type().getText()
+        partial = bool(ctx.class_prefixes().PARTIAL())
         spec = ctx.class_specifier()
         form = type(spec).__name__
         name = spec.IDENT()[0].getText() if isinstance(spec.IDENT(), list) else spec.IDENT().getText()
+        if form == "Class_spec_enumContext":
+            return Class(name, kind, self.comment(spec.comment()), place, literals=self.literals(spec, name))
         if form == "Class_spec_baseContext":
+            if prefix := spec.base_prefix().getText():
+                raise ExportError(place, f"'{prefix}' in the short definition of '{name}' is not supported")
             target = self.ref(spec.component_reference())
             modifier = self.class_modification(spec.class_modification())
             result = Class(name, kind, self.comment(spec.comment()), place)
@@ -63,9 +69,20 @@ class ClassReader(BodyReader):
             return result
         if form != "Class_spec_compContext":
             raise ExportError(place, f"this form of class definition is not supported ('{name}')")
-        result = Class(name, kind, self.strings(spec.string_comment()), place)
+        result = Class(name, kind, self.strings(spec.string_comment()), place, partial=partial)
         self.composition(spec.composition(), result)
         return result
+
+    def literals(self, ctx: Any, name: str) -> tuple[tuple[str, str], ...]:
+        """Return names and descriptions of the items of an enumeration."""
+        items = ctx.enum_list().enumeration_literal() if ctx.enum_list() else ()
+        if not items:
+            raise ExportError(self.place(ctx), f"the enumeration '{name}' must list its items")
+        found = tuple((item.IDENT().getText(), self.comment(item.comment())) for item in items)
+        for k, (item, _) in enumerate(found):
+            if item in (other for other, _ in found[:k]):
+                raise ExportError(self.place(items[k]), f"'{item}' is declared twice in '{name}'")
+        return found
 
     def composition(self, ctx: Any, owner: Class) -> None:
         """The body of a class."""
@@ -183,8 +200,7 @@ class ClassReader(BodyReader):
             if any(part.subscripts for part in name.parts):
                 raise ExportError(place, f"a subscript in the modifier of '{name}' is not supported")
             inner = self.modification(change.modification(), place)
-            each = bool(node.EACH())
-            inner = Modifier(inner.value, inner.inner, inner.place, each)
+            inner = replace(inner, each=bool(node.EACH()), final=bool(node.FINAL()))
             for part in reversed(name.parts[1:]):
                 inner = Modifier(None, ((part.name, inner),), place)
             entries.append((name.parts[0].name, inner))

@@ -144,6 +144,13 @@ def _first(name: str, scope: Class, avoid: Class | None) -> Class | None:
     return None
 
 
+def enumeration(cls: Class | None) -> Class | None:
+    """The enumeration that a class is or stands for, None for any other class."""
+    while cls is not None and cls.alias_of:
+        cls = lookup(cls.alias_of.name, cls.parent or cls)
+    return cls if cls is not None and cls.literals else None
+
+
 def find_constant(name: str, scope: Class) -> tuple[Component, Class] | None:
     """Return a component of an enclosing package or of a named one, such as `Data.gain` or `gain`."""
     *path, last = name.split(".")

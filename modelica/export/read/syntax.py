@@ -223,6 +223,7 @@ class Modifier:
     inner: tuple[tuple[str, Modifier], ...] = ()
     place: Place | None = None
     each: bool = False
+    final: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +278,8 @@ class Class:
     annotation: Modifier = field(default_factory=Modifier)
     alias_of: Extends | None = None  # `type Speed = Real(unit="m/s")`
     alias_dimensions: tuple[Expr, ...] = ()
+    literals: tuple[tuple[str, str], ...] = ()  # of an enumeration: names and descriptions
+    partial: bool = False
     parent: Class | None = None
 
     @property

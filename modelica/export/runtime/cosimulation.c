@@ -55,6 +55,7 @@ static void take_inputs(Simulation *s) {
         events_evaluate(m);
         if (events_crossed(m, z)) events_handle(m);
     }
+    if (MODEL_LINES) lines_record(m); /* with the inputs, the input of a delay may have jumped */
     s->changed_reals = s->changed_others = 0;
 }
 

@@ -127,6 +127,7 @@ void events_initialize(Model *m) {
             m->tick_count[k] = (long long)ceil((m->time - start - TIME_TOLERANCE) / interval);
     }
     m->current = m->rest_current = 1;
+    if (MODEL_LINES) lines_start(m);
 }
 
 void events_handle(Model *m) {
@@ -136,6 +137,10 @@ void events_handle(Model *m) {
             m->tick_count[k]++;
         }
     iterate(m);
+    if (MODEL_LINES) {
+        lines_record(m);
+        if (m->ahead) model_fail(m, "a delay time is negative");
+    }
 }
 
 double events_next_time(Model *m) {

@@ -136,6 +136,22 @@ API(fmi3SetBoolean)(void *c, const VR vr[], size_t n, const bool values[], size_
     return result;
 }
 
+/* Enumerations */
+API(fmi3GetInt64)(void *c, const VR vr[], size_t n, int64_t values[], size_t nv) {
+    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: as many values as value references");
+    for (size_t k = 0; k < n && !result; k++) {
+        int value = 0;
+        result = instance_get_int(c, vr[k], &value);
+        values[k] = value;
+    }
+    return result;
+}
+API(fmi3SetInt64)(void *c, const VR vr[], size_t n, const int64_t values[], size_t nv) {
+    int result = nv == n ? RESULT_OK : (int)instance_error(c, "all variables are scalars: as many values as value references");
+    for (size_t k = 0; k < n && !result; k++) result = instance_set_int(c, vr[k], (int)values[k]);
+    return result;
+}
+
 #define NO_SUCH_TYPE(name, type)                                                                                   \
     API(fmi3Get##name)(void *c, const VR vr[], size_t n, type values[], size_t nv) {                               \
         (void)vr, (void)values, (void)nv;                                                                          \
@@ -151,7 +167,6 @@ NO_SUCH_TYPE(UInt8, uint8_t)
 NO_SUCH_TYPE(Int16, int16_t)
 NO_SUCH_TYPE(UInt16, uint16_t)
 NO_SUCH_TYPE(UInt32, uint32_t)
-NO_SUCH_TYPE(Int64, int64_t)
 NO_SUCH_TYPE(UInt64, uint64_t)
 typedef const char *String;
 NO_SUCH_TYPE(String, String)

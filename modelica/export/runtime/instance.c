@@ -31,8 +31,13 @@ void instance_free(Instance *c) {
     free(c);
 }
 
+static void attach_lines(State *state, Line *lines) {
+    state->simulation.now.lines = state->simulation.before.lines = lines;
+}
+
 void instance_reset(Instance *c) {
     memset(&c->state.simulation, 0, sizeof c->state.simulation);
+    attach_lines(&c->state, c->state.lines);
     c->state.phase = PHASE_CREATED;
     c->state.simulation.now.tolerance = SOLVER_TOLERANCE;
     model_defaults(&c->state.simulation.now);
@@ -46,8 +51,14 @@ Result instance_error(Instance *c, const char *message) {
 }
 
 Result instance_result(Instance *c) {
-    const char *error = c->state.simulation.now.error;
-    return error[0] ? instance_error(c, error) : RESULT_OK;
+    Model *m = &c->state.simulation.now;
+    if (m->error[0]) return instance_error(c, m->error);
+    if (!m->ahead) return RESULT_OK;
+    m->ahead = 0;
+    if (c->log && !c->told)
+        c->log(c->environment, c->name, RESULT_DISCARD, "this step is longer than a delay of the model; use a shorter one");
+    c->told = 1;
+    return RESULT_DISCARD;
 }
 
 Result instance_end_initialization(Instance *c) {
@@ -156,12 +167,14 @@ Result instance_save(Instance *c, void **state) {
     if (!*state) *state = malloc(sizeof(State));
     if (!*state) return instance_error(c, "not enough memory for the FMU state");
     memcpy(*state, &c->state, sizeof(State));
+    attach_lines(*state, NULL);
     return RESULT_OK;
 }
 
 Result instance_restore(Instance *c, const void *state) {
     if (!state) return instance_error(c, "there is no FMU state to set");
     memcpy(&c->state, state, sizeof(State));
+    attach_lines(&c->state, c->state.lines);
     forget_preview(c);
     return RESULT_OK;
 }
@@ -243,6 +256,7 @@ Result instance_step_completed(Instance *c, int *enter_event_mode) {
     double z[MODEL_CROSSINGS + 1];
     Model *m = &c->state.simulation.now;
     *enter_event_mode = 0;
+    if (MODEL_LINES) lines_record(m);
     if (MODEL_CROSSINGS) { /* otherwise the event is lost if the solver stops just before an indicator's zero */
         events_evaluate(m);
         *enter_event_mode = events_crossed(m, z);

@@ -15,6 +15,7 @@ typedef enum { RESULT_OK = 0, RESULT_WARNING = 1, RESULT_DISCARD = 2, RESULT_ERR
 
 typedef struct {
     Simulation simulation;
+    Line lines[MODEL_LINES + !MODEL_LINES];
     Phase phase;
     int cosimulation;
     double start_time;
@@ -26,6 +27,7 @@ typedef struct {
     void (*log)(void *environment, const char *name, int status, const char *message);
     const void *callbacks; /* FMI 2: the callback functions of the environment */
     const char *name;
+    int told;       /* the message about a step longer than a delay has been logged */
     Model *preview; /* during initialization: a copy with the initial system solved */
 } Instance;
 

@@ -1,58 +1,25 @@
-/* Runge-Kutta integration with the Dormand-Prince pair 5(4), with fixed or adaptive steps.
+/* Integration with fixed or adaptive steps, by the method of explicit.h or implicit.h.
  *
  * State events are detected by comparing relations with their frozen values at several points of a step, and located
- * on the continuous extension of the pair. Coefficients: Dormand, Prince (1980) and Hairer, Norsett, Wanner,
- * Solving Ordinary Differential Equations I, sections II.5 and II.6.
+ * on the continuous extension of the method.
  */
-#include "model.h"
+#include "step.h"
+
+#include SOLVER_METHOD /* "explicit.h" or "implicit.h" */
 
 #include <stdio.h>
 
-#define N MODEL_STATES
+#define MAX_HALVINGS 4 /* of a step, to add points to a delay line */
 
-typedef struct {
-    double t, h;
-    double y0[N + 1], y1[N + 1];
-    double k[7][N + 1];
-    double dense[N + 1]; /* highest coefficient of the continuous extension */
-    int has_dense;
-} Step;
-
-static void evaluate_at(Model *m, double t, const double *y, double *k) {
+static void step_evaluate(Model *m, double t, const double *y, double *k) {
     m->time = t;
     memcpy(m->r, y, N * sizeof(double));
     model_derivatives(m);
     memcpy(k, m->r + N, N * sizeof(double));
 }
 
-static void stages(Model *m, Step *s) {
-    static const double a[6][5] = {
-        {0},
-        {1.0 / 5},
-        {3.0 / 40, 9.0 / 40},
-        {44.0 / 45, -56.0 / 15, 32.0 / 9},
-        {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
-        {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656}};
-    static const double c[6] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1};
-    double y[N + 1];
-    events_evaluate(m);
-    memcpy(s->k[0], m->r + N, N * sizeof(double));
-    for (int stage = 1; stage < 6; stage++) {
-        for (int j = 0; j < N; j++) {
-            double sum = 0;
-            for (int l = 0; l < stage; l++) sum += a[stage][l] * s->k[l][j];
-            y[j] = s->y0[j] + s->h * sum;
-        }
-        evaluate_at(m, s->t + c[stage] * s->h, y, s->k[stage]);
-    }
-    for (int j = 0; j < N; j++)
-        s->y1[j] = s->y0[j] + s->h * (35.0 / 384 * s->k[0][j] + 500.0 / 1113 * s->k[2][j] + 125.0 / 192 * s->k[3][j] -
-                                      2187.0 / 6784 * s->k[4][j] + 11.0 / 84 * s->k[5][j]);
-    s->has_dense = 0;
-}
-
 static void finish(Model *m, Step *s, double t) {
-    evaluate_at(m, t, s->y1, s->k[6]);
+    step_evaluate(m, t, s->y1, s->k[6]);
     m->current = 1;
     m->rest_current = 0;
 }
@@ -60,26 +27,19 @@ static void finish(Model *m, Step *s, double t) {
 static double error_of(const Model *m, const Step *s) {
     double sum = 0;
     for (int j = 0; j < N; j++) {
-        double e = s->h * (71.0 / 57600 * s->k[0][j] - 71.0 / 16695 * s->k[2][j] + 71.0 / 1920 * s->k[3][j] -
-                           17253.0 / 339200 * s->k[4][j] + 22.0 / 525 * s->k[5][j] - 1.0 / 40 * s->k[6][j]);
         double scale = m->tolerance * (model_nominal[j] + max_real(fabs(s->y0[j]), fabs(s->y1[j])));
-        sum += square(e / scale);
+        sum += square(step_error(s, j) / scale);
     }
     return N ? sqrt(sum / N) : 0;
 }
 
 static void interpolate(Step *s, double theta, double *y) {
-    if (!s->has_dense) {
-        for (int j = 0; j < N; j++)
-            s->dense[j] = s->h * (-12715105075.0 / 11282082432.0 * s->k[0][j] + 87487479700.0 / 32700410799.0 * s->k[2][j] -
-                                  10690763975.0 / 1880347072.0 * s->k[3][j] + 701980252875.0 / 199316789632.0 * s->k[4][j] -
-                                  1453857185.0 / 822651844.0 * s->k[5][j] + 69997945.0 / 29380423.0 * s->k[6][j]);
-        s->has_dense = 1;
-    }
+    if (!s->extended) step_extend(s);
+    s->extended = 1;
     for (int j = 0; j < N; j++) {
-        double rise = s->y1[j] - s->y0[j], bend = s->h * s->k[0][j] - rise;
-        double twist = rise - s->h * s->k[6][j] - bend;
-        y[j] = s->y0[j] + theta * (rise + (1 - theta) * (bend + theta * (twist + (1 - theta) * s->dense[j])));
+        double rise = s->y1[j] - s->y0[j];
+        double curve = s->bend[j] + theta * (s->twist[j] + (1 - theta) * s->dense[j]);
+        y[j] = s->y0[j] + theta * (rise + (1 - theta) * curve);
     }
 }
 
@@ -87,7 +47,7 @@ static void interpolate(Step *s, double theta, double *y) {
 static int probe(Model *m, Step *s, double theta, double *z) {
     double y[N + 1], k[N + 1];
     interpolate(s, theta, y);
-    evaluate_at(m, s->t + theta * s->h, y, k);
+    step_evaluate(m, s->t + theta * s->h, y, k);
     return events_crossed(m, z);
 }
 
@@ -134,7 +94,7 @@ static int find_event(Model *m, Step *s, double end, double *z_start) {
         int last = k + 1 == count, crossed;
         double theta = k < early ? near[k] : (double)(k - early + 1) / SOLVER_CHECKS;
         if (last) {
-            if (k) evaluate_at(m, end, s->y1, s->k[6]);
+            if (k) step_evaluate(m, end, s->y1, s->k[6]);
             crossed = events_crossed(m, z_hi);
         } else {
             crossed = probe(m, s, theta, z_hi);
@@ -168,7 +128,7 @@ static int all_finite(const Model *m, const double *y) {
 
 static double step_size(Model *m, double rest) {
     if (SOLVER_STEP > 0) {
-        double count = ceil(rest / SOLVER_STEP - 1e-6);
+        double count = ceil(rest / (MODEL_LINES ? min_real(SOLVER_STEP, m->longest) : SOLVER_STEP) - 1e-6);
         return rest / max_real(1, count);
     }
     if (!(m->step > 0)) {
@@ -176,8 +136,54 @@ static double step_size(Model *m, double rest) {
         m->step = first_step(m, rest);
     }
     double size = min_real(m->step, SOLVER_MAX_STEP);
+    if (MODEL_LINES) size = min_real(size, m->longest);
     if (size >= rest) return rest;
     return size > 0.5 * rest ? 0.5 * rest : size;
+}
+
+/* Record points of the delay lines inside a step, if straight lines between its ends are not accurate enough. */
+static void refine(Model *m, Step *s, double from, double to, const Entries *first, const Entries *last, int depth) {
+    double y[N + 1], k[N + 1], middle = 0.5 * (from + to);
+    Entries entries;
+    interpolate(s, middle, y);
+    step_evaluate(m, s->t + middle * s->h, y, k);
+    model_lines(m, &entries);
+    if (lines_are_straight(m, first, &entries, last)) return;
+    if (depth) refine(m, s, from, middle, first, &entries, depth - 1);
+    lines_insert(m, &entries);
+    if (depth) refine(m, s, middle, to, &entries, last, depth - 1);
+}
+
+/* Record a completed step, which may have ended early at an event. */
+static void record(Model *m, Step *s) {
+    double end = m->time, reals[MODEL_REALS + 1];
+    Entries first, last;
+    lines_last(m, &first);
+    model_lines(m, &last);
+    memcpy(reals, m->r, sizeof reals);
+    refine(m, s, 0, (end - s->t) / s->h, &first, &last, MAX_HALVINGS);
+    memcpy(m->r, reals, sizeof reals);
+    m->time = end;
+    lines_record(m);
+}
+
+/* Return to the beginning of a rejected step. */
+static void reject(Model *m, const Step *s) {
+    m->time = s->t;
+    memcpy(m->r, s->y0, N * sizeof(double));
+    memcpy(m->r + N, s->k[0], N * sizeof(double));
+    m->error[0] = 0;
+}
+
+static int shorter_than_delay(Model *m, const Step *s) {
+    m->ahead = 0;
+    m->longest = 0.5 * s->h;
+    if (m->longest < 1e-9) {
+        model_fail(m, "a delay is shorter than the smallest step");
+        return 0;
+    }
+    reject(m, s);
+    return 1;
 }
 
 int integrate(Model *m, double stop) {
@@ -194,31 +200,36 @@ int integrate(Model *m, double stop) {
         s.h = step_size(m, rest);
         double end = s.h >= rest ? stop : s.t + s.h;
         memcpy(s.y0, m->r, N * sizeof(double));
-        stages(m, &s);
+        s.extended = 0;
+        step_stages(m, &s);
         if (!all_finite(m, s.y1) && !(SOLVER_STEP > 0) && s.h > 1e-12 && !m->error[0]) s.y1[0] = NAN;
         finish(m, &s, end);
+        if (MODEL_LINES && m->ahead) {
+            if (!shorter_than_delay(m, &s)) return 0;
+            continue;
+        }
         if (!(SOLVER_STEP > 0)) {
             double error = error_of(m, &s);
-            double factor = error > 0 ? 0.9 * pow(error, -0.2) : 5;
+            double factor = error > 0 ? 0.9 * pow(error, -1.0 / STEP_ORDER) : 5;
             if (!(error <= 1)) { /* also if the error is NaN */
                 m->step = s.h * (error > 1 && isfinite(error) ? max_real(0.2, factor) : 0.2);
                 if (m->step < 1e-13 * max_real(1, fabs(s.t))) {
                     model_fail(m, "the integrator cannot reach its tolerance");
                     return 0;
                 }
-                m->time = s.t;
-                memcpy(m->r, s.y0, N * sizeof(double));
-                memcpy(m->r + N, s.k[0], N * sizeof(double));
-                m->error[0] = 0;
+                reject(m, &s);
                 continue;
             }
-            if (s.h >= m->step || factor < 1) m->step = s.h * min_real(5, max_real(0.2, factor)); /* not if `stop` cut it short */
+            double proposal = s.h * min_real(5, max_real(0.2, factor));
+            m->step = s.h >= m->step || factor < 1 ? proposal : max_real(m->step, proposal); /* `stop` cut this one short */
         }
         if (!all_finite(m, s.y1)) {
             if (!m->error[0]) model_fail(m, "a state is not a finite number");
             return 0;
         }
-        if (crossings && find_event(m, &s, end, z)) return 1;
+        int event = crossings && find_event(m, &s, end, z);
+        if (MODEL_LINES) record(m, &s);
+        if (event) return 1;
     }
     return 0;
 }

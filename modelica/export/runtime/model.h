@@ -1,6 +1,6 @@
 /* The simulated model: its memory, the functions of the generated model.c, and those of the runtime.
  *
- * A Model contains no pointers: copying the struct copies the complete state of a simulation.
+ * Copying the struct copies the complete state of a simulation, except the points of its delay lines (lines.c).
  */
 #ifndef MODEL_H
 #define MODEL_H
@@ -13,6 +13,18 @@
 
 #define MODEL_CROSSINGS (MODEL_RELATIONS + 2 * MODEL_FLOORS)
 #define TIME_TOLERANCE 1e-9 /* s; times that differ by less than this are considered equal */
+
+typedef struct {
+    double key, value;
+} Point;
+
+typedef struct {
+    Point point[LINE_POINTS]; /* a ring buffer */
+} Line;
+
+typedef struct { /* inputs of the delay lines at one time, and how far back each is read */
+    double key[MODEL_LINES + 1], value[MODEL_LINES + 1], span[MODEL_LINES + 1];
+} Entries;
 
 typedef struct {
     double time;
@@ -34,6 +46,11 @@ typedef struct {
     int rest_current; /* all other variables are, too */
     int after_event;  /* no step since the last event */
     int idle_events;  /* events since time last advanced */
+    Line *lines;      /* delay lines, shared by copies of this struct */
+    long long line_begin[MODEL_LINES + 1], line_end[MODEL_LINES + 1], line_hint[MODEL_LINES + 1];
+    double line_time; /* s; time of the last record */
+    double longest;   /* s; limit of the step size, because steps must be shorter than the delays */
+    int ahead;        /* a delay line was read beyond its last point */
     char error[256];  /* empty: no error */
 } Model;
 
@@ -49,6 +66,9 @@ extern const int model_pre_reals[]; /* index in r of the Reals with a value befo
 extern const int model_output_ints[], model_output_reals[]; /* discrete outputs */
 extern const unsigned char model_crossing_op[];
 extern const double model_nominal[];
+extern const int model_group[];             /* implicit method: no slope depends on two states of one group */
+extern const unsigned char model_depends[]; /* implicit method: whether a slope (row) depends on a state (column) */
+extern const char *const model_line_names[]; /* file and line of each delay */
 void model_defaults(Model *m);           /* literal values of parameters and starts */
 void model_parameters(Model *m);         /* parameters that depend on others */
 void model_starts(Model *m);             /* start values that depend on parameters */
@@ -62,6 +82,9 @@ void model_floors(Model *m, double *values);
 void model_thresholds(Model *m, double *at);
 void model_tick_times(Model *m, int k, double *start, double *interval);
 
+void model_line_seeds(Model *m);         /* initial content of the delay lines */
+void model_lines(Model *m, Entries *now);
+
 /* ---- runtime ---- */
 void model_fail(Model *m, const char *message);
 void model_fail_subscript(Model *m, int index, int size, int line);
@@ -73,6 +96,15 @@ int events_crossed(Model *m, double *z);    /* whether a relation differs from i
 double events_next_time(Model *m);          /* HUGE_VAL if there is none */
 void events_evaluate(Model *m);             /* bring the derivatives up to date */
 void events_evaluate_all(Model *m);         /* bring all variables up to date */
+
+/* lines.c */
+void line_seed(Model *m, int k, double key, double value);
+void lines_start(Model *m);
+void lines_record(Model *m);
+void lines_last(const Model *m, Entries *last);
+void lines_insert(Model *m, const Entries *entries);
+int lines_are_straight(const Model *m, const Entries *from, const Entries *middle, const Entries *to);
+double line_read(Model *m, int k, double position);
 
 /* integrate.c */
 int integrate(Model *m, double stop); /* to `stop`, or to the first state event; then returns 1 */

@@ -1,6 +1,6 @@
 within Features;
 model Inherited "extends with a modifier, import, qualified names"
-  extends Base(gain = 3, x(start = 2));
+  extends Base(final gain = 3, x(start = 2));
   import Features.Functions.polynomial;
   import F = Features.Functions;
   output Real z;

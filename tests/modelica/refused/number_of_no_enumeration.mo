@@ -1,0 +1,4 @@
+model M
+  Integer n = Integer(2.5);  // error: 'Integer' expects an enumeration
+equation
+end M;

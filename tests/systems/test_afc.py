@@ -1,0 +1,75 @@
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from tests.systems.driving import Array, Driver, golden, robustness
+from tests.systems.independent import afc
+
+GOLDEN = golden("AFC")
+STOP = GOLDEN["stop_time"]
+OUTPUTS = ("mu", "mode", "pressure", "fuel")
+PIECE = 5.0
+
+
+def pieces(values: Sequence[float], stop: float = STOP) -> Array:
+    """Return a signal of equal pieces at the controller's samples; the last value also holds at the end."""
+    counts = round(stop / 0.01 / len(values))
+    return np.append(np.repeat(np.asarray(values, float), counts), values[-1])
+
+
+def drive(fmu: Driver, pedal: Array, engine: float) -> dict[str, Array]:
+    inputs = {"pedal": pedal, "engine": np.full(len(pedal), engine)}
+    stop = 0.01 * (len(pedal) - 1)
+    rows = fmu.run(inputs, OUTPUTS, stop_time=stop, samples=len(pedal))
+    return {"pedal": pedal, **dict(zip(OUTPUTS, rows.T, strict=True))}
+
+
+@pytest.mark.parametrize("name", GOLDEN["runs"])
+def test_golden_ratios(fmu: Driver, name: str) -> None:
+    run = GOLDEN["runs"][name]
+    found = drive(fmu, pieces(run["pedal"]), run["engine"])
+    at = [round(100 * t) for t in GOLDEN["times"]]
+    assert found["mu"][at] == pytest.approx(run["mu"], abs=GOLDEN["tolerance"])
+    assert np.all(found["mu"][:100] == 0)
+    assert np.all(found["mode"][:1000] == 1)
+    assert np.all(found["mode"][1000:] == run["mode_after_10_s"])
+    for row in run["state"]:
+        k = round(100 * row["time"])
+        assert found["pressure"][k] == pytest.approx(row["pressure"], abs=2e-5)
+        assert found["fuel"][k] == pytest.approx(row["fuel"], abs=4e-5)
+    for requirement, expected in run["robustness"].items():
+        measured = robustness(requirement, "AFC", found, stop_time=STOP)
+        assert measured == pytest.approx(expected, abs=1e-4), requirement
+
+
+@pytest.mark.parametrize("name", [n for n, run in GOLDEN["runs"].items() if "then" in run])
+def test_golden_answers_to_steps(fmu: Driver, name: str) -> None:
+    run = GOLDEN["runs"][name]
+    found = drive(fmu, pieces([*run["pedal"], run["then"]], STOP + PIECE), run["engine"])
+    for requirement, expected in run["robustness_until_55_s"].items():
+        measured = robustness(requirement, "AFC", found, stop_time=STOP + PIECE)
+        assert measured == pytest.approx(expected, abs=3e-5), requirement
+
+
+def test_independent_ratios(fmu: Driver) -> None:
+    rng = np.random.default_rng(36)
+    for run in range(10):
+        low, high = (61.2, 81.2) if run % 3 == 2 else (0.0, 61.1)
+        pedal = pieces(rng.uniform(low, high, 10).tolist())
+        engine = rng.uniform(900, 1100)
+        found = drive(fmu, pedal, engine)
+        mu, mode, pressure = afc.ratios(pedal, np.full(len(pedal), engine))
+        assert np.array_equal(found["mode"], mode)
+        assert np.abs(found["pressure"] - pressure).max() < 5e-5
+        # The independent integration spreads the jump of the ratio at 10 s over one of its steps.
+        difference = np.abs(found["mu"] - mu)
+        assert difference.max() < 3e-4
+        assert difference[1100:].max() < 5e-5
+
+
+def test_a_dead_sensor_opens_the_loop(fmu: Driver) -> None:
+    inputs = {"pedal": np.full(2001, 30.0), "engine": np.full(2001, 1000.0)}
+    rows = fmu.run(inputs, ("mode",), stop_time=20.0, samples=2001, parameters={"faultTime": 15.0})
+    assert rows[1000:1500, 0].max() == 0
+    assert rows[1500:, 0].min() == 1
