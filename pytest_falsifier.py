@@ -169,6 +169,7 @@ def _setting(config: pytest.Config, name: str) -> Any:
 
 def _message(item: pytest.Item, checked: "Checked") -> str:
     """The counterexample, its picture, the command that replays it, and the explanation."""
+    from falsifier.core.files import file_name
     from falsifier.core.words import candidate_lines
     from falsifier.counterexamples.explain import explain
     from falsifier.views.plotting import plot_evaluation, save_figure
@@ -176,7 +177,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     problem, found = checked.problem, checked.counterexample
     assert found is not None
     pictures = item.config.cache.mkdir("falsifier") if item.config.cache else item.config.rootpath
-    picture = pictures / f"{problem.name}.png"
+    picture = pictures / f"{file_name(problem.name)}.png"
     save_figure(plot_evaluation(problem, found.evaluation), picture)
     how = "stored counterexample" if checked.result is None else "counterexample found by a search"
     lines = [

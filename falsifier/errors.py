@@ -13,14 +13,21 @@ from typing import Literal
 _SHOWN_INPUT = 60
 # Maximum number of known names in a message: all bundled requirements fit.
 _LISTED = 40
+# Maximum number of characters of a message; names and values in it come from files of any size.
+_LONGEST_MESSAGE = 2000
+# Maximum number of characters of a name that is compared with known names, or listed.
+_LONGEST_NAME = 100
 
 FailureStatus = Literal["failed", "crashed", "timeout"]
 
 
 class FalsifierError(Exception):
-    """Base of all errors that the package raises on purpose."""
+    """Base of all errors that the package raises on purpose; messages that are too long lose their middle."""
 
     exit_code = 2
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_shortened(message, _LONGEST_MESSAGE))
 
 
 class SpecError(FalsifierError):
@@ -104,11 +111,16 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     >>> did_you_mean("sped", ["rpm", "speed"])
     "did you mean 'speed'? Known: rpm, speed"
     """
-    names = list(dict.fromkeys(known))
+    name = name[:_LONGEST_NAME]
+    names = list(dict.fromkeys(_shortened(other, _LONGEST_NAME) for other in known))
     shown = [*names[:_LISTED], *(["..."] if len(names) > _LISTED else [])]
     listing = f"Known: {', '.join(shown) or 'none'}"
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}? {listing}" if near else listing
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - most // 4]} ... {text[-most // 4 :]}"
 
 
 def rejected(message: str, given: object) -> str:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from falsifier.campaigns.analysis import Run, load
 from falsifier.campaigns.suites import bundled_target
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
@@ -169,8 +170,8 @@ def tolerance(requirement: str) -> float:
 def _exported(run: Run) -> dict[str, object]:
     system, property_ = _NAMES.get(run.requirement, (run.manifest.model.rpartition(".")[2], run.requirement))
     row: dict[str, object] = {
-        "system": system,
-        "property": property_,
+        "system": csv_cell(system),
+        "property": csv_cell(property_),
         "instance": next((i for i, p in _PROFILES.items() if p == (run.method.profile or None)), "1"),
         "input": "[]",
         "parameters": "[]",

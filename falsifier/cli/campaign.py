@@ -1,12 +1,11 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
 import shlex
-import sys
 import time
 from datetime import datetime
 from itertools import product
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NoReturn, get_args
 
 import click
 
@@ -44,6 +43,7 @@ from falsifier.cli.options import (
     total_options,
     variant_option,
 )
+from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.problem.loading import sources_of
@@ -51,6 +51,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.request import Effort, LLMSettings
 from falsifier.views.campaign_text import campaign_display, overall_line
+from falsifier.views.terminal import warn
 
 # Time in s between two updates of falsifier watch.
 _WATCH_PERIOD = 0.5
@@ -163,7 +164,7 @@ def bench(
         suite=suite_name,
     )
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
-    click.echo(f"{counted(len(request.runs), 'run')} in {directory}", err=True)
+    warn(f"{counted(len(request.runs), 'run')} in {directory}")
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
@@ -187,9 +188,9 @@ def watch(*, directory: Path, once: bool) -> None:
                 working = is_worked_on(directory)
             show(follower.look())
     progress = follower.look()  # after the lock was released: by then everything has been written
-    click.echo(overall_line(progress, None, stopped=not working))
+    say(overall_line(progress, None, stopped=not working))
     if not working and progress.finished < len(progress.runs):
-        click.echo(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
+        say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
 
 
 def resume_campaign(
@@ -201,7 +202,7 @@ def resume_campaign(
     finish(directory, outcome, table="main", as_json=as_json)
 
 
-def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> None:
+def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> NoReturn:
     """Save all tables, print one of them, and exit with the campaign's exit code."""
     runs, published = load(directory), read_published()
     for name, make in TABLES.items():
@@ -211,14 +212,14 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
             write_whole(directory / f"table-{name}.csv", made.csv())
     data = statistics_json(runs)
     write_whole(directory / "table.json", data)
-    click.echo(data if as_json else TABLES[table](runs, published).text(), nl=not as_json)
     again = f"falsifier resume {shlex.quote(str(directory))}"
     if outcome.reason:
-        click.echo(f"stopped: {outcome.reason}; to continue: {again}", err=True)
+        warn(f"stopped: {outcome.reason}; to continue: {again}")
     failed = outcome.progress.counts["failed"]
     if failed:
-        click.echo(f"{counted(failed, 'run')} failed; to retry: {again}", err=True)
-    sys.exit(3 if failed or outcome.reason else 0)
+        warn(f"{counted(failed, 'run')} failed; to retry: {again}")
+    text = data if as_json else TABLES[table](runs, published).text()
+    conclude(text, 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:

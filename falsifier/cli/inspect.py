@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.options import json_option, out_option, profile_option
+from falsifier.cli.output import say
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
@@ -50,9 +51,9 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
     found = read_info(source)
     if as_json:
-        click.echo(info_json(found))
+        say(info_json(found))
         return
-    click.echo(info_text(found, everything=everything))
+    say(info_text(found, everything=everything))
     if checked:
         _print_convergence(source, found)
 
@@ -65,7 +66,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
     from falsifier.fmu.build import build as compile_sources
 
     written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
-    click.echo(f"{written} written")
+    say(f"{written} written")
 
 
 @click.command()
@@ -86,7 +87,7 @@ def init(*, fmu: Path, out: Path | None, force: bool) -> None:
     path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
     load_problems(str(path))
     command = f"falsifier run {shlex.quote(str(path))}"
-    click.echo(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
+    say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 
 
 @click.command()
@@ -96,9 +97,9 @@ def check(*, target: str, profile: str | None) -> None:
     """Check the keys, signals, ranges and formulas of a spec file without simulating."""
     problems = load_problems(target, profile=profile)
     for problem in problems:
-        click.echo(_problem_line(problem))
+        say(_problem_line(problem))
     for note in dict.fromkeys(note for problem in problems for note in problem.notes):
-        click.echo(f"note: {note}")
+        say(f"note: {note}")
 
 
 @click.command()
@@ -112,7 +113,7 @@ def check(*, target: str, profile: str | None) -> None:
 )
 def schema(*, what: str) -> None:
     """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
-    click.echo(json.dumps(_schema(what), indent=2))
+    say(json.dumps(_schema(what), indent=2))
 
 
 def _schema(what: str) -> dict[str, Any]:
@@ -149,15 +150,15 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         movements = step_convergence(model, experiment, signals)
     finally:
         model.close()
-    click.echo(
+    say(
         f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s "
         f"({grid.reason}):"
     )
     if not found.outputs:
-        click.echo("  the FMU declares no outputs; these are its states or other computed variables")
+        say("  the FMU declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         unit = f" {found[name].unit}" if found[name].unit else ""
-        click.echo(
+        say(
             f"  {name} changes by at most {moved.largest:.3g}{unit}, at {moved.time:.4g} s "
             f"({100 * moved.relative:.2f} % of its range)"
         )

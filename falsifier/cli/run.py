@@ -1,10 +1,9 @@
 """``falsifier run`` and ``falsifier resume``."""
 
 import json
-import sys
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -28,7 +27,9 @@ from falsifier.cli.options import (
     seed_option,
     total_options,
 )
-from falsifier.errors import SpecError
+from falsifier.cli.output import conclude
+from falsifier.core.files import file_name
+from falsifier.errors import FalsifierError, SpecError
 from falsifier.problem.loading import find_spec, sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
@@ -37,6 +38,7 @@ from falsifier.search.run import falsify
 from falsifier.search.run import resume as resume_run
 from falsifier.views.fmu_log import FmuLog
 from falsifier.views.progress import make_display
+from falsifier.views.terminal import warn
 from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 
 # If several requirements end differently, the first of these that occurs decides.
@@ -98,7 +100,7 @@ def run(
             seed=seed,
             budget=Budget(budget, seconds, max_tokens, max_cost),
             jobs=jobs,
-            directory=out or _new_directory(source.target),
+            directory=out or _new_directory(source.name),
             listeners=[display, *logs],
         )
     _finish(results, as_json=as_json)
@@ -138,25 +140,39 @@ def resume(
     _finish(results, as_json=as_json)
 
 
-def _finish(results: list[Result], *, as_json: bool) -> None:
+def _finish(results: list[Result], *, as_json: bool) -> NoReturn:
+    """Write the counterexamples, print the results, and end with the code of what the search found."""
     for result in results:
         if result.directory is not None:
             _write_counterexamples(result, result.directory)
+    for reason in {result.unrecorded for result in results} - {""}:
+        warn(f"falsifier: the end of the run could not be recorded: {reason}")
     if as_json:
         shown = [result_json(result) for result in results]
-        click.echo(json.dumps(shown[0] if len(shown) == 1 else shown, indent=2))
+        text = json.dumps(shown[0] if len(shown) == 1 else shown, indent=2)
     else:
-        click.echo(result_text(results[0]) if len(results) == 1 else results_text(results))
+        text = result_text(results[0]) if len(results) == 1 else results_text(results)
     statuses = {result.status for result in results}
-    sys.exit(next(code for status, code in _EXIT_CODES.items() if status in statuses))
+    conclude(text, next(code for status, code in _EXIT_CODES.items() if status in statuses))
 
 
 def _write_counterexamples(result: Result, directory: Path) -> None:
-    name = counterexample_name(result)
-    if result.counterexample is not None:
-        write_counterexample(result.counterexample, directory, name=name)
-    for i, fragile in enumerate(result.fragile, start=1):
-        write_counterexample(fragile, directory, name=name.replace("counterexample", f"fragile-{i}"))
+    """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
+    try:
+        name = counterexample_name(result)
+    except FalsifierError as error:
+        warn(f"falsifier: {error}")
+        return
+    found = [(name, result.counterexample)] if result.counterexample is not None else []
+    found += [
+        (f"fragile-{i}{name.removeprefix('counterexample')}", fragile)
+        for i, fragile in enumerate(result.fragile, start=1)
+    ]
+    for file, confirmation in found:
+        try:
+            write_counterexample(confirmation, directory, name=file)
+        except (OSError, FalsifierError) as error:
+            warn(f"falsifier: {directory / file} cannot be written: {error}")
 
 
 def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
@@ -165,17 +181,16 @@ def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
     Raises:
         SpecError: if the target is not a spec, or names one requirement.
     """
-    if source.target.endswith(".fmu") or source.target.startswith("python:") or source.stl is not None:
+    if source.parts.kind in ("fmu", "python") or source.stl is not None:
         raise SpecError(f"{source.target}: --all needs a spec with several requirements; drop --all")
     if find_spec(source.target)[1] is not None:
         raise SpecError(f"{source.target}: --all needs the spec's name without a requirement")
     return tuple(sources_of(source))
 
 
-def _new_directory(target: str) -> Path:
-    name = Path(target.rpartition(":")[2] or target).stem
+def _new_directory(name: str) -> Path:
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    base = Path("runs") / f"{name}-{stamp}"
+    base = Path("runs") / f"{file_name(name)}-{stamp}"
     return next(
         p for p in (base, *(base.with_name(f"{base.name}-{i}") for i in range(2, 1000))) if not p.exists()
     )

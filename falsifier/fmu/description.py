@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
-from math import prod
+from math import isfinite, prod
 from pathlib import Path, PurePosixPath
 from typing import cast
 from xml.etree import ElementTree
@@ -42,6 +42,10 @@ _INTERFACE_TAGS: Mapping[str, Interface] = {
     "CoSimulation": "co-simulation",
     "ModelExchange": "model-exchange",
 }
+# Limits of what descriptions may contain; real ones stay far below.
+_MAX_ELEMENTS = 1_000_000
+_LONGEST_NAME = 10_000
+_LARGEST_REFERENCE = 2**32 - 1
 _CAUSALITIES: Mapping[str, Causality] = {
     "input": "input",
     "output": "output",
@@ -129,7 +133,7 @@ def describe(path: Path, sha256: str) -> Description:
     text = archive.read_entry(path, "modelDescription.xml")
     try:
         root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # also an unknown encoding
         raise ModelError(f"{path}: modelDescription.xml is not well-formed XML ({error})") from error
     names = archive.entry_names(path)
     described = parse(root, name=str(path), platforms=archive.platforms(names))
@@ -167,6 +171,7 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
     variables: list[Variable] = []
     slots: dict[str, Slot] = {}
     for variable, slot in _variables_3(root, arrays) if major == 3 else _variables_1_2(root, major):
+        _check_variable(variable, slot, slots)
         variables.append(variable)
         slots[variable.name] = slot
     marked, slots = with_aliases_marked(variables, slots)
@@ -199,6 +204,15 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         needs_tool=needs_tool,
         saves_state=_saving(root),
     )
+
+
+def _check_variable(variable: Variable, slot: Slot, known: Mapping[str, Slot]) -> None:
+    if len(variable.name) > _LONGEST_NAME:
+        raise ValueError(f"the name {variable.name[:40]!r}... has more than {_LONGEST_NAME} characters")
+    if variable.name in known:
+        raise ValueError(f"two variables are named {variable.name!r}")
+    if not 0 <= slot.reference <= _LARGEST_REFERENCE:
+        raise ValueError(f"value reference {slot.reference} of {variable.name!r} does not fit 32 bits")
 
 
 def _number_of_states(root: Element, major: int) -> int:
@@ -238,7 +252,9 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
     elements = root.findall("ModelVariables/ScalarVariable")
     states = _states_2(root, elements)
     for position, element in enumerate(elements, start=1):
-        typed = next(child for child in element if child.tag in _TYPES_1_2)
+        typed = next((child for child in element if child.tag in _TYPES_1_2), None)
+        if typed is None:
+            raise ValueError(f"variable {element.attrib['name']!r} has no type")
         kind, code = _TYPES_1_2[typed.tag]
         declared = types.get(typed.get("declaredType", ""))
         definition = None if declared is None else next(iter(declared), None)
@@ -303,6 +319,8 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
             refusal = "it belongs to a clock; only the FMU itself may change it"
         shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
         count = prod(shape)
+        if not 0 <= count <= _MAX_ELEMENTS:
+            raise ValueError(f"array {element.get('name')!r} has {count} elements, not 0 to {_MAX_ELEMENTS}")
         starts = starts * count if len(starts) == 1 else starts
         if shape and kind != "string":
             arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
@@ -398,7 +416,8 @@ def _child(root: Element, tag: str) -> Mapping[str, str]:
 
 
 def _number(text: str | None) -> float | None:
-    return None if text is None else float(text)
+    number = None if text is None else float(text)
+    return number if number is not None and isfinite(number) else None  # NaN and infinity limit nothing
 
 
 def _limit(text: str | None) -> float | None:

@@ -12,6 +12,7 @@ from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
 from falsifier.problem.grid import Grid, choose_grid, formula_times
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
 # Tolerance, as a share of the output interval, for the stop time to be a multiple of it: with an interval of
@@ -80,6 +81,7 @@ def join(
     experiment, grid = _experiment(spec, layers, model.info, formulas, file)
     inputs, parameters = _merged(spec, layers)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    check_sizes(experiment, space, file)
     strings = _strings(parameters, model.info, path.parent)
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
@@ -186,6 +188,7 @@ def _experiment(
         # All formulas of a spec, so that its requirements can share a search.
         grid = _grid(stop_time, formula_times(formulas), info, step_size, file)
         output_interval = grid.interval
+    check_steps(stop_time, output_interval, file=file, key="model.output_interval")
     intervals = stop_time / output_interval
     if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
         fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None, file)

@@ -16,7 +16,7 @@ from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.joining import Joined, join, join_fmu
 from falsifier.problem.options import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.problem.source import Parameterization, ProblemSource, Target
 from falsifier.problem.spec import read_spec
 
 
@@ -29,10 +29,10 @@ def find_spec(target: str) -> tuple[Path, str | None]:
     Raises:
         SpecError: if there is neither; lists the known names.
     """
-    path_part, _, requirement = target.rpartition(":") if ".toml:" in target else (target, "", "")
-    if path_part.endswith(".toml"):
-        return Path(path_part), requirement or None
-    name, _, requirement = target.partition(":")
+    parts = Target.parse(target)
+    if parts.kind == "spec":
+        return Path(parts.file), parts.requirement or None
+    name, requirement = target.partition(":")[0], parts.requirement
     names: list[str] = []
     for path in sorted(bundled("specs").glob("*.toml")):
         if path.stem == "published":
@@ -111,7 +111,7 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
     Raises:
         SpecError: if the target is neither a spec file nor a bundled name.
     """
-    if source.target.endswith(".fmu") or source.target.startswith("python:"):
+    if source.parts.kind in ("fmu", "python"):
         return [source]
     path, requirement = find_spec(source.target)
     if requirement is not None:
@@ -122,7 +122,7 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
 
 def spec_file(source: ProblemSource) -> Path | None:
     """Return the spec file of a source; None for an FMU or a problem made in Python."""
-    if source.target.endswith(".fmu") or source.target.startswith("python:"):
+    if source.parts.kind in ("fmu", "python"):
         return None
     return find_spec(source.target)[0]
 
@@ -134,13 +134,14 @@ def load_source(source: ProblemSource) -> Problem:
         SpecError: naming what is wrong and the remedy.
         ModelError: if the FMU cannot be used.
     """
-    if source.target.startswith("python:"):
+    kind = source.parts.kind
+    if kind == "python":
         if source.model_copy(update={"parameterization": "free"}) != ProblemSource(target=source.target):
             raise SpecError(
                 f"{source.target}: a problem made in Python takes no options; change it where it is made"
             )
         problem = replace(_python_problem(source.target), source=source)
-    elif source.target.endswith(".fmu"):
+    elif kind == "fmu":
         if source.stl is None:
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
         problem = _made(join_fmu(Path(source.target), source.stl, changes=source.changes), source)

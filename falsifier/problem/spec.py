@@ -21,6 +21,11 @@ from falsifier.errors import SpecError, did_you_mean, rejected
 Section = TypeVar("Section", bound=BaseModel)
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Maximum number of control points of one input.
+MAX_CONTROL_POINTS = 10_000
+# Limits of a spec file: the time to read nested keys grows with the square of their depth.
+_MAX_LENGTH = 1_000_000
+_MAX_KEY_PARTS = 500
 
 
 class _Strict(BaseModel):
@@ -30,7 +35,9 @@ class _Strict(BaseModel):
 class FreeSection(_Strict):
     """Limits of a free parameterization."""
 
-    max_control_points: int = Field(ge=1, description="Maximum number of control points.")
+    max_control_points: int = Field(
+        ge=1, le=MAX_CONTROL_POINTS, description="Maximum number of control points."
+    )
     min_interval: Seconds = Field(description="Minimum time between two control points in s.")
 
 
@@ -46,7 +53,9 @@ class InputSection(_Strict):
     range: tuple[Number, Number] | None = Field(
         None, description="[low, high]; default: the FMU's min and max."
     )
-    control_points: int | None = Field(None, ge=1, description="Number of evenly spaced control points.")
+    control_points: int | None = Field(
+        None, ge=1, le=MAX_CONTROL_POINTS, description="Number of evenly spaced control points."
+    )
     interpolation: Interpolation | None = Field(
         None,
         description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
@@ -163,14 +172,18 @@ def read_spec(path: Path) -> Spec:
         SpecError: naming the file, the key and what was expected.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin files with a byte order mark
     except FileNotFoundError:
         raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one", file=str(path)) from None
     except (OSError, UnicodeDecodeError) as error:
         raise SpecError(f"cannot be read: {error}", file=str(path)) from None
+    if len(text) > _MAX_LENGTH:
+        raise SpecError(f"has {len(text):,} characters, more than {_MAX_LENGTH:,}", file=str(path))
+    if any(line.partition("=")[0].count(".") > _MAX_KEY_PARTS for line in text.splitlines()):
+        raise SpecError(f"has a key of more than {_MAX_KEY_PARTS} parts", file=str(path))
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
         raise SpecError(f"not valid TOML: {error}", file=str(path)) from None
     return parse_spec(data, file=str(path))
 

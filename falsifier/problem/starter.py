@@ -8,6 +8,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Item, Table
 
+from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
@@ -148,15 +149,10 @@ def _formula_item(formula: str) -> Item:
 def _noted(value: object, comment: str) -> Item:
     item: Item = tomlkit.item(value)
     if comment:
-        item.comment(_one_line(comment))
+        item.comment(one_line(comment))
         item.trivia.comment_ws = "  "
     return item
 
 
 def _comment(text: str) -> Any:
-    return tomlkit.comment(_one_line(text))
-
-
-def _one_line(text: str) -> str:
-    """Return the text on one line and without characters that TOML forbids in comments."""
-    return "".join(c if c.isprintable() else " " for c in text)
+    return tomlkit.comment(one_line(text))

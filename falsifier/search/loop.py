@@ -184,6 +184,7 @@ class _Loop:
         self.last_error = ""
         self.started = perf_counter() - steps.seconds
         self.spent = Spent()
+        self.unrecorded = ""
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
@@ -300,7 +301,11 @@ class _Loop:
             target.counterexample, target.spent = confirmation, spent
         else:
             target.doubtful.append(confirmation)
-        self.emit(Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent))
+        event = Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
+        if all(t.counterexample is not None for t in self.targets):
+            self.emit_last(event)
+        else:
+            self.emit(event)
 
     def exchanged(self, exchange: Exchange) -> None:
         """Count and announce an exchange with a language model."""
@@ -322,13 +327,20 @@ class _Loop:
         for listener in self.listeners:
             listener(event)
 
+    def emit_last(self, event: Event) -> None:
+        """Announce what ends the search: it counts even if the machine can no longer record it."""
+        try:
+            self.emit(event)
+        except OSError as error:
+            self.unrecorded = self.unrecorded or str(error)
+
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
         results = [self.result(target, status, reason) for target in self.targets]
         overall = "falsified" if all(r.falsified for r in results) else status
         stated = results[0].reason if len(results) == 1 else reason
-        self.emit(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
-        return results
+        self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
+        return [replace(result, unrecorded=self.unrecorded) for result in results]
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample

@@ -28,6 +28,7 @@ class Result:
         fragile: violations that disappear at half the communication step.
         spent: what the run has spent; if falsified, until the counterexample was confirmed.
         directory: the run directory, or None.
+        unrecorded: why the end of the run could not be recorded, such as a full disk; empty if it was.
     """
 
     problem: Problem
@@ -40,6 +41,7 @@ class Result:
     fragile: tuple[Confirmation, ...] = ()
     spent: Spent = field(default_factory=Spent)
     directory: Path | None = None
+    unrecorded: str = ""
 
     @property
     def falsified(self) -> bool:

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import overload
 
+from falsifier.core.files import file_name
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError, SpecError
@@ -16,7 +17,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
 from falsifier.search.budget import Budget
 from falsifier.search.events import Listener
-from falsifier.search.journal import holds_run, open_journal, write_manifest
+from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.search.leaders import make_engines
 from falsifier.search.loop import Live, Steps, search
 from falsifier.search.manifest import Manifest
@@ -112,7 +113,7 @@ def falsify(
         )
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
-            place = place / group[0].name
+            place = place / file_name(group[0].name)
         found = carry_out(
             request,
             group,
@@ -209,6 +210,11 @@ def carry_out(
             raise JournalError(
                 f"{directory} already contains a run: choose another --out, or to continue it: "
                 f"falsifier resume {directory}"
+            )
+        if directory is not None and not begun and holds_lines(directory):
+            raise JournalError(
+                f"{directory} contains a journal without its manifest, so nobody knows what it belongs to: "
+                "choose another --out, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         engines = [engine] if engine is not None else make_engines(request, problems, chat)

@@ -56,6 +56,7 @@ class Tally:
         self._simulation_seconds = 0.0
         self._failures = 0
         self._robustness: list[float] = []
+        self._missing: set[int] = set()
         self._latest: VerdictRecord | None = None
 
     @property
@@ -85,9 +86,10 @@ class Tally:
 
     def add(self, record: Record) -> None:
         """Update the numbers with one record."""
-        if self.counterexample is not None:
+        if self.counterexample is not None and not self._is_missing(record):
             return
-        self.status = "running"
+        if self.counterexample is None:
+            self.status = "running"
         match record:
             case EvaluatedRecord():
                 self._evaluated(record)
@@ -115,6 +117,10 @@ class Tally:
             case AskedRecord():
                 pass
 
+    def _is_missing(self, record: Record) -> bool:
+        """Whether this is an evaluation that a repair dropped and that was carried out again."""
+        return isinstance(record, EvaluatedRecord) and record.index in self._missing
+
     def _evaluated(self, record: EvaluatedRecord) -> None:
         judged = record.verdicts
         verdict = (
@@ -122,12 +128,17 @@ class Tally:
         )
         value = verdict.robustness if verdict else float("nan")
         smallest = self.best_robustness
-        self._latest = verdict
-        if verdict is not None and (smallest is None or value < smallest):
-            self.best, self.verdict = record.index, verdict
+        if record.index >= len(self._robustness):
+            self._latest = verdict
+        if verdict is not None and (smallest is None or (value, record.index) < (smallest, self.best)):
+            self.best = record.index
+            self.verdict = verdict if self.counterexample is None else self.verdict
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory
-        self._robustness.append(value)
+        gap = range(len(self._robustness), record.index + 1)
+        self._robustness += [float("nan") for _ in gap]
+        self._missing = (self._missing | set(gap)) - {record.index}
+        self._robustness[record.index] = value
         self._simulation_seconds += record.seconds
         self._failures += all(v is None for v in judged.values())
 

@@ -14,13 +14,15 @@ def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
 
     Numba writes the cache next to the source or to the user's cache folder. If both are read-only (for
     example in a container without a home directory), a temporary folder is used; if that belongs to another
-    user, nothing is cached.
+    user, nothing is cached. A damaged cache is written again.
 
     Args:
         function: the function to compile.
         forceinline: whether to inline its machine code at every call.
     """
     import numba
+
+    from falsifier.stl.checked_cache import check_cache
 
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": forceinline}
 
@@ -31,6 +33,7 @@ def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)
         result = numba.njit(cache=folder is not None, **options)(function)
+    check_cache(result)
     return result
 
 

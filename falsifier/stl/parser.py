@@ -24,7 +24,7 @@ import math
 from collections.abc import Callable
 from typing import NoReturn, cast
 
-from falsifier.errors import did_you_mean
+from falsifier.errors import FormulaError, did_you_mean
 from falsifier.stl.expression import (
     POWER,
     PRODUCT,
@@ -67,6 +67,8 @@ from falsifier.stl.names import FUNCTIONS, RESERVED
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100
+# Maximum number of characters of a formula.
+MAX_LENGTH = 20_000
 UNITS = {"us": (1, 1_000_000), "ms": (1, 1000), "s": (1, 1), "min": (60, 1), "h": (3600, 1)}  # seconds
 
 _LEVELS = {
@@ -101,6 +103,11 @@ class _Parser:
     """Precedence climbing with one grammar for formulas and expressions; operators check their operands."""
 
     def __init__(self, text: str) -> None:
+        if len(text) > MAX_LENGTH:
+            raise FormulaError(
+                f"the formula has {len(text):,} characters, more than {MAX_LENGTH:,}; split it into several "
+                "requirements"
+            )
         self.text = text
         self.tokens = tokenize(text)
         self.index = 0

@@ -6,7 +6,9 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from falsifier.campaigns import Progress, RunProgress
+from falsifier.core.literals import one_line
 from falsifier.core.words import counted
+from falsifier.views.terminal import error_console, moving, unbroken
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -25,17 +27,19 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     if quiet:
         yield lambda progress: None
         return
-    from rich.console import Console
-
-    console = Console(stderr=True)
+    console = error_console()
     if not console.is_terminal:
-        yield PlainScoreboard(lambda text: console.print(text, highlight=False, markup=False, soft_wrap=True))
+        board = PlainScoreboard(
+            lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+        )
+        yield unbroken(board)
         return
     from rich.live import Live
 
-    board = Rate()
-    with Live(console=console, refresh_per_second=4, transient=True) as live:
-        yield lambda progress: live.update(_fitting(progress, board(progress), console))
+    rate = Rate()
+    live = Live(console=console, refresh_per_second=4, transient=True)
+    with moving(live):
+        yield unbroken(lambda progress: live.update(_fitting(progress, rate(progress), console)))
 
 
 class Rate:
@@ -106,6 +110,7 @@ def overall_line(progress: Progress, rate: float | None, *, stopped: bool = Fals
 
 def _fitting(progress: Progress, rate: float | None, console: "Console") -> "RenderableType":
     """The live table: as many requirements as fit on the terminal, preferring those that are running."""
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, caption=overall_line(progress, rate), caption_justify="left")
@@ -117,7 +122,7 @@ def _fitting(progress: Progress, rate: float | None, console: "Console") -> "Ren
         part = groups[name]
         cost = part.spent.cost
         table.add_row(
-            name,
+            escape(one_line(name)),
             f"{part.finished}/{len(part.runs)}",
             str(part.counts["falsified"]),
             str(part.spent.simulations),

@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
 from falsifier.views.html import el, join
+from falsifier.views.terminal import error_console, moving, unbroken
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,25 +23,24 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     if quiet:
         yield lambda event: None
         return
-    from rich.console import Console
-
-    console = Console(stderr=True)
+    console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
         yield NotebookLine()
         return
     if not console.is_terminal:
-        yield PlainDisplay(console)
+        yield unbroken(PlainDisplay(console))
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as progress:
+    progress = Progress(*columns, console=console, transient=True)
+    with moving(progress):
         task = progress.add_task("starting", total=None, note="")
         warn = FailureWarning()
 
@@ -57,11 +58,11 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                 case Exchanged():
                     progress.update(task, note=f"LLM replied, {event.spent.tokens} tokens so far")
                 case Confirmed():
-                    progress.console.print(_confirmed(event), highlight=False, markup=False)
+                    progress.console.print(one_line(_confirmed(event)), highlight=False, markup=False)
                 case _:
                     pass
 
-        yield show
+        yield unbroken(show)
 
 
 def progress() -> Listener:
@@ -69,10 +70,8 @@ def progress() -> Listener:
 
     >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
     """
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    return NotebookLine() if console.is_jupyter else PlainDisplay(console)
+    console = error_console()
+    return NotebookLine() if console.is_jupyter else unbroken(PlainDisplay(console))
 
 
 class PlainDisplay:
@@ -108,7 +107,7 @@ class PlainDisplay:
                 pass
 
     def _line(self, text: str) -> None:
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+        self._console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
 
 
 class FailureWarning:
@@ -195,4 +194,4 @@ def _confirmed(event: Confirmed) -> str:
 
 def _title(event: RunStarted) -> str:
     """The requirements and the engine."""
-    return f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}"
+    return one_line(f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}")

@@ -1,13 +1,13 @@
 """The result of a run as text or JSON."""
 
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted
-from falsifier.counterexamples.store import file_name
+from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search import manifest
 from falsifier.search.budget import Spent
@@ -36,7 +36,7 @@ def result_text(result: Result) -> str:
             lines.append(f"  picture        {_picture(result)}")
         if _can_continue(result):
             lines.append(_continue_line(result.directory))
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def results_text(results: Sequence[Result]) -> str:
@@ -57,13 +57,13 @@ def results_text(results: Sequence[Result]) -> str:
     directories = {result.directory for result in results}
     if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
         lines.append(_continue_line(results[0].directory))
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; results that share a directory have one each."""
     shared = result.directory is not None and manifest.read(result.directory).shared
-    return file_name(result.problem.name if shared else "")
+    return file_of(result.problem.name if shared else "")
 
 
 def result_json(result: Result) -> dict[str, Any]:
@@ -146,8 +146,3 @@ def seconds_text(spent: Spent) -> str:
 
 def _unit(unit: str) -> str:
     return f" {unit}" if unit else ""
-
-
-def warn(text: str) -> None:
-    """Print a message on stderr, so that stdout contains only results."""
-    print(text, file=sys.stderr)

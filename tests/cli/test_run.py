@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.search.journal import read_journal
+from falsifier.search.journal import read_journal, write_manifest
 from tests.command import ROOT, falsifier, listen_to_interrupts
 from tests.fmu.fixtures import path as fixture
 from tests.patience import HANG, wait_until
@@ -112,7 +112,7 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     assert kept > 5
     request = json.loads((tmp_path / "run" / "manifest.json").read_text())
     request["request"]["budget"]["simulations"] = kept + 2
-    (tmp_path / "run" / "manifest.json").write_text(json.dumps(request))
+    write_manifest(tmp_path / "run", request)
     resumed = falsifier("resume", "run", cwd=tmp_path)
     assert resumed.code == 0, resumed.err
     assert f"{kept} evaluations from the journal" in resumed.err

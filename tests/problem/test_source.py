@@ -10,7 +10,7 @@ CHANGED = ProblemSource(target="AT1", changes=changes_from_options(inputs=["brak
 
 @pytest.mark.parametrize(
     ("target", "name"),
-    [("AT1", "AT1"), ("specs/AT.toml:AT1", "AT1"), ("python:a.b:make", "make"), ("my.fmu", "my.fmu")],
+    [("AT1", "AT1"), ("specs/AT.toml:AT1", "AT1"), ("python:a.b:make", "make"), ("my.fmu", "my")],
 )
 def test_its_name_is_the_targets_last_part(target: str, name: str) -> None:
     assert ProblemSource(target=target).name == name

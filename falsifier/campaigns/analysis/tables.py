@@ -11,6 +11,7 @@ from falsifier.campaigns.analysis.published import COLUMNS, Published, Score, ra
 from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
 from falsifier.campaigns.plan import Method
+from falsifier.core.literals import csv_cell, markdown_text, one_line
 
 NONE = "–"
 
@@ -43,11 +44,9 @@ class Table:
     def markdown(self) -> str:
         """Format as a Markdown table with its title and notes."""
         lines = [self.header, tuple("---" for _ in self.header), *self.rows]
-        body = "\n".join(
-            f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines
-        )
+        body = "\n".join(f"| {' | '.join(map(markdown_text, row))} |" for row in lines)
         notes = "".join(f"\n\n{note}" for note in self.notes)
-        return f"**{self.title}**\n\n{body}{notes}\n"
+        return f"**{markdown_text(self.title)}**\n\n{body}{notes}\n"
 
     def _repr_markdown_(self) -> str:
         return self.markdown()
@@ -56,13 +55,12 @@ class Table:
         """Format as comma-separated values."""
         buffer = StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(self.header)
-        writer.writerows(self.rows)
+        writer.writerows(map(csv_cell, row) for row in (self.header, *self.rows))
         return buffer.getvalue()
 
     def text(self) -> str:
         """Format as plain text with aligned columns."""
-        rows = [self.header, *self.rows]
+        rows = [tuple(map(one_line, row)) for row in (self.header, *self.rows)]
         widths = [max(len(row[i]) for row in rows) for i in range(len(self.header))]
         lines = [
             "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows

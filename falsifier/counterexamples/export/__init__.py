@@ -16,8 +16,13 @@ import shutil
 from pathlib import Path
 
 from falsifier.counterexamples.export.inputs import input_table, start_values
-from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
-from falsifier.counterexamples.export.tables import write_csv, write_json, write_mat, write_ssv
+from falsifier.counterexamples.export.scripts import (
+    identifier,
+    openmodelica_script,
+    pytest_file,
+    replay_script,
+)
+from falsifier.counterexamples.export.tables import file_columns, write_csv, write_json, write_mat, write_ssv
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
@@ -53,9 +58,9 @@ def export_counterexample(
     if isinstance(problem.model, FmuModel):
         files.append(copied_fmu(problem.model, directory))
     scripts = {
-        "replay.py": replay_script(problem, evaluation),
+        "replay.py": replay_script(problem, evaluation, file_columns(table, problem.model)),
         "replay.mos": openmodelica_script(problem, start),
-        f"test_{_identifier(problem.name)}.py": pytest_file(stored),
+        f"test_{identifier(problem.name)}.py": pytest_file(stored),
     }
     for name, text in scripts.items():
         if text is not None:
@@ -70,7 +75,3 @@ def copied_fmu(model: FmuModel, directory: Path) -> Path:
     if not target.exists() or not target.samefile(model.path):
         shutil.copyfile(model.path, target)
     return target
-
-
-def _identifier(name: str) -> str:
-    return "".join(c if c.isalnum() else "_" for c in name)

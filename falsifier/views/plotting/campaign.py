@@ -8,7 +8,7 @@ import numpy as np
 from falsifier.campaigns.analysis import Run, Statistics, group, statistics
 from falsifier.campaigns.analysis.curves import falsification_curve
 from falsifier.core.words import counted
-from falsifier.views.plotting.axes import figure_of, own_axes
+from falsifier.views.plotting.axes import caption, figure_of, own_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
     if run.counterexample is not None:
         found = run.counterexample
         ax.plot(found + 1, run.robustness[found], "o", color=_FOUND, label="counterexample")
-    ax.set(xlabel="simulation", ylabel="robustness", title=f"{run.requirement}: {run.method.label}")
+    ax.set(xlabel="simulation", ylabel="robustness", title=caption(f"{run.requirement}: {run.method.label}"))
     ax.legend()
     return figure_of(ax)
 
@@ -45,9 +45,8 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
         by_method.setdefault(run.method.label, []).append(run)
     for label, members in by_method.items():
         counts, shares = falsification_curve(members)
-        ax.step(
-            counts, shares, where="post", linewidth=1.6, label=f"{label} ({counted(len(members), 'run')})"
-        )
+        name = caption(f"{label} ({counted(len(members), 'run')})")
+        ax.step(counts, shares, where="post", linewidth=1.6, label=name)
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
     if by_method:
         ax.legend()
@@ -66,10 +65,15 @@ def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
         at = np.arange(len(requirements)) + (i - (len(methods) - 1) / 2) * width
         means = _each(found, lambda s: s.mean)
         bars = ax.bar(
-            at, means, width, yerr=_each(found, lambda s: s.deviation), label=method.label, capsize=2
+            at,
+            means,
+            width,
+            yerr=_each(found, lambda s: s.deviation),
+            label=caption(method.label),
+            capsize=2,
         )
         ax.bar_label(bars, [f"{s.falsified}/{s.runs}" if s else "" for s in found], fontsize=7, padding=2)
-    ax.set_xticks(np.arange(len(requirements)), requirements)
+    ax.set_xticks(np.arange(len(requirements)), list(map(caption, requirements)))
     ax.set(ylabel="simulations (mean, standard deviation)")
     ax.legend()
     return figure_of(ax)

@@ -10,7 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.views.panels import Panel, panels
-from falsifier.views.plotting.axes import figure_of, own_axes
+from falsifier.views.plotting.axes import caption, figure_of, own_axes
 from falsifier.views.plotting.trajectory import plot_trajectory
 
 if TYPE_CHECKING:
@@ -59,12 +59,9 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         plot_panel(ax, panel)
         ax.axvline(verdict.critical_time, color=_CRITICAL, linewidth=0.8, linestyle=":")
     axes[-1].set_xlabel("time [s]")
-    parameters = "".join(f"  {name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
-    figure.suptitle(
-        f"{problem.name}: robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s"
-        + parameters,
-        fontsize=11,
-    )
+    parameters = "".join(f", {name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
+    decided = f"robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s"
+    figure.suptitle(f"{caption(problem.name)}: {decided}{caption(parameters)}", fontsize=11)
     return figure
 
 
@@ -114,7 +111,7 @@ def plot_panel(ax: "Axes", panel: Panel) -> None:
         ax.set_ylim(low - margin, high + margin)
         for limit in panel.limits:
             ax.axhline(limit, color=_WINDOW, linewidth=0.6, linestyle=":")
-    ax.set_ylabel(panel.title)
+    ax.set_ylabel(caption(panel.title))
 
 
 def save_figure(figure: "Figure", path: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from falsifier.campaigns.analysis import Table
 from falsifier.campaigns.progress import total
+from falsifier.core.files import file_name
 from falsifier.core.words import choices, counted
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
@@ -193,4 +194,4 @@ def _environment(content: Content) -> Html:
 
 
 def _anchor(section: Section) -> str:
-    return f"requirement-{section.name}"
+    return f"requirement-{file_name(section.name)}"

@@ -163,7 +163,7 @@ def test_where_a_smaller_step_is_simulated_every_so_many_rows_are_kept(tmp_path:
     problem = load_problem("AT1")
     problem = replace(problem, experiment=replace(problem.experiment, step_size=0.002))
     evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["constant"]))
-    script = replay_script(problem, evaluation)
+    script = replay_script(problem, evaluation, [])
     assert script is not None
     assert "output_interval=0.002," in script
     assert ")[::5]" in script
@@ -172,7 +172,7 @@ def test_where_a_smaller_step_is_simulated_every_so_many_rows_are_kept(tmp_path:
 def test_models_that_are_no_fmu_and_problems_made_in_python_have_no_scripts(tmp_path: Path) -> None:
     problem = lag_problem()
     evaluation = evaluate(problem, problem.space.decode([1.0] * 4))
-    assert replay_script(problem, evaluation) is None
+    assert replay_script(problem, evaluation, []) is None
     assert openmodelica_script(problem, {}) is None
     assert pytest_file(to_store(confirmed(problem, evaluation))) is None
 
