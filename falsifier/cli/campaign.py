@@ -50,7 +50,7 @@ from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.request import Effort, LLMSettings
-from falsifier.views.campaign_text import campaign_display, overall_line
+from falsifier.views.campaign_progress import campaign_display, overall_line
 from falsifier.views.terminal import warn
 
 # Time in s between two updates of falsifier watch.

@@ -129,7 +129,7 @@ def _schema(what: str) -> dict[str, Any]:
 def _print_convergence(fmu: Path, found: ModelInfo) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.fmu import FmuModel
-    from falsifier.fmu.step_check import step_convergence
+    from falsifier.fmu.step_effect import step_convergence
 
     interface = default_interface(found)
     if interface is None:

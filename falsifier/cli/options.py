@@ -16,7 +16,7 @@ import click
 from falsifier.core.secrets import is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.prompts.variants import DEFAULT_VARIANT
-from falsifier.problem.options import changes_from_options
+from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.search.request import Effort, LLMSettings
 

@@ -17,7 +17,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from falsifier.stl.compiled import compiled as keep_compiled
+from falsifier.stl.numba_compilation import compiled as keep_compiled
 
 # Where a loop stopped, in `report[WHERE]`; DONE: nowhere before its end.
 DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)

@@ -14,8 +14,8 @@ from falsifier.core.files import bundled
 from falsifier.core.model import Interface
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.joining import Joined, join, join_fmu
-from falsifier.problem.options import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.problem import Problem, alike
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import Parameterization, ProblemSource, Target
 from falsifier.problem.spec import read_spec
 

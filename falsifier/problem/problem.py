@@ -8,8 +8,8 @@ from typing import Self
 
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.space import SearchSpace
-from falsifier.problem.options import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.requirement import Requirement
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import ProblemSource
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from falsifier.core.model import Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, ValueKind
 from falsifier.errors import SpecError
-from falsifier.problem.options import named_file
+from falsifier.problem.shorthand import named_file
 from falsifier.problem.spec import InputSection
 
 

@@ -2,7 +2,7 @@ import pytest
 from pydantic import ValidationError
 
 from falsifier.problem.loading import load_source
-from falsifier.problem.options import changes_from_options
+from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 
 CHANGED = ProblemSource(target="AT1", changes=changes_from_options(inputs=["brake=0"], stop_time=30.0))

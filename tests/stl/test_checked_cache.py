@@ -10,7 +10,7 @@ import pytest
 from tests.hostile.test_damage import DAMAGES
 
 CODE = """
-from falsifier.stl.compiled import compiled
+from falsifier.stl.numba_compilation import compiled
 
 @compiled
 def doubled(x):

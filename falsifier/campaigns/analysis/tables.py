@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from typing import Any
 
-from falsifier.campaigns.analysis.published import COLUMNS, Published, Score, rank
+from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, rank
 from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
 from falsifier.campaigns.plan import Method

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.core.candidate import Candidate
-from falsifier.problem.options import options_from
+from falsifier.problem.shorthand import options_from
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse

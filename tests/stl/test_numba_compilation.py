@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.stl import compiled
+from falsifier.stl import numba_compilation
 
 CODE = """
 import numba.core.caching as caching
 cache = getattr(caching, "CacheImpl", None) or caching._CacheImpl
 # As where neither the package's folder nor a home can be written.
 cache._locator_classes = [k for k in cache._locator_classes if "UserProvided" in k.__name__]
-from falsifier.stl.compiled import compiled
+from falsifier.stl.numba_compilation import compiled
 
 @compiled
 def double(x: float) -> float:
@@ -40,7 +40,7 @@ def test_a_temporary_folder_that_others_can_write_to_is_not_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    own = compiled._own_temporary_folder()
+    own = numba_compilation._own_temporary_folder()
     assert own is not None and own.stat().st_mode & 0o777 == 0o700
     own.chmod(0o777)
-    assert compiled._own_temporary_folder() is None
+    assert numba_compilation._own_temporary_folder() is None

@@ -4,7 +4,7 @@ from rich.console import Console
 
 from falsifier.campaigns import Method, Progress, RunProgress
 from falsifier.search.budget import Spent
-from falsifier.views.campaign_text import PlainScoreboard, Rate, _fitting, overall_line
+from falsifier.views.campaign_progress import PlainScoreboard, Rate, _fitting, overall_line
 
 
 def run(name: str, seed: int, status: str, simulations: int = 0, best: float | None = None) -> RunProgress:

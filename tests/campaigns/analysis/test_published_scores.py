@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.campaigns.analysis import Score, read_published
-from falsifier.campaigns.analysis.published import rank
+from falsifier.campaigns.analysis.published_scores import rank
 from falsifier.errors import SpecError
 
 BEST, LLM = Score(10, 10, 1.3, "FReaK"), Score(10, 10, 2.3)

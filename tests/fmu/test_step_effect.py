@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.fmu.step_check import Movement, step_convergence
+from falsifier.fmu.step_effect import Movement, step_convergence
 from tests.fmu.fixtures import local, ramp
 
 

@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.problem.options import changes_from, changes_from_options, options_from
+from falsifier.problem.shorthand import changes_from, changes_from_options, options_from
 from falsifier.problem.spec import InputSection
 
 
