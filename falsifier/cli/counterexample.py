@@ -86,7 +86,7 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
 def shrink(
     *, run: Path, budget: int, margin: float, out: Path | None, store: Path | None, as_json: bool
 ) -> None:
-    """Make a counterexample as simple as possible such that it still violates; the original is kept.
+    """Make a counterexample as simple as possible while it still violates; the original is kept.
 
     RUN is a run directory or a counterexample file.
     """

@@ -74,7 +74,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(*, fmu: Path, out: Path | None, force: bool) -> None:
-    """Write a starter spec for an FMU: valid, and to be completed with ranges and requirements."""
+    """Write a starter spec for an FMU: valid as written; fill in ranges and requirements."""
     from falsifier.fmu import FmuModel, read_info
 
     source = _existing_fmu(fmu)
