@@ -8,7 +8,7 @@ from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variab
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu import FmuModel, read_info
-from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
+from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface, default_interval
 from falsifier.problem.ranges import fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.problem.sizes import check_sizes, check_steps
@@ -38,6 +38,7 @@ def join(
     path: Path,
     profile: str | None = None,
     stl: str | None = None,
+    stl_name: str = STL_NAME,
     changes: ModelChanges | None = None,
 ) -> Joined:
     """Join a validated spec with its FMU.
@@ -48,6 +49,7 @@ def join(
         path: path of the spec file, for relative paths and error messages.
         profile: name of a profile of the spec.
         stl: a formula to use instead of the spec's.
+        stl_name: name of the requirement that this formula makes.
         changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
 
     Raises:
@@ -80,15 +82,15 @@ def join(
     )
     return Joined(
         model,
-        Requirement(requirement if stl is None else "stl", formula, "" if stl else section.description),
+        Requirement(requirement if stl is None else stl_name, formula, "" if stl else section.description),
         space,
         _recording(experiment, model.info, [*spec.model.record, *formula.signals], file),
         fixed,
     )
 
 
-def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
-    """Join an FMU and a formula, without a spec.
+def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME) -> Joined:
+    """Join an FMU and a formula, without a spec; the requirement gets the given name.
 
     If no input or parameter is to be searched, all real inputs with a min and a max are searched.
 
@@ -114,7 +116,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
                 "output_interval": default_interval(info, stop_time),
             },
             "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
-            "requirements": {"stl": {"formula": stl}},
+            "requirements": {name: {"formula": stl}},
         },
         file=str(fmu),
     )
@@ -123,7 +125,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
         raise SpecError(
             f"{fmu}: nothing to search; add --input NAME=LOW:HIGH:POINTS. {did_you_mean('', known)}"
         )
-    return join(spec, "stl", path=fmu, changes=changes)
+    return join(spec, name, path=fmu, changes=changes)
 
 
 def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:

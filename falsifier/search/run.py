@@ -12,7 +12,7 @@ from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, load_sources, reloadable
-from falsifier.problem.problem import Problem, alike
+from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
 from falsifier.search.budget import Budget
@@ -89,7 +89,9 @@ def falsify(
         One result, or for a list of problems a list of results in the same order.
 
     Raises:
-        SpecError: if a problem, an engine or a language model is not valid.
+        SpecError: if a problem, an engine, a language model or a number is not valid, or two problems have
+            the same name.
+        CandidateError: if an engine made in Python returns a candidate outside the search space.
         ModelError: if the FMU cannot be used.
         ChatError: if the language model cannot be asked; raised before the first simulation.
         JournalError: if the directory already contains a run.
@@ -99,6 +101,7 @@ def falsify(
     """
     several = isinstance(problem, list | tuple)
     problems = [_problem(each) for each in (problem if isinstance(problem, list | tuple) else [problem])]
+    check_names(problems)
     groups = alike(problems)
     chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
     results: dict[str, Result] = {}

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.files import bundled
 from falsifier.engines import make_engine
 from falsifier.errors import JournalError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
 from falsifier.search.budget import Budget
@@ -17,7 +19,7 @@ from falsifier.search.journal import holds_run
 from falsifier.search.request import LLMSettings
 from falsifier.search.run import falsify, resume
 from falsifier.testing import lag_problem
-from tests.problems import easy, hard, impossible
+from tests.problems import easy, easy_again, hard, impossible
 
 EASY = "python:tests.problems:easy"
 
@@ -42,6 +44,23 @@ def test_several_problems_give_several_results_in_their_order() -> None:
     assert [r.falsified for r in results] == [False, True, True]
     (only,) = falsify([easy()], "corners", budget=5)
     assert only.falsified
+
+
+@pytest.mark.parametrize("other", [easy_again(), lag_problem(points=2, name="EASY")], ids=["shared", "apart"])
+def test_problems_of_one_call_have_different_names(other: Problem, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"two of the problems are named 'EASY'.*name=\.\.\."):
+        falsify([easy(), hard(), other], "corners", budget=5, directory=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None:
+    formulas = {"low": "G[0,1] (speed <= 500)", "high": "G[0,1] (speed <= -1)"}
+    fmu = bundled("fmus") / "AT.fmu"
+    problems = [Problem.from_fmu(fmu, formula, name=name) for name, formula in formulas.items()]
+    results = falsify(problems, "corners", budget=1, directory=tmp_path)
+    assert [(r.problem.name, r.falsified) for r in results] == [("low", False), ("high", True)]
+    assert [r.problem.name for r in resume(tmp_path)] == ["low", "high"]
+    assert Problem.from_fmu(fmu, formulas["low"]).name == "stl"
 
 
 def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Path) -> None:
