@@ -24,6 +24,7 @@ from falsifier.cli.options import (
     problem_options,
     problem_source,
     quiet_option,
+    refuse_limits_without_llm,
     seed_option,
     total_options,
 )
@@ -79,6 +80,8 @@ def run(
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     source, llm = problem_source(options), llm_settings(options)
+    if llm is None:
+        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     sources = _all_of(source) if together else (source,)
     with make_display(quiet=quiet) as display:
         results = falsify(
