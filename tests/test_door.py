@@ -69,6 +69,10 @@ class Mine:
 engine: Engine = Mine()
 result: Result = falsify(problem, engine, budget=Budget(simulations=5, cost=1.0), listeners=[heard])
 results: list[Result] = falsify([problem, other], "surrogate", directory=Path("runs/a"))
+mixed: list[Result] = falsify([problem, "AT1"])
+another: list[Result] = falsify((problem, "AT1"))
+names = ["AT1", "AT2"]
+by_name: list[Result] = falsify(names)
 again: list[Result] = resume("runs/a")
 found: Confirmation | None = result.counterexample
 robustness: float | None = result.robustness

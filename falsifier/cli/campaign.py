@@ -39,6 +39,7 @@ from falsifier.cli.options import (
     parameterization_option,
     profile_option,
     quiet_option,
+    refuse_limits_without_llm,
     seed_option,
     total_options,
     variant_option,
@@ -148,6 +149,8 @@ def bench(
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
+    if not llms:
+        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
     methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)

@@ -20,6 +20,9 @@ from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.search.request import Effort, LLMSettings
 
+# What a price is, in errors; $0.25 and $2 per million tokens, as providers state prices.
+_PRICE = "expected SENT:RECEIVED in US dollars per 1000 tokens sent and received, for example 0.00025:0.002"
+
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
 
@@ -206,6 +209,15 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
     return given | {"price": _price(price), "options": dict(map(_llm_option, pairs)), "cache": cache}
 
 
+def refuse_limits_without_llm(*, max_tokens: int | None, max_cost: float | None) -> None:
+    """Refuse limits of a language model although none is named.
+
+    Raises:
+        click.UsageError: naming the options.
+    """
+    _refuse_without_llm({"max_tokens": max_tokens, "max_cost": max_cost})
+
+
 def _refuse_without_llm(given: dict[str, Any]) -> None:
     stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value and key != "cache"]
     if stray:
@@ -221,9 +233,9 @@ def _price(text: str | None) -> tuple[float, float] | None:
     try:
         sent, received = (float(part) for part in text.split(":"))
     except ValueError:
-        raise click.UsageError(f"--price {text}: expected SENT:RECEIVED, for example 0.25:2") from None
+        raise click.UsageError(f"--price {text}: {_PRICE}") from None
     if not all(math.isfinite(price) and price >= 0 for price in (sent, received)):
-        raise click.UsageError(f"--price {text}: prices must be finite and not negative, for example 0.25:2")
+        raise click.UsageError(f"--price {text}: prices must be finite and not negative; {_PRICE}")
     return sent, received
 
 
@@ -283,12 +295,16 @@ def total_options(command: Function) -> Function:
 
 
 def seed_option(text: str = "Random seed.") -> Decorator:
-    return click.option("--seed", type=int, default=0, show_default=True, help=text)
+    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=text)
 
 
 def jobs_option(what: str) -> Decorator:
     return click.option(
-        "--jobs", type=int, default=1, show_default=True, help=f"Number of {what} at a time on this machine."
+        "--jobs",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+        help=f"Number of {what} at a time on this machine.",
     )
 
 

@@ -24,6 +24,7 @@ from falsifier.cli.options import (
     problem_options,
     problem_source,
     quiet_option,
+    refuse_limits_without_llm,
     seed_option,
     total_options,
 )
@@ -91,6 +92,8 @@ def run(
     if fmu_log:
         changes = source.changes.model_copy(update={"logging": True})
         source = source.model_copy(update={"changes": changes})
+    if llm is None:
+        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     sources = _all_of(source) if together else (source,)
     with make_display(quiet=quiet) as display:
         results = falsify(

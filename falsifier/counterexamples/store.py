@@ -142,13 +142,13 @@ def save(stored: StoredCounterexample, path: Path) -> Path:
     return write_whole(path, seal(json.dumps(content, indent=2)))
 
 
-def load(path: Path) -> StoredCounterexample:
+def load(path: Path | str) -> StoredCounterexample:
     """Read a counterexample file, or the counterexample in a run directory.
 
     Raises:
         SpecError: naming the file and what is wrong with it.
     """
-    file = counterexample_file(path)
+    file = counterexample_file(Path(path))
     try:
         content = file.read_bytes()
         stored = StoredCounterexample.model_validate_json(content)

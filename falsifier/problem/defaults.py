@@ -4,6 +4,8 @@ from falsifier.core.model import Interface, ModelInfo
 
 # Number of control points of an input: both ends, the middle and two in between.
 DEFAULT_POINTS = 5
+# Name of the requirement that a formula makes if it is given without a name.
+STL_NAME = "stl"
 
 
 def default_interface(info: ModelInfo) -> Interface | None:

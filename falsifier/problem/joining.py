@@ -8,7 +8,7 @@ from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variab
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu import FmuModel, read_info
-from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
+from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface
 from falsifier.problem.grid import Grid, choose_grid, formula_times
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
@@ -42,6 +42,7 @@ def join(
     path: Path,
     profile: str | None = None,
     stl: str | None = None,
+    stl_name: str = STL_NAME,
     changes: ModelChanges | None = None,
 ) -> Joined:
     """Join a validated spec with its FMU.
@@ -52,6 +53,7 @@ def join(
         path: path of the spec file, for relative paths and error messages.
         profile: name of a profile of the spec.
         stl: a formula to use instead of the spec's.
+        stl_name: name of the requirement that this formula makes.
         changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
 
     Raises:
@@ -92,7 +94,7 @@ def join(
     )
     return Joined(
         model,
-        Requirement(requirement if stl is None else "stl", formula, "" if stl else section.description),
+        Requirement(requirement if stl is None else stl_name, formula, "" if stl else section.description),
         space,
         _recording(
             replace(experiment, strings=strings),
@@ -106,8 +108,8 @@ def join(
     )
 
 
-def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
-    """Join an FMU and a formula, without a spec.
+def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME) -> Joined:
+    """Join an FMU and a formula, without a spec; the requirement gets the given name.
 
     If no input or parameter is to be searched, all real inputs with a min and a max are searched.
 
@@ -132,7 +134,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
                 "stop_time": stop_time,
             },
             "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
-            "requirements": {"stl": {"formula": stl}},
+            "requirements": {name: {"formula": stl}},
         },
         file=str(fmu),
     )
@@ -143,7 +145,7 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
             f"{fmu}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
             f"{did_you_mean('', inputs)}"
         )
-    joined = join(spec, "stl", path=fmu, changes=changes)
+    joined = join(spec, name, path=fmu, changes=changes)
     unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
     if searched or not unbounded:
         return joined

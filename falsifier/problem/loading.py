@@ -144,7 +144,9 @@ def load_source(source: ProblemSource) -> Problem:
     elif kind == "fmu":
         if source.stl is None:
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
-        problem = _made(join_fmu(Path(source.target), source.stl, changes=source.changes), source)
+        problem = _made(
+            join_fmu(Path(source.target), source.stl, changes=source.changes, name=source.stl_name), source
+        )
     else:
         problem = _of_spec(source)
     if source.parameterization == "fixed":
@@ -178,7 +180,13 @@ def _of_spec(source: ProblemSource) -> Problem:
             )
         requirement = next(iter(spec.requirements))
     joined = join(
-        spec, requirement, path=path, profile=source.profile, stl=source.stl, changes=source.changes
+        spec,
+        requirement,
+        path=path,
+        profile=source.profile,
+        stl=source.stl,
+        stl_name=source.stl_name,
+        changes=source.changes,
     )
     return _made(joined, source)
 

@@ -8,6 +8,8 @@ from typing import Self
 
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.space import SearchSpace
+from falsifier.errors import SpecError
+from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import ProblemSource
@@ -41,6 +43,7 @@ class Problem:
         fmu: str | Path,
         formula: str,
         *,
+        name: str = STL_NAME,
         inputs: Mapping[str, InputChoice] | None = None,
         parameters: Mapping[str, ParameterChoice] | None = None,
         stop_time: float | None = None,
@@ -55,6 +58,7 @@ class Problem:
         Args:
             fmu: path of the FMU.
             formula: the requirement, in Signal Temporal Logic.
+            name: the requirement's name, in results and records.
             inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
                 all real inputs with a min and a max are.
             parameters: values of parameters and start values, or ranges to search, by name.
@@ -84,8 +88,8 @@ class Problem:
             time_limit=time_limit,
             interface=interface,
         )
-        joined = join_fmu(Path(fmu), formula, changes=changes)
-        source = ProblemSource(target=str(fmu), stl=formula, changes=changes)
+        joined = join_fmu(Path(fmu), formula, changes=changes, name=name)
+        source = ProblemSource(target=str(fmu), stl=formula, stl_name=name, changes=changes)
         return cls(
             joined.model,
             joined.requirement,
@@ -119,6 +123,22 @@ class Problem:
             sorted(self.parameters.items()),
         )
         return sha256(repr(content).encode()).hexdigest()
+
+
+def check_names(problems: Iterable[Problem]) -> None:
+    """Check that no two problems have the same name: results and records go by the name.
+
+    Raises:
+        SpecError: naming the name that occurs twice.
+    """
+    seen: set[str] = set()
+    for problem in problems:
+        if problem.name in seen:
+            raise SpecError(
+                f"two of the problems are named {problem.name!r}, and results and records go by the name: "
+                "name each differently, with Problem.from_fmu(..., name=...) or Requirement(name, ...)"
+            )
+        seen.add(problem.name)
 
 
 def alike(problems: Iterable[Problem]) -> list[list[Problem]]:

@@ -67,7 +67,9 @@ def changes_from_options(
     Raises:
         SpecError: naming the option that is invalid.
     """
-    return _changes(dict(map(_input, inputs)), dict(map(_parameter, parameters)), experiment)
+    return _changes(
+        _once("--input", map(_input, inputs)), _once("--param", map(_parameter, parameters)), experiment
+    )
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
@@ -125,6 +127,15 @@ def _parameter_section(name: str, choice: ParameterChoice) -> object:
         case (low, high):
             return {"range": (low, high)}
     raise SpecError(f"parameters.{name}: expected a number, text or (low, high)")
+
+
+def _once(flag: str, sections: Iterable[tuple[str, dict[str, object]]]) -> dict[str, dict[str, object]]:
+    found: dict[str, dict[str, object]] = {}
+    for name, section in sections:
+        if name in found:
+            raise SpecError(f"{flag} {name}: given twice; drop one of them")
+        found[name] = section
+    return found
 
 
 def _input(option: str) -> tuple[str, dict[str, object]]:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
+from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.spec import ModelChanges
 
 Parameterization = Literal["free", "fixed"]
@@ -49,6 +50,7 @@ class ProblemSource(BaseModel):
         target: ``file.toml:REQ``, ``file.fmu``, a bundled name such as ``AT1``, or ``python:MODULE:NAME``: a
             Problem made in Python, or a function that returns one.
         stl: formula to use instead of the spec's requirement.
+        stl_name: name of the requirement that this formula makes.
         profile: name of a profile of the spec.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
             only the control points of the spec are allowed.
@@ -59,6 +61,7 @@ class ProblemSource(BaseModel):
 
     target: str
     stl: str | None = None
+    stl_name: str = STL_NAME
     profile: str | None = None
     parameterization: Parameterization = "free"
     changes: ModelChanges = Field(default_factory=ModelChanges)

@@ -15,7 +15,7 @@ from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.evaluation.workers import evaluate_all
 from falsifier.llm.messages import Chat, Exchange
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, check_names
 from falsifier.search.bounded import BoundedChat
 from falsifier.search.budget import Budget, LimitReached, Spent
 from falsifier.search.events import (
@@ -28,6 +28,7 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
+from falsifier.search.proposals import proposals
 from falsifier.search.result import Result, ResultStatus
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
@@ -47,8 +48,8 @@ class Steps(Protocol):
         """Wall-clock seconds of the recorded part of the run."""
         ...
 
-    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Return an engine's candidates, the number asked for, and the time that took in s."""
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
         ...
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
@@ -76,10 +77,10 @@ class Live:
     replayed: int = 0
     seconds: float = 0.0
 
-    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Ask the engine, and measure the time."""
         started = perf_counter()
-        candidates = engine.ask(wanted)
+        candidates = proposals(engine, problem.space, wanted)
         return candidates, wanted, perf_counter() - started
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
@@ -124,8 +125,11 @@ def search(
         One result per problem, in their order.
 
     Raises:
-        SpecError: if the problems differ in more than their requirement.
+        SpecError: if the problems differ in more than their requirement or share a name, or an engine
+            returns no candidate or too many.
+        CandidateError: if an engine returns a candidate outside the search space.
     """
+    check_names(problems)
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     loop = _Loop(budget, steps or Live(), directory, tuple(listeners))
@@ -247,7 +251,7 @@ class _Loop:
 
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
-        candidates, wanted, seconds = self.steps.ask(target.engine, wanted)
+        candidates, wanted, seconds = self.steps.ask(target.problem, target.engine, wanted)
         self.think(seconds)
         self.emit(
             Asked(

@@ -19,6 +19,7 @@ from falsifier.llm.replay import RecordedChat, Recording
 from falsifier.problem.problem import Problem
 from falsifier.search.journal import recorded_evaluations, recorded_exchanges
 from falsifier.search.loop import Steps
+from falsifier.search.proposals import proposals
 from falsifier.search.records import AskedRecord, ConfirmedRecord, EndedRecord, Record
 
 
@@ -47,17 +48,17 @@ class Replayed:
     def __post_init__(self) -> None:
         self.replayed = len(self.evaluations)
 
-    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Let the engine repeat its recorded suggestions.
 
         Raises:
             JournalError: if it suggests something else.
         """
         if not self.asked.get(self._next):
-            return self.live.ask(engine, wanted)
+            return self.live.ask(problem, engine, wanted)
         record = self.asked[self._next].pop(0)
         # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
-        candidates = engine.ask(record.n)
+        candidates = proposals(engine, problem.space, record.n)
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
             raise JournalError(
                 f"cannot resume: candidate {record.first} of the engine {engine.name!r} differs from the "

@@ -165,3 +165,8 @@ def test_the_formula_is_kept_as_text() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9 or u < -2)")
     stored = to_store(violation(problem))
     assert parse(stored.formula) == problem.requirement.formula
+
+
+def test_a_path_may_be_a_text(tmp_path: Path) -> None:
+    path = save(to_store(violation(lag_problem())), tmp_path / "counterexample.json")
+    assert load(str(path)) == load(path) == load(str(tmp_path))

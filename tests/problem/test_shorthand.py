@@ -70,3 +70,15 @@ def test_values_that_mean_nothing_are_named(value: object) -> None:
         return
     with pytest.raises(SpecError, match=r"parameters\.p"):
         changes_from(inputs={}, parameters={"p": value})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"inputs": ["u=0:1:3", "v", "u"]}, "--input u: given twice"),
+        ({"parameters": ["p=1", "p=0:1"]}, "--param p: given twice"),
+    ],
+)
+def test_a_name_is_given_once(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        changes_from_options(**options)

@@ -113,6 +113,8 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     problem, budget = request.source, request.budget
     if problem is None:
         return "(no command: the problem was made in Python)"
+    if shared and problem.stl is not None:
+        return "(no command: these requirements were searched together in Python)"
     target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
