@@ -169,7 +169,8 @@ def _retry_after(error: Exception) -> float | None:
     """Seconds that the server asked to wait, given as a number or as a date; None if it did not say."""
     for holder in (getattr(error, "response", None), error):
         headers = getattr(holder, "headers", None) or getattr(holder, "litellm_response_headers", None) or {}
-        stated = headers.get("retry-after") if isinstance(headers, Mapping) else None
+        # Headers of urllib are no Mapping, but have its ``get``.
+        stated = headers.get("retry-after") if hasattr(headers, "get") else None
         if stated is not None and (seconds := _seconds_until(str(stated), headers)) is not None:
             return max(0.0, seconds)
     return None

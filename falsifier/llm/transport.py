@@ -91,8 +91,10 @@ class _Call:
         request: "httpx.Request",
     ) -> "httpx.Response":
         """Send a request as the transport would, on a connection of its own, and check the response."""
-        if self._has_ended:
-            self.refuse("the call has ended")
+        import httpx
+
+        if self._has_ended:  # litellm looks up prices and the like in threads that outlive the call
+            raise httpx.TransportError("the call has ended")
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"
         # Compressed, a small reply could fill the memory.

@@ -16,8 +16,8 @@ import sys, time
 from falsifier.cli import streams
 
 streams.stop_at_interrupts()
-print("ready", flush=True)
 try:
+    print("ready", flush=True)
     time.sleep(60)
 except KeyboardInterrupt:
     print("stopping", flush=True)
