@@ -11,6 +11,8 @@ from typing import Literal
 
 # Maximum number of characters of a rejected value in a message.
 _SHOWN_INPUT = 60
+# Maximum number of known names in a message: all bundled requirements fit.
+_LISTED = 40
 
 FailureStatus = Literal["failed", "crashed", "timeout"]
 
@@ -103,7 +105,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     "did you mean 'speed'? Known: rpm, speed"
     """
     names = list(dict.fromkeys(known))
-    listing = "Known: " + (", ".join(names[:30]) + (", ..." if len(names) > 30 else "") if names else "none")
+    shown = [*names[:_LISTED], *(["..."] if len(names) > _LISTED else [])]
+    listing = f"Known: {', '.join(shown) or 'none'}"
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}? {listing}" if near else listing
 
