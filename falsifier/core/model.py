@@ -2,18 +2,21 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import one_of, positive
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import SimulationError, did_you_mean
+from falsifier.errors import SimulationError, SpecError, did_you_mean
 
 Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
+_KINDS: tuple[str, ...] = get_args(Kind)
+_CAUSALITIES: tuple[str, ...] = get_args(Causality)
 
 # Smallest and largest number by type name; Integer (FMI 1 and 2) has 32 bits.
 _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
@@ -46,6 +49,9 @@ class Variable:
         type: name of its data type, such as ``Int8``; empty if unknown.
         alias_of: the name to use instead, if the model has one variable for both; such a name can be read.
         is_clocked: whether it belongs to clocks that never tick, so that it keeps its start value.
+
+    Raises:
+        SpecError: if the kind or the causality is not one of those that there are.
     """
 
     name: str
@@ -65,6 +71,10 @@ class Variable:
     type: str = ""
     alias_of: str = ""
     is_clocked: bool = False
+
+    def __post_init__(self) -> None:
+        one_of("kind of a variable", self.kind, _KINDS)
+        one_of("causality of a variable", self.causality, _CAUSALITIES)
 
     @property
     def is_bounded(self) -> bool:
@@ -153,6 +163,11 @@ class ModelInfo:
         return tuple(v for v in self.with_causality("parameter") if not v.alias_of)
 
 
+# Relative tolerance for one time to be an integer multiple of another: with an interval of 1/30 s, rounding
+# prevents an exact multiple.
+GRID_ROUNDING = 1e-6
+
+
 @dataclass(frozen=True, slots=True)
 class Experiment:
     """How one simulation is run; the same for all candidates of a problem.
@@ -166,6 +181,9 @@ class Experiment:
         tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
         time_limit: maximum wall-clock time of one simulation in s.
         strings: names and values of string parameters.
+
+    Raises:
+        SpecError: naming the attribute that is not as above.
     """
 
     stop_time: float
@@ -175,6 +193,23 @@ class Experiment:
     tolerance: float | None = None
     time_limit: float = 60.0
     strings: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("stop_time", "output_interval", "time_limit"):
+            positive(name, getattr(self, name))
+        for name in ("step_size", "tolerance"):
+            if (given := getattr(self, name)) is not None:
+                positive(name, given)
+        if not isinstance(self.outputs, tuple):
+            raise SpecError(f"outputs: expected a tuple of names, got {self.outputs!r}")
+        intervals = self.stop_time / self.output_interval
+        count = max(round(intervals), 1)
+        if abs(intervals - count) > GRID_ROUNDING * count:
+            raise SpecError(
+                f"stop_time = {self.stop_time:g} s is not an integer multiple of output_interval = "
+                f"{self.output_interval:g} s; try output_interval = {self.stop_time / count:g}",
+                key="output_interval",
+            )
 
     @property
     def samples(self) -> int:

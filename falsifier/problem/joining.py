@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
+from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu import FmuModel, read_info
@@ -15,9 +15,6 @@ from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
-# Tolerance, as a share of the output interval, for the stop time to be a multiple of it: with an interval of
-# 1/30 s, rounding prevents an exact multiple.
-_GRID_ROUNDING = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
 _MAX_RECORDED = 50
@@ -192,7 +189,7 @@ def _experiment(
         output_interval = grid.interval
     check_steps(stop_time, output_interval, file=file, key="model.output_interval")
     intervals = stop_time / output_interval
-    if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
+    if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
         fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None, file)
         raise SpecError(
             f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "

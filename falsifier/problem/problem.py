@@ -8,7 +8,7 @@ from typing import Self
 
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.space import SearchSpace
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
@@ -27,6 +27,10 @@ class Problem:
         parameters: fixed values of parameters, start values and constant inputs, by name.
         source: how it was loaded; None if it was made in Python, or changed after it was loaded.
         notes: what was chosen or ignored when it was loaded and the user should know, in words.
+
+    Raises:
+        SpecError: if the parts do not fit: the model has no such variable, the formula names a signal that is
+            not recorded, or the search space has another stop time than the experiment.
     """
 
     model: Model
@@ -36,6 +40,15 @@ class Problem:
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: ProblemSource | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        if self.space.stop_time != self.experiment.stop_time:
+            raise SpecError(
+                f"{self.name}: stop_time is {self.space.stop_time:g} s in the search space, but "
+                f"{self.experiment.stop_time:g} s in the experiment"
+            )
+        if self.info.variables:
+            _check_variables(self)
 
     @classmethod
     def from_fmu(
@@ -123,6 +136,25 @@ class Problem:
             sorted(self.parameters.items()),
         )
         return sha256(repr(content).encode()).hexdigest()
+
+
+def _check_variables(problem: Problem) -> None:
+    """Check that the model has all variables that are named, and that the formula's signals will be known."""
+    info, experiment = problem.info, problem.experiment
+    inputs = [v.name for v in info.inputs]
+    for name in (r.name for r in problem.space.inputs):
+        if name not in inputs:
+            raise SpecError(f"{problem.name}: the model has no input {name!r}; {did_you_mean(name, inputs)}")
+    for name in (*(p.name for p in problem.space.parameters), *problem.parameters, *experiment.outputs):
+        if name not in info:
+            near = did_you_mean(name, (v.name for v in info.variables))
+            raise SpecError(f"{problem.name}: the model has no variable {name!r}; {near}")
+    for name in problem.requirement.formula.signals:
+        if name not in (*experiment.outputs, *inputs):
+            raise SpecError(
+                f"{problem.name}: the formula names {name!r}, which is neither an input nor recorded: add it "
+                "to the experiment's outputs"
+            )
 
 
 def check_names(problems: Iterable[Problem]) -> None:

@@ -17,11 +17,20 @@ class Requirement:
         name: its name in the spec, e.g. ``AT1``.
         formula: the parsed formula; ``str(formula)`` is its text.
         description: its meaning in words.
+
+    Raises:
+        SpecError: if the name is empty, or the formula is not parsed.
     """
 
     name: str
     formula: Formula
     description: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise SpecError(f"requirement: expected a name, got {self.name!r}")
+        if not isinstance(self.formula, Formula):
+            raise SpecError(f"requirement {self.name!r}: expected a formula; use parse({self.formula!r})")
 
 
 def parse_requirement(

@@ -1,26 +1,10 @@
 """What a run may spend, and what it has spent."""
 
 from dataclasses import dataclass, replace
-from math import isfinite
-from operator import index
-from typing import SupportsIndex
 
+from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
-
-
-def whole(name: str, given: object, *, least: int) -> int:
-    """Return a whole number that a user gave, numpy's too, as an int.
-
-    Raises:
-        SpecError: naming the argument, if it is no whole number or less than the least.
-    """
-    try:
-        if isinstance(given, SupportsIndex) and not isinstance(given, bool) and index(given) >= least:
-            return index(given)
-    except TypeError:  # such as an array of numpy, which has an index only if it is a single whole number
-        pass
-    raise SpecError(f"{name}: expected a whole number, at least {least}, got {given!r}")
 
 
 class LimitReached(FalsifierError):
@@ -104,9 +88,8 @@ class Budget:
             if (number := getattr(self, name)) is not None:
                 object.__setattr__(self, name, whole(f"budget: {name}", number, least=1))
         for name in ("seconds", "cost"):
-            limit = getattr(self, name)
-            if limit is not None and not (limit > 0 and isfinite(limit)):
-                raise SpecError(f"budget: {name} must be positive and finite, got {limit}")
+            if (limit := getattr(self, name)) is not None:
+                positive(f"budget: {name}", limit)
         if all(getattr(self, name) is None for name in ("simulations", "seconds", "tokens", "cost")):
             raise SpecError("budget: give at least one limit: simulations, seconds, tokens or cost")
 

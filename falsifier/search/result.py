@@ -12,7 +12,7 @@ from falsifier.search.budget import Spent
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Result:
     """The result of a run for one requirement.
 
@@ -42,6 +42,11 @@ class Result:
     spent: Spent = field(default_factory=Spent)
     directory: Path | None = None
     unrecorded: str = ""
+
+    def __repr__(self) -> str:
+        # All trajectories and variables would fill pages of a terminal.
+        least = "" if self.robustness is None else f", robustness {self.robustness:+.6g}"
+        return f"Result({self.problem.name}: {self.status}{least}, {self.spent.simulations_text})"
 
     @property
     def falsified(self) -> bool:

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import overload
 
+from falsifier.core.arguments import whole
 from falsifier.core.files import file_name
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import Engine
@@ -15,7 +16,7 @@ from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
-from falsifier.search.budget import Budget, whole
+from falsifier.search.budget import Budget
 from falsifier.search.events import Listener
 from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.search.leaders import make_engines

@@ -13,7 +13,7 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--stl", "G[0,20] (sped <= 120)"], "did you mean 'speed'"),
         (["run", "AT1", "--engine", "corner"], "did you mean 'corners'"),
         (["run", "AT1", "--input", "throtle=0:100:7"], "did you mean 'throttle'"),
-        (["run", "AT1", "--budget", "0"], "simulations must be positive"),
+        (["run", "AT1", "--budget", "0"], "simulations: expected a whole number, at least 1, got 0"),
         (["run", "AT1", "--budget", "many"], "many"),
         (["run", "AT1", "--effort", "low"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),

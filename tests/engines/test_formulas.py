@@ -11,6 +11,8 @@ from falsifier.engines.registry import ENGINES
 from falsifier.engines.surrogate import Settings
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.stl import parse
 from falsifier.testing import FREE, lag_problem
 from tests.engines.support import HASTY
 
@@ -27,7 +29,7 @@ FORMULAS = (
 
 def partly_searched(formula: str) -> Problem:
     """u is searched; v and w are kept constant, brake and locked at their start values."""
-    problem = lag_problem(formula, inputs=3, free=FREE)
+    problem = lag_problem(inputs=3, free=FREE)
     assert isinstance(problem.model, FunctionModel)
     held = (
         Variable("brake", causality="input", start=20.0),
@@ -37,6 +39,7 @@ def partly_searched(formula: str) -> Problem:
     return replace(
         problem,
         model=replace(problem.model, info=info),
+        requirement=Requirement("partly", parse(formula)),
         space=replace(problem.space, inputs=problem.space.inputs[:1]),
         parameters={"v": 2.0, "w": 0.5},
     )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.search.budget import Budget, Spent, whole
+from falsifier.search.budget import Budget, Spent
 
 
 @pytest.mark.parametrize(
@@ -43,14 +43,7 @@ def test_remaining_cuts_a_batch() -> None:
     assert Budget(None, seconds=1).remaining(Spent(simulations=8), 4) == 4
 
 
-@pytest.mark.parametrize("given", [2.5, "10", True, 0, -1, None, np.bool_(True), np.array([1, 2])])
-def test_what_is_no_whole_number_is_refused(given: object) -> None:
-    with pytest.raises(SpecError, match="jobs: expected a whole number, at least 1, got"):
-        whole("jobs", given, least=1)
-
-
 def test_whole_numbers_of_numpy_become_ints() -> None:
-    assert type(whole("seed", np.int64(3), least=0)) is int
     budget = Budget(np.int32(3), tokens=np.int64(5))  # type: ignore[arg-type]
     assert (type(budget.simulations), type(budget.tokens)) == (int, int)
     with pytest.raises(

@@ -58,12 +58,15 @@ def _oscillator(
 
 def switch_problem(formula: str) -> Problem:
     """The lag, of which only ``mode`` is seen: 1 where x is above a half, else 0."""
-    problem = lag_problem(formula, free=FREE)
+    problem = lag_problem(free=FREE)
     info = ModelInfo(
         "switch", variables=(Variable("u", causality="input"), Variable("mode", "integer", "output"))
     )
     experiment = replace(problem.experiment, outputs=("mode",))
-    return replace(problem, model=FunctionModel(_switch, info), experiment=experiment)
+    requirement = Requirement("SWITCH", parse(formula))
+    return replace(
+        problem, model=FunctionModel(_switch, info), experiment=experiment, requirement=requirement
+    )
 
 
 def _switch(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
