@@ -3,6 +3,7 @@
 import ctypes
 import os
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +110,8 @@ class Library:
     def close(self) -> None:
         """Free the instance and unload the library."""
         self._free()
+        if self._log in _LISTENERS:
+            _LISTENERS.remove(self._log)
         self._fmu.freeLibrary()
 
     def _symbol(self, name: str) -> str:
@@ -196,7 +199,7 @@ class Library:
 
         version: Any = fmi1 if self.description.major == 1 else fmi2
         callbacks = getattr(version, f"{self._prefix}CallbackFunctions")()
-        callbacks.logger = getattr(version, f"{self._prefix}CallbackLoggerTYPE")(self._log_1_2)
+        callbacks.logger = _logger(getattr(version, f"{self._prefix}CallbackLoggerTYPE"))
         callbacks.allocateMemory = getattr(version, f"{self._prefix}CallbackAllocateMemoryTYPE")(calloc)
         callbacks.freeMemory = getattr(version, f"{self._prefix}CallbackFreeMemoryTYPE")(free)
         try:
@@ -204,12 +207,8 @@ class Library:
         except (ImportError, OSError):
             return callbacks
         addLoggerProxy(ctypes.byref(callbacks))
+        _LISTENERS[:] = [self._log]
         return callbacks
-
-    def _log_1_2(
-        self, _component: object, _name: bytes, status: int, _category: bytes, message: bytes
-    ) -> None:
-        self._log(_line(status, message))
 
     def _log_3(self, _environment: object, status: int, _category: bytes, message: bytes) -> None:
         self._log(_line(status, message))
@@ -223,6 +222,24 @@ class Library:
         }.get((self.description.major, self.interface), "FreeInstance")
         self.function(name)(self.component)
         self._fmu.component = None
+
+
+# What hears the messages of FMI 1 and 2: the FMU that was instantiated last, or nothing once it is closed.
+_LISTENERS: list[Callable[[str], None]] = []
+
+
+@cache
+def _logger(callback_type: Any) -> Any:
+    """Return the logger of FMI 1 or 2.
+
+    It is never freed: fmpy's proxy has one logger per process, which other FMUs call when this one has gone.
+    """
+
+    def log(_component: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+        for listener in _LISTENERS or [print]:
+            listener(_line(status, message))
+
+    return callback_type(log)
 
 
 def _line(status: int, message: bytes | None) -> str:

@@ -1,9 +1,12 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu.simulator import FmuModel
+from tests.command import ROOT
 from tests.fmu.fixtures import isolated, local, path, run
 from tests.fmu.support import ERROR, TALK
 
@@ -33,6 +36,27 @@ def test_messages_belong_to_the_simulation_that_they_came_from() -> None:
     assert got.log == ("warning: valve nearly closed",)
     assert run(model, ("y",)).log == ()
     model.close()
+
+
+def test_the_messages_of_an_fmu_that_others_load_are_printed_when_this_one_is_closed() -> None:
+    """fmpy has one logger per process: were it freed with its FMU, the next message would crash."""
+    program = f"""
+import gc
+from tests.fmu.fixtures import local, run
+from tests.fmu.support import TALK
+from tests.modelica.support import opened
+model = local("Misdeeds_2")
+assert run(model, ("y",), parameters={{"misdeed": TALK}}).log
+model.close()
+gc.collect()
+with opened({str(path("Misdeeds_2"))!r}) as [other]:
+    other.start(misdeed=TALK).run(["y"], 1.0, 0.1)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout.splitlines()) == {"warning: valve nearly closed"}
 
 
 def test_equal_files_are_loaded_once_and_closing_removes_the_folder(
