@@ -64,11 +64,11 @@ def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path)
     path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     wrong = {"--variant": "MP9", "--fallback": "corner", "--engine": "uniform"}
     for option, value in wrong.items():
-        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path)
+        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path, fresh=True)
         assert (done.code, "imported" in done.err) == (2, False), done.err
-    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path)
+    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path, fresh=True)
     assert (done.code, "OPENAI_API_KEY" in done.err) == (2, True), done.err
-    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path)
+    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path, fresh=True)
     assert (done.code, "imported" in done.err) == (3, True), done.err
 
 
