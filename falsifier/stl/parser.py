@@ -13,7 +13,7 @@ Operators, lowest precedence first::
     *  /                            left associative
     -x
     ^                               right associative, so -x^2 is -(x^2)
-    numbers, names, abs sqrt exp log sin cos min max, parentheses
+    numbers, names, true, false, abs sqrt exp log sin cos min max, parentheses
 
 So ``G[0,5] x <= 3 -> y <= 1`` means ``(G[0,5] (x <= 3)) -> (y <= 1)``. Windows are closed intervals, in
 seconds unless each bound has a unit (``us ms s min h``); an operator without a window extends to the stop
@@ -25,6 +25,7 @@ from collections.abc import Callable
 from typing import NoReturn, cast
 
 from falsifier.errors import FormulaError, did_you_mean
+from falsifier.stl.constants import Constant, without_constants
 from falsifier.stl.expression import (
     POWER,
     PRODUCT,
@@ -139,6 +140,9 @@ class _Parser:
             self._fail_after(rest)
         if _depth(formula) > MAX_DEPTH:
             self._fail_depth(0)
+        formula = without_constants(formula)
+        if isinstance(formula, Constant):
+            self._fail(f"the formula is always {formula}", 0, "compare a signal, for example speed <= 120")
         return formula
 
     def _climb(self, level: int) -> Node:
@@ -202,6 +206,8 @@ class _Parser:
         if token.text == "-":
             operand = self._expression_at(SIGN)
             return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
+        if token.text in ("true", "false"):
+            return Constant(token.text == "true")
         if token.text in FUNCTIONS:
             return self._call(token)
         if token.text in ("not", "G", "F", "X"):
@@ -329,11 +335,10 @@ class _Parser:
     def _as_expression(self, node: Node, start: int) -> Expression:
         if isinstance(node, Expression):
             return node
-        self._fail(
-            "expected a number or a signal, got a formula",
-            start,
-            "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->",
-        )
+        hint = "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->"
+        if isinstance(node, Constant):
+            hint = "write a Boolean signal b as b or not b"
+        self._fail("expected a number or a signal, got a formula", start, hint)
 
     def _fail_operand(self, token: Token) -> NoReturn:
         problem = f"expected a formula, a signal or a number, not {token.shown}"
@@ -341,9 +346,7 @@ class _Parser:
             problem = "the formula ends too early"
         hint = "something is missing before it"
         previous = self.tokens[self.index - 2] if self.index > 1 else None
-        if token.text in ("true", "false"):
-            problem, hint = f"{token.text} has no margin", "write a Boolean signal b as b or not b"
-        elif token.text == "U":
+        if token.text == "U":
             hint = f'it belongs between two formulas; write a signal of that name as "{token.written}"'
         elif token.text in ("[", "]"):
             hint = "write windows directly after G, F or U"
