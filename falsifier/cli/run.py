@@ -50,7 +50,7 @@ _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified":
 @problem_options
 @engine_option()
 @llm_options
-@budget_option(100)
+@budget_option()
 @limit_options()
 @seed_option()
 @jobs_option("simulations")

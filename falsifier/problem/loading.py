@@ -175,7 +175,8 @@ def _of_spec(source: ProblemSource) -> Problem:
         if len(spec.requirements) > 1:
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{path}:{next(iter(spec.requirements))}. Known: {', '.join(spec.requirements)}",
+                f"{source.target}:{next(iter(spec.requirements))}, or falsify all of them with --all. "
+                f"Known: {', '.join(spec.requirements)}",
                 file=str(path),
             )
         requirement = next(iter(spec.requirements))

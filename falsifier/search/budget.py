@@ -8,6 +8,9 @@ from typing import SupportsIndex
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
 
+# Maximum number of simulations of a run if nothing else is said.
+DEFAULT_SIMULATIONS = 100
+
 
 def whole(name: str, given: object, *, least: int) -> int:
     """Return a whole number that a user gave, numpy's too, as an int.

@@ -15,7 +15,7 @@ from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
-from falsifier.search.budget import Budget, whole
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, whole
 from falsifier.search.events import Listener
 from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.search.leaders import make_engines
@@ -77,7 +77,7 @@ def falsify(
     engine: str | Engine | None = None,
     *,
     llm: LLM | None = None,
-    budget: Budget | int = 100,
+    budget: Budget | int = DEFAULT_SIMULATIONS,
     seed: int = 0,
     directory: Path | str | None = None,
     jobs: int = 1,
