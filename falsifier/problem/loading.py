@@ -142,10 +142,11 @@ def load_source(source: ProblemSource) -> Problem:
             )
         problem = replace(_python_problem(source.target), source=source)
     elif kind == "fmu":
-        if source.stl is None:
+        if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
         problem = _made(
-            join_fmu(Path(source.target), source.stl, changes=source.changes, name=source.stl_name), source
+            join_fmu(Path(source.target), source.stl or "", changes=source.changes, name=source.stl_name),
+            source,
         )
     else:
         problem = _of_spec(source)

@@ -227,13 +227,13 @@ def carry_out(
         begun = directory is not None and holds_run(directory)
         if begun and not resume:
             raise JournalError(
-                f"{directory} already contains a run: choose another --out, or to continue it: "
-                f"falsifier resume {directory}"
+                f"{directory} already contains a run: choose another directory, or to continue it: "
+                + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
             )
         if directory is not None and not begun and holds_lines(directory):
             raise JournalError(
                 f"{directory} contains a journal without its manifest, so nobody knows what it belongs to: "
-                "choose another --out, or delete it"
+                "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         engines = [engine] if engine is not None else make_engines(request, problems, chat)
