@@ -76,15 +76,14 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
 @click.option(
     "--margin",
     type=float,
-    default=0.0,
-    show_default=True,
-    help="Keep the robustness at or below minus this value.",
+    help="Margin to keep: the robustness stays at or below minus this value. Default: half of the "
+    "original's; 0: any violation will do.",
 )
 @out_option("File to write; default: shrunk.json in RUN's directory.")
 @store_option
 @json_option
 def shrink(
-    *, run: Path, budget: int, margin: float, out: Path | None, store: Path | None, as_json: bool
+    *, run: Path, budget: int, margin: float | None, out: Path | None, store: Path | None, as_json: bool
 ) -> None:
     """Make a counterexample as simple as possible while it still violates; the original is kept.
 
@@ -118,10 +117,13 @@ def shrink(
     if as_json:
         content = _confirmation_json(confirmation)
         content |= {"minimal": shrunk.minimal, "simulations": shrunk.simulations}
+        content |= {"least_margin": shrunk.least_margin}
         say(json.dumps(content | {"files": list(map(str, written))}, indent=2))
         return
     say(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
     say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
+    half = ", half of the original's; --margin changes it" if margin is None else ""
+    say(f"  margin         at least {shrunk.least_margin:.6g} was kept{half}")
     for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
         say(f"  {line}")
     say(f"  files          {', '.join(map(str, written))}")

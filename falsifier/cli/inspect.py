@@ -18,7 +18,7 @@ from falsifier.core.words import counted
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
-from falsifier.problem.loading import load_problems
+from falsifier.problem.loading import find_spec, load_problems
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
@@ -44,7 +44,8 @@ _CHECKED_VARIABLES = 50
 def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     """Show an FMU's interfaces, variables, units and ranges.
 
-    FMU is an FMU, the name of a bundled one (AT), or a spec file, which stands for its FMU.
+    FMU is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
+    two stand for their FMU.
     """
     from falsifier.fmu import read_info
 
@@ -170,6 +171,9 @@ def _existing_fmu(fmu: Path) -> Path:
     inside = bundled("fmus") / f"{fmu.name.removesuffix('.fmu')}.fmu"
     if fmu.parent == Path() and inside.is_file():
         return inside
+    if fmu.parent == Path() and not fmu.suffix:
+        spec = find_spec(str(fmu))[0]  # the name of a bundled requirement
+        return spec.parent / read_spec(spec).model.fmu
     raise SpecError(f"{fmu}: no such file; expected the path of an FMU, or the name of a bundled one")
 
 

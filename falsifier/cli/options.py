@@ -17,7 +17,8 @@ from falsifier.core.secrets import is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.prompts.variants import DEFAULT_VARIANT
 from falsifier.problem.shorthand import changes_from_options
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.search.budget import DEFAULT_SIMULATIONS
 from falsifier.search.request import Effort, LLMSettings
 
 # What a price is, in errors; $0.25 and $2 per million tokens, as providers state prices.
@@ -40,14 +41,18 @@ def profile_option(command: Function) -> Function:
     )(command)
 
 
-def parameterization_option(*, multiple: bool = False) -> Decorator:
-    # Campaigns are compared with published results, which exist for the fixed parameterization only.
+# What a search does unless it is told otherwise: the same for one run and for each run of a campaign.
+DEFAULT_PARAMETERIZATION: Parameterization = "free"
+
+
+def parameterization_option(*, multiple: bool = False, suite: Parameterization = "fixed") -> Decorator:
+    default = DEFAULT_PARAMETERIZATION
     return click.option(
         "--parameterization",
         type=click.Choice(["free", "fixed"]),
         multiple=multiple,
-        default=("fixed",) if multiple else "free",
-        show_default=True,
+        default=() if multiple else default,
+        show_default=f"{default}; with --suite {suite}" if multiple else True,
         help=_repeatable(
             "free: engines may choose control points within the spec's limits; fixed: the spec's own.",
             multiple=multiple,
@@ -253,12 +258,14 @@ def _llm_option(text: str) -> tuple[str, str | float]:
         return name, value
 
 
-def budget_option(default: int, *, note: str = "") -> Decorator:
+def budget_option(
+    default: int = DEFAULT_SIMULATIONS, *, suite: int | None = None, note: str = ""
+) -> Decorator:
     return click.option(
         "--budget",
         type=int,
-        default=default,
-        show_default=True,
+        default=default if suite is None else None,
+        show_default=True if suite is None else f"{default}; with --suite {suite}",
         help=f"Maximum number of simulations{note}.",
     )
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import click
 
-from falsifier.campaigns.archcomp import BUDGET, Finding, export, read_rows
+from falsifier.campaigns.archcomp import Finding, export, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
+from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS
 from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
@@ -46,7 +47,7 @@ def report(
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
-@budget_option(BUDGET, note=" per run; claims that used more are rejected")
+@budget_option(PROTOCOL_SIMULATIONS, note=" per run; claims that used more are rejected")
 @json_option
 def validate(*, file: Path, budget: int, as_json: bool) -> None:
     """Re-simulate the counterexamples in FILE and report which of them are reproduced.

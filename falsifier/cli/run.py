@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 import click
 
-from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.directory import is_campaign, run_directories
 from falsifier.cli.campaign import resume_campaign
 from falsifier.cli.files import write_counterexample
 from falsifier.cli.options import (
@@ -29,8 +29,8 @@ from falsifier.cli.options import (
     total_options,
 )
 from falsifier.cli.output import conclude
-from falsifier.core.files import file_name
-from falsifier.errors import FalsifierError, SpecError
+from falsifier.core.files import bundled, file_name
+from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.problem.loading import find_spec, sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
@@ -46,11 +46,27 @@ from falsifier.views.text import counterexample_name, result_json, result_text, 
 _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}
 
 
-@click.command()
+class _OneTarget(click.Command):
+    """A command that says what to use instead if it is given several targets."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            if "unexpected extra argument" not in error.message:
+                raise
+            raise click.UsageError(
+                f"{error.message}; one run searches one target: for several, falsifier bench TARGET "
+                "TARGET ..., and for all requirements of one spec in one search, falsifier run SPEC --all",
+                ctx,
+            ) from None
+
+
+@click.command(cls=_OneTarget)
 @problem_options
 @engine_option()
 @llm_options
-@budget_option(100)
+@budget_option()
 @limit_options()
 @seed_option()
 @jobs_option("simulations")
@@ -138,8 +154,18 @@ def resume(
         limits = Budget(*given) if any(x is not None for x in given) else None
         resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
         return
+    places = run_directories(directory)
+    results: list[Result] = []
     with make_display(quiet=quiet) as display:
-        results = resume_run(directory, listeners=[display])
+        for place in places:
+            try:
+                results += resume_run(place, listeners=[display])
+            except JournalError as error:  # such as a run whose problem was made in Python
+                if len(places) == 1:
+                    raise
+                warn(f"falsifier: {error}; left as it is")
+    if not results:
+        raise JournalError(f"{directory}: none of these {len(places)} runs can be continued here")
     _finish(results, as_json=as_json)
 
 
@@ -187,8 +213,16 @@ def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
     if source.parts.kind in ("fmu", "python") or source.stl is not None:
         raise SpecError(f"{source.target}: --all needs a spec with several requirements; drop --all")
     if find_spec(source.target)[1] is not None:
-        raise SpecError(f"{source.target}: --all needs the spec's name without a requirement")
+        raise SpecError(
+            f"{source.target} is one requirement; for all of its spec: falsifier run {_spec_of(source)} --all"
+        )
     return tuple(sources_of(source))
+
+
+def _spec_of(source: ProblemSource) -> str:
+    """The spec's name if it is bundled, else its path."""
+    path = find_spec(source.target)[0]
+    return path.stem if path.parent == bundled("specs") else str(path)
 
 
 def _new_directory(name: str) -> Path:

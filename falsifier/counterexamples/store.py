@@ -22,7 +22,7 @@ from falsifier import __version__
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name, write_whole
 from falsifier.core.sealing import check_seal, seal
-from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source, reloadable, spec_file
@@ -157,7 +157,10 @@ def load(path: Path | str) -> StoredCounterexample:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise SpecError(f"not a counterexample file: {first['msg']}", file=str(file), key=key) from None
+        why = rejected(first["msg"], first["input"])
+        if first["type"] == "json_invalid" or not key:
+            key, why = "", "expected the counterexample.json of a run, or a run directory"
+        raise SpecError(f"not a counterexample file: {why}", file=str(file), key=key) from None
     try:
         if stored.sum:
             check_seal(content)

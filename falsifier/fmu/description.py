@@ -266,8 +266,8 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
                 kind=kind,
                 causality=causality,
                 variability=variability,
-                unit=attributes.get("unit", ""),
-                display_unit=attributes.get("displayUnit", ""),
+                unit=_unit(attributes.get("unit")),
+                display_unit=_unit(attributes.get("displayUnit")),
                 low=_limit(attributes.get("min")),
                 high=_limit(attributes.get("max")),
                 nominal=_number(attributes.get("nominal")),
@@ -329,8 +329,8 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
             kind=kind,
             causality=causality,
             variability=variability,
-            unit=attributes.get("unit", ""),
-            display_unit=attributes.get("displayUnit", ""),
+            unit=_unit(attributes.get("unit")),
+            display_unit=_unit(attributes.get("displayUnit")),
             low=_limit(attributes.get("min")),
             high=_limit(attributes.get("max")),
             nominal=_number(attributes.get("nominal")),
@@ -428,3 +428,8 @@ def _limit(text: str | None) -> float | None:
 
 def _flag(text: str | None) -> bool:
     return text is not None and text.strip() in ("true", "1")
+
+
+def _unit(text: str | None) -> str:
+    """Return a unit; empty for 1, which FMUs use for dimensionless variables."""
+    return "" if text in (None, "1") else str(text)

@@ -279,6 +279,8 @@ def _space(
     ranges: list[ParameterRange] = []
     for name, parameter in parameters.items():
         key = f"parameters.{name}"
+        if name in info and info[name].causality == "input":
+            raise SpecError(f"{name} is an input; {_as_input(name, parameter, file)}", file=file, key=key)
         settable = [v for v in info.variables if v.settable and v.causality != "input"]
         if name in info and not info[name].settable:
             v = info[name]
@@ -293,6 +295,8 @@ def _space(
         elif parameter.value is not None:
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
     if not searched and not ranges:
+        if file.endswith(".fmu"):  # there is no spec file
+            raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
         raise SpecError(
             "nothing to search; add [inputs.NAME] with range and control_points, "
             "or [parameters.NAME] with range",
@@ -318,6 +322,25 @@ def _variable(name: str, variables: Iterable[Variable], kind: str, file: str, ke
     if name not in known:
         raise SpecError(f"the FMU has no such {kind}; {did_you_mean(name, known)}", file=file, key=key)
     return known[name]
+
+
+def _as_input(name: str, section: ParameterSection, file: str) -> str:
+    """Say how to write as an input what was written as a parameter."""
+    text = "LOW:HIGH" if section.value is None else str(section.value)
+    if section.range is not None:
+        text = ":".join(f"{value:g}" for value in section.range)
+    option = f"--input {name}={text}"
+    return f"write {option}" if file.endswith(".fmu") else f"write {option}, or [inputs.{name}] in the spec"
+
+
+def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:
+    """Say which option makes one of the inputs, which all have fixed values, a searched one."""
+    if not inputs:
+        return "add --input NAME=LOW:HIGH or --param NAME=LOW:HIGH"
+    name = next(iter(inputs))
+    low, high = info[name].low, info[name].high
+    limits = "LOW:HIGH" if low is None or high is None else f"{low:g}:{high:g}"
+    return f"all inputs have fixed values; give one of them a range, for example --input {name}={limits}"
 
 
 def _bounded_inputs(info: ModelInfo) -> dict[str, object]:

@@ -142,10 +142,11 @@ def load_source(source: ProblemSource) -> Problem:
             )
         problem = replace(_python_problem(source.target), source=source)
     elif kind == "fmu":
-        if source.stl is None:
+        if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
         problem = _made(
-            join_fmu(Path(source.target), source.stl, changes=source.changes, name=source.stl_name), source
+            join_fmu(Path(source.target), source.stl or "", changes=source.changes, name=source.stl_name),
+            source,
         )
     else:
         problem = _of_spec(source)
@@ -175,7 +176,8 @@ def _of_spec(source: ProblemSource) -> Problem:
         if len(spec.requirements) > 1:
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{path}:{next(iter(spec.requirements))}. Known: {', '.join(spec.requirements)}",
+                f"{source.target}:{next(iter(spec.requirements))}, or falsify all of them with --all. "
+                f"Known: {', '.join(spec.requirements)}",
                 file=str(path),
             )
         requirement = next(iter(spec.requirements))

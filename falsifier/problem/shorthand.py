@@ -1,5 +1,6 @@
 """Conversion of Python values and command-line options to the sections of a spec."""
 
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from falsifier.core.signals import INTERPOLATIONS
 from falsifier.errors import SpecError, did_you_mean, rejected
 from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection
+
+_DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 
 # A constant value; (low, high), (low, high, points) or (low, high, points, interpolation) to search; None to
 # search between the FMU's min and max; or a complete section of a spec.
@@ -143,6 +146,11 @@ def _input(option: str) -> tuple[str, dict[str, object]]:
         return option.strip(), {}
     name, parts = _split(option, "--input")
     if len(parts) == 1:
+        if _as_number(parts[0]) is None:
+            raise SpecError(
+                f"--input {option}: expected a number, or a range LOW:HIGH with a colon, for example "
+                f"--input {name}={_as_range(parts[0])}"
+            )
         return name, {"value": _number(parts[0], option)}
     section: dict[str, object] = {"range": (_number(parts[0], option), _number(parts[1], option))}
     section["control_points"] = DEFAULT_POINTS
@@ -204,6 +212,12 @@ def _number(text: str, option: str) -> float:
         return float(text)
     except ValueError:
         raise SpecError(f"{option}: {text!r} is not a number") from None
+
+
+def _as_range(text: str) -> str:
+    """Return the range that a text with another separator was meant to be, or an example."""
+    match = re.fullmatch(rf"[\[(]?\s*({_DIGITS})\s*(?:-|,|;|\.\.+|\bto\b|\s)\s*({_DIGITS})\s*[\])]?", text)
+    return f"{match[1]}:{match[2]}" if match else "0:100"
 
 
 def _parameter_option(section: ParameterSection) -> str:

@@ -185,6 +185,12 @@ def read_spec(path: Path) -> Spec:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
         raise SpecError(f"not valid TOML: {error}", file=str(path)) from None
+    if not data:
+        raise SpecError(
+            "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "
+            "`falsifier init MODEL.fmu` write a spec to begin with",
+            file=str(path),
+        )
     return parse_spec(data, file=str(path))
 
 

@@ -6,6 +6,9 @@ from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
 
+# Maximum number of simulations of a run if nothing else is said.
+DEFAULT_SIMULATIONS = 100
+
 
 class LimitReached(FalsifierError):
     """A limit of the run is reached in the middle of an engine's turn; the message says which."""

@@ -16,7 +16,7 @@ from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
-from falsifier.search.budget import Budget
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.events import Listener
 from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.search.leaders import make_engines
@@ -78,7 +78,7 @@ def falsify(
     engine: str | Engine | None = None,
     *,
     llm: LLM | None = None,
-    budget: Budget | int = 100,
+    budget: Budget | int = DEFAULT_SIMULATIONS,
     seed: int = 0,
     directory: Path | str | None = None,
     jobs: int = 1,
@@ -228,13 +228,13 @@ def carry_out(
         begun = directory is not None and holds_run(directory)
         if begun and not resume:
             raise JournalError(
-                f"{directory} already contains a run: choose another --out, or to continue it: "
-                f"falsifier resume {directory}"
+                f"{directory} already contains a run: choose another directory, or to continue it: "
+                + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
             )
         if directory is not None and not begun and holds_lines(directory):
             raise JournalError(
                 f"{directory} contains a journal without its manifest, so nobody knows what it belongs to: "
-                "choose another --out, or delete it"
+                "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         engines = [engine] if engine is not None else make_engines(request, problems, chat)

@@ -41,6 +41,11 @@ def test_info_takes_a_spec_for_its_fmu(tmp_path: Path) -> None:
     )
 
 
+def test_info_takes_a_bundled_requirement_for_its_fmu(tmp_path: Path) -> None:
+    assert falsifier("info", "AT1", "--json", cwd=tmp_path).json["name"].endswith("AT")
+    assert "did you mean 'AT1'?" in falsifier("info", "at1", cwd=tmp_path).err
+
+
 def test_init_writes_a_spec_that_runs(tmp_path: Path) -> None:
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
     assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0

@@ -5,11 +5,15 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from falsifier.core.files import bundled
+from falsifier.errors import JournalError
 from falsifier.search.journal import read_journal, write_manifest
+from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier, listen_to_interrupts
 from tests.fmu.fixtures import path as fixture
 from tests.patience import HANG, wait_until
@@ -80,6 +84,52 @@ def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path
     assert done.json["best"]["signals"]["throttle"]["values"] == [100.0] * 5
     manifest = json.loads((Path(tmp_path) / done.json["directory"] / "manifest.json").read_text())
     assert [(i["name"], i["low"], i["high"]) for i in manifest["inputs"]] == [("throttle", 0.0, 100.0)]
+
+
+SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*SPEED, "--input", "throttle=50", "--input", "brake=0"), "for example --input throttle=0:100"),
+        (("nosuch.fmu",), "nosuch.fmu: no such file"),
+        ((*SPEED, "--input", "throttle=0-100"), "for example --input throttle=0:100"),
+        ((*SPEED, "--input", "throttle=-5.5..7"), "for example --input throttle=-5.5:7"),
+        ((*SPEED, "--param", "throttle=0:100"), "throttle is an input; write --input throttle=0:100"),
+        (("AT1", "--param", "throttle=3"), "write --input throttle=3.0, or [inputs.throttle] in the spec"),
+        (("at1",), "did you mean 'AT1'?"),
+        (("AT1", "--all"), "for all of its spec: falsifier run AT --all"),
+        (("AT1", "AT2"), "falsifier bench TARGET TARGET"),
+        (("AT",), "for example AT:AT1, or falsify all of them with --all"),
+        ((*SPEED, "--stop-time", "-5"), "stop_time: expected a number greater than 0, got -5.0"),
+        ((*SPEED, "--input", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
+        (("empty.toml",), "empty.toml: the file contains nothing; write [model]"),
+    ],
+)
+def test_what_newcomers_get_wrong_is_answered_with_what_to_write(
+    command: Any, tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    (tmp_path / "my.fmu").symlink_to(bundled("fmus") / "AT.fmu")
+    (tmp_path / "empty.toml").write_text("# nothing yet\n")
+    result = command("run", *arguments)
+    assert result.exit_code != 0
+    assert message in f"{result.output} {result.exception}"
+    assert "Input should" not in str(result.exception)
+
+
+def test_a_folder_is_resumed_without_the_runs_that_only_python_can_continue(
+    command: Any, tmp_path: Path
+) -> None:
+    falsify(lag_problem(), budget=2, directory="a")
+    command("run", "python:tests.problems:impossible", "--engine", "uniform", "--budget", "2", "--out", "b")
+    result = command("resume", ".")
+    assert result.exit_code == 0, result.output
+    assert "NEVER: not falsified after 2 simulations" in result.stdout
+    assert "a: this run's problem was made in Python" in result.stderr
+    assert isinstance(command("resume", "a").exception, JournalError)
+    with pytest.raises(JournalError, match=r"choose another directory, .*resume\(\) with problems=\[...\]"):
+        falsify(lag_problem(), budget=2, directory="a")
 
 
 def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:

@@ -107,7 +107,11 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [("{", "c.json: not a counterexample file"), ('{"format": 2}', "c.json: format: not a counterexample")],
+    [
+        ("hello", "c.json: not a counterexample file: expected the counterexample.json of a run"),
+        ("[1]", "c.json: not a counterexample file: expected the counterexample.json of a run"),
+        ('{"format": 2}', "c.json: format: not a counterexample"),
+    ],
 )
 def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "c.json").write_text(content)

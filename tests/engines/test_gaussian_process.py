@@ -53,6 +53,7 @@ def test_equal_costs_are_no_trouble() -> None:
 def test_length_scales_that_shrink_from_fit_to_fit_leave_a_covariance_that_can_be_factored(seed: int) -> None:
     """Found in a long search: after many refits the factor of the covariance did not exist."""
     rng = np.random.default_rng(seed)
-    points = rng.random((5, 8))[rng.integers(0, 5, 80)] + 10.0 ** -rng.uniform(3, 12) * rng.standard_normal((80, 8))
+    apart = 10.0 ** -rng.uniform(3, 12) * rng.standard_normal((80, 8))
+    points = rng.random((5, 8))[rng.integers(0, 5, 80)] + apart
     process = fit_lengths(points, rng.standard_normal(80), np.full(8, 1e-8), rng, noise=1e-4)
     assert np.isfinite(process.weights).all()

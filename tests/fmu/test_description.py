@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu import read_info
 from falsifier.fmu.description import Description, parse, read_description
@@ -38,7 +39,7 @@ def test_agrees_with_fmpy(name: str) -> None:
         twin = scalars[variable.name]
         slot = description.slots[variable.name]
         assert slot.reference == twin.valueReference
-        assert variable.unit == (twin.unit or "")
+        assert variable.unit == ("" if twin.unit == "1" else twin.unit or "")
         assert variable.description == (twin.description or "")
         # Limits that stand for "none" in some exporters are none here.
         low = None if twin.min is None else float(twin.min)
@@ -144,3 +145,8 @@ def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
     assert read_info(copy).name == "Lag"
     copy.write_bytes(fixtures.path("Ball_2").read_bytes())
     assert read_info(copy).name == "Ball"
+
+
+@pytest.mark.parametrize("name", ["CC", "NN"])
+def test_a_dimensionless_variable_has_no_unit(name: str) -> None:
+    assert "1" not in {v.unit for v in read_info(bundled("fmus") / f"{name}.fmu").variables}

@@ -44,6 +44,7 @@ class Published:
     Attributes:
         columns: scores by column (``best``, ``uniform``, ``llm_falsifier``) and requirement.
         ablation: scores by prompt variant and requirement.
+        tools: scores of single tools that have no column of their own, by tool and requirement.
         llms: scores by language model with effort, e.g. ``gpt-5-mini-high``, and requirement.
         sources: publication that a column was taken from.
     """
@@ -51,11 +52,22 @@ class Published:
     columns: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
     ablation: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
     llms: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
+    tools: Mapping[str, Mapping[str, Score]] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def scores(self, requirement: str) -> dict[str, Score]:
         """Scores for one requirement by column."""
         return {name: scores[requirement] for name, scores in self.columns.items() if requirement in scores}
+
+    def competitors(self, requirement: str) -> list[Score]:
+        """Scores for one requirement of every published tool, each tool once."""
+        best = self.columns.get("best", {}).get(requirement)
+        shown = list(self.scores(requirement).values())
+        return shown + [
+            scores[requirement]
+            for tool, scores in self.tools.items()
+            if requirement in scores and (best is None or best.tool != tool)
+        ]
 
 
 COLUMNS = {"best": "best ARCH-COMP tool", "llm_falsifier": "LLM-Falsifier", "uniform": "uniform random"}
@@ -66,6 +78,11 @@ def rank(score: Score, others: Iterable[Score]) -> int | None:
     if score.falsified == 0:
         return None
     return 1 + sum(other.falsified > 0 and other.key < score.key for other in others)
+
+
+def is_tied(score: Score, others: Iterable[Score]) -> bool:
+    """Whether another score has the same rank."""
+    return any(other.falsified > 0 and other.key == score.key for other in others)
 
 
 @lru_cache(maxsize=4)
@@ -83,7 +100,11 @@ def read_published(path: Path | None = None) -> Published:
             {name: _scores(data[name], runs) for name in COLUMNS},
             {name: _scores(column, runs) for name, column in data.get("ablation", {}).items()},
             {name: _scores(column, runs) for name, column in data.get("llms", {}).items()},
-            {name: data[name].get("source", "") for name in COLUMNS},
+            {name: _scores(column, runs) for name, column in data.get("tools", {}).items()},
+            {
+                **{name: data[name].get("source", "") for name in COLUMNS},
+                **{name: column.get("source", "") for name, column in data.get("tools", {}).items()},
+            },
         )
     except (OSError, tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:
         raise SpecError(f"not a table of published results: {error!r}", file=str(file)) from None

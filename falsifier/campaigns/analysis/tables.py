@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from typing import Any
 
-from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, rank
+from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
 from falsifier.campaigns.plan import Method
@@ -80,14 +80,14 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
     for (requirement, method), members in group(runs).items():
         found = statistics(members)
         others = published.scores(requirement) if comparable(method) else {}
-        place = rank(score(found), others.values()) if others else None
+        competitors = published.competitors(requirement) if others else []
         rows.append(
             (
                 requirement,
                 method.label,
                 _rate(found),
                 *_numbers(found),
-                _place(place),
+                _place(score(found), competitors),
                 *(_cell(others.get(name)) for name in names),
             )
         )
@@ -148,8 +148,8 @@ _NUMBERS = (
 _LEGEND = (
     "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
     "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
-    "means per run. Rank: position among the published columns shown, by FR, then by mean S; ties share a "
-    "rank. Published cells: falsified runs / mean S."
+    "means per run. Rank: position among all published tools known for the requirement, by FR, then by "
+    "mean S; ties share a rank. Published cells: falsified runs / mean S."
 )
 
 
@@ -184,8 +184,11 @@ def _interval(interval: Interval | None, decimals: int) -> str:
     return NONE if interval is None else f"{interval[0]:.{decimals}f}..{interval[1]:.{decimals}f}"
 
 
-def _place(place: int | None) -> str:
-    return NONE if place is None else str(place)
+def _place(own: Score, competitors: Sequence[Score]) -> str:
+    place = rank(own, competitors) if competitors else None
+    if place is None:
+        return NONE
+    return f"{place} (tie)" if is_tied(own, competitors) else str(place)
 
 
 def _cell(cell: Score | None) -> str:
@@ -197,7 +200,9 @@ def _cell(cell: Score | None) -> str:
 
 def _sources(published: Published) -> tuple[str, ...]:
     return tuple(
-        f"Source of {COLUMNS[name]}: {source}." for name, source in published.sources.items() if source
+        f"Source of {COLUMNS.get(name, name)}: {source}."
+        for name, source in published.sources.items()
+        if source
     )
 
 

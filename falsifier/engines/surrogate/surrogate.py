@@ -204,11 +204,7 @@ class Surrogate:
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
-        gaps = [c.times[1] - c.times[0] for c in self.layout.codings if len(c.times) > 1]
-        why = f"inputs switch between their bounds every {dwell:.3g} s, a fraction of an inner window"
-        if not gaps or min(gaps) > dwell:
-            apart = f", {min(gaps):.3g} s apart" if gaps else ""
-            why = f"inputs take a random bound at each control point{apart}"
+        why = f"inputs take a random bound{_pace(self.layout, dwell)}"
         return Pending("switching", self.layout, switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
@@ -262,3 +258,18 @@ class Surrogate:
         point = self._region.ask(rng, partial(self.feasibility.excess, layout))
         why = f"direct search in a trust region of {layout.dimension} coordinates"
         return Pending("region", layout, point, why, region=self._region)
+
+
+def _pace(layout: Layout, dwell: float) -> str:
+    """Say how often switching inputs can change: control points may be further apart than the dwell time."""
+    paces: dict[str, list[str]] = {}
+    for r, coding in zip(layout.space.inputs, layout.codings, strict=True):
+        pace = f"every {dwell:.3g} s, a fraction of an inner window"
+        if len(coding.times) < 2:
+            pace = "for the whole simulation"
+        elif (gap := coding.times[1] - coding.times[0]) > dwell:
+            pace = f"at each control point, {gap:.3g} s apart"
+        paces.setdefault(pace, []).append(r.name)
+    if len(paces) == 1:
+        return f" {next(iter(paces))}"
+    return ": " + "; ".join(f"{' and '.join(names)} {pace}" for pace, names in paces.items())

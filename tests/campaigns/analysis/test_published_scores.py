@@ -1,9 +1,10 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from falsifier.campaigns.analysis import Score, read_published
-from falsifier.campaigns.analysis.published_scores import rank
+from falsifier.campaigns.analysis.published_scores import is_tied, rank
 from falsifier.errors import SpecError
 
 BEST, LLM = Score(10, 10, 1.3, "FReaK"), Score(10, 10, 2.3)
@@ -43,6 +44,21 @@ def test_the_published_ranks_follow_from_the_published_numbers() -> None:
         r for r, s in published.columns["llm_falsifier"].items() if rank(s, published.scores(r).values()) == 1
     ]
     assert len(first) == 14
+
+
+def test_every_published_tool_counts_once_and_ties_are_known() -> None:
+    published = read_published()
+    # LLM-Falsifier falsified CC4 in 5 of 10 runs: behind the best tool and behind FalCAuN, as published.
+    llm = published.columns["llm_falsifier"]["CC4"]
+    assert rank(llm, published.competitors("CC4")) == 3
+    assert rank(llm, published.scores("CC4").values()) == 2
+    assert len(published.competitors("AT1")) == 4
+    assert "FalCAuN" in published.sources
+    again = replace(published, tools={"FReaK": {"AT1": Score(10, 10, 4.8)}})
+    assert len(again.competitors("AT1")) == 3
+    assert is_tied(Score(10, 10, 1.34), [BEST, LLM])
+    assert not is_tied(Score(10, 10, 1.4), [BEST, LLM])
+    assert not is_tied(Score(0, 10, None), [Score(0, 10, None)])
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -120,10 +121,24 @@ def test_parallel_candidates_differ() -> None:
     ("points", "free", "why"),
     [
         (3, None, "inputs take a random bound at each control point, 5 s apart"),
-        (4, FREE, "inputs switch between their bounds every "),
+        (4, FREE, "inputs take a random bound every "),
+        (1, None, "inputs take a random bound for the whole simulation"),
     ],
 )
 def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | None, why: str) -> None:
     problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", points=points, free=free)
     engine = Surrogate(problem, seed=0, settings=HASTY)
     assert any(candidate.rationale.startswith(why) for candidate in engine.ask(4))
+
+
+def test_switching_inputs_with_different_control_points_say_so_for_each() -> None:
+    problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", inputs=3, points=3)
+    u, v, w = problem.space.inputs
+    space = replace(problem.space, inputs=(u, replace(v, control_points=101), w))
+    engine = Surrogate(replace(problem, space=space), seed=0, settings=HASTY)
+    why = next(c.rationale for c in engine.ask(4) if "random bound" in c.rationale)
+    assert re.fullmatch(
+        r"inputs take a random bound: u and w at each control point, 5 s apart; "
+        r"v every (0\.5|1) s, a fraction of an inner window",
+        why,
+    )
