@@ -22,6 +22,7 @@ from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
 from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.suites import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
@@ -170,6 +171,7 @@ def bench(
         calls=calls,
         suite=suite_name,
     )
+    check_request(request, executor=executor)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
     with campaign_display(quiet=quiet) as show:

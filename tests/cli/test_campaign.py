@@ -191,3 +191,9 @@ def test_a_campaign_as_a_user_starts_it(tmp_path: Path) -> None:
     again = falsifier("bench", HARD, "--engine", "corners", "--out", "c", cwd=tmp_path)
     assert again.code == 2
     assert "falsifier resume c" in again.err
+
+
+def test_a_wrong_engine_is_told_before_a_campaign_is_announced(tmp_path: Path) -> None:
+    done = falsifier("bench", "AT1", "--engine", "corner", "--runs", "1", cwd=tmp_path)
+    assert (done.code, done.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert done.err.startswith("falsifier: unknown engine 'corner'; did you mean 'corners'")
