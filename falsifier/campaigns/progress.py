@@ -113,7 +113,7 @@ class _Followed:
             requirement=self.request.problems[0].name,
             method=method_of(self.request),
             seed=self.request.seed,
-            status=tally.status,
+            status="running" if tally.is_incomplete else tally.status,
             reason=tally.reason,
             best=tally.best_robustness,
             spent=tally.spent,

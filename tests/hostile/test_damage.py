@@ -206,6 +206,24 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
 
 
+def test_a_dropped_evaluation_of_a_finished_run_is_repeated_by_its_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work_in_threads(monkeypatch)
+    run_campaign(request("hard", seeds=1, budget=40), tmp_path)
+    (run,) = (tmp_path / "runs").iterdir()
+    wanted = outcomes(tmp_path)
+    assert wanted[0][1] == "falsified"
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    first = next(i for i, line in enumerate(lines) if b'"kind":"evaluated"' in line)
+    lines[first] = flip(lines[first][60:-2], Random(1)).join([lines[first][:60], lines[first][-2:]])
+    (run / "journal.jsonl").write_bytes(b"".join(lines))
+    repair(run)
+    assert outcomes(tmp_path) != wanted
+    resume_campaign(tmp_path)
+    assert outcomes(tmp_path) == wanted
+
+
 def test_a_damaged_campaign_file_gives_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     work_in_threads(monkeypatch)
     run_campaign(request("impossible", seeds=1, budget=2), tmp_path)
