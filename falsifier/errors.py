@@ -98,6 +98,12 @@ class SimulationError(FalsifierError):
         return _simulation_error, (str(self), self.status, self.time, self.log)
 
 
+class MachineError(FalsifierError):
+    """The machine does not grant what is needed."""
+
+    exit_code = 3
+
+
 class MonitorError(FalsifierError):
     """A trajectory cannot be evaluated: NaN, unequal lengths, missing signal, too short for the formula."""
 

@@ -110,6 +110,8 @@ def run_directories(directory: Path) -> list[Path]:
     below = sorted(path for path in directory.glob("*") if holds_run(path))
     if below:
         return below
+    if not directory.exists():
+        raise JournalError(f"{directory}: no such directory")
     raise JournalError(
         f"{directory}: not a run or campaign directory: it contains neither {CAMPAIGN} nor a run's manifest"
     )

@@ -127,7 +127,7 @@ class _Followed:
             requirement=self.requirement or self.request.problems[0].name,
             method=self.method,
             seed=self.request.seed,
-            status=tally.status,
+            status="running" if tally.is_incomplete else tally.status,
             reason=tally.reason,
             best=tally.best_robustness,
             spent=tally.spent,

@@ -18,6 +18,7 @@ from falsifier.cli.streams import (
     settle_streams,
     stop_at_interrupts,
 )
+from falsifier.core.memory import check_memory_limits
 from falsifier.errors import FalsifierError, did_you_mean
 from falsifier.views.terminal import warn
 
@@ -118,6 +119,7 @@ def main() -> NoReturn:
 def _carried_out(arguments: list[str]) -> int:
     """Carry out a command; return its exit code."""
     try:
+        check_memory_limits()
         # Not cli.main: it ends with exit code 1, which means falsified, if a pipe is closed.
         with cli.make_context("falsifier", arguments) as context:
             cli.invoke(context)

@@ -156,6 +156,10 @@ def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Descr
     version = root.get("fmiVersion", "")
     if version[:1] not in ("1", "2", "3"):
         raise ModelError(f"{name}: fmiVersion is {version!r}; export it as FMI 1.0, 2.0 or 3.0")
+    for element in root.iter():
+        text = element.get("description", "")
+        if len(text) > _LONGEST_NAME:
+            element.set("description", f"{text[:_LONGEST_NAME]} ...")
     try:
         return _parse(root, version, platforms)
     except (KeyError, ValueError, IndexError) as error:
@@ -167,6 +171,8 @@ def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Descr
 def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Description:
     major = int(version[0])
     identifiers, needs_tool = _interfaces(root, major)
+    for name in (root.attrib["modelName"], *identifiers.values(), root.get("generationTool", "")):
+        _check_length(name)
     arrays: dict[int, tuple[float, ...]] = {}
     variables: list[Variable] = []
     slots: dict[str, Slot] = {}
@@ -206,9 +212,13 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
     )
 
 
+def _check_length(name: str) -> None:
+    if len(name) > _LONGEST_NAME:
+        raise ValueError(f"the name {name[:40]!r}... has more than {_LONGEST_NAME} characters")
+
+
 def _check_variable(variable: Variable, slot: Slot, known: Mapping[str, Slot]) -> None:
-    if len(variable.name) > _LONGEST_NAME:
-        raise ValueError(f"the name {variable.name[:40]!r}... has more than {_LONGEST_NAME} characters")
+    _check_length(variable.name)
     if variable.name in known:
         raise ValueError(f"two variables are named {variable.name!r}")
     if not 0 <= slot.reference <= _LARGEST_REFERENCE:

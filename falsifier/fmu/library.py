@@ -24,7 +24,9 @@ LogSink = Callable[[str], None]
 
 def status_name(status: int) -> str:
     """Return the name of an FMI status."""
-    return _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {status}"
+    return (
+        _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {ctypes.c_int(status).value}"
+    )
 
 
 def load_binding() -> None:
@@ -91,7 +93,8 @@ class Library:
             raise ModelError(
                 f"{self.description.info.name}: the library does not export {self._symbol(name)}"
             )
-        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *argument_types)
+        # Unsigned, so that negative statuses, which FMI does not define, are larger than all others.
+        prototype = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p, *argument_types)
         return prototype(address)
 
     def getters(self) -> dict[str, int]:

@@ -20,6 +20,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.memory import check_memory_limits
 from falsifier.errors import ModelError
 from falsifier.fmu import folders, nursery, posix
 from falsifier.fmu.buffers import Room
@@ -55,6 +56,7 @@ class Nursery:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        check_memory_limits()
         protect_secrets(os.environ)
         folders.sweep()
         self._folder = folders.WorkFolder()

@@ -109,6 +109,10 @@ class Stepper(ABC):
             what = "the FMU terminated the simulation"
         elif where == loops.STUCK:
             what = "the FMU makes no progress: its events never end"
+        elif where == loops.TOO_SMALL:
+            what = (
+                "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast"
+            )
         else:
             doing = {
                 loops.SETTING: "setting the inputs",

@@ -20,7 +20,7 @@ from numba.extending import intrinsic
 from falsifier.stl.numba_compilation import compiled as keep_compiled
 
 # Where a loop stopped, in `report[WHERE]`; DONE: nowhere before its end.
-DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
+DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL = range(8)
 STATUS, WHERE, STEP = range(3)
 
 # Rows of the table of function addresses of a co-simulation FMU.
@@ -41,7 +41,10 @@ _NUMBA = {"p": types.intp, "n": types.intp, "d": types.float64, "i": types.int32
 
 
 def call_signature(arguments: str) -> Any:
-    """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char."""
+    """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char.
+
+    The status is unsigned: a negative one, which FMI does not define, is larger than all others.
+    """
 
     def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_LLVM[a] for a in arguments])
@@ -52,7 +55,7 @@ def call_signature(arguments: str) -> Any:
         ]
         return builder.call(function, passed)
 
-    return types.int32(types.intp, *(_NUMBA[a] for a in arguments)), emit
+    return types.uint32(types.intp, *(_NUMBA[a] for a in arguments)), emit
 
 
 def _load(kind: Any, stored: ir.Type) -> Any:

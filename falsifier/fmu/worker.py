@@ -37,6 +37,7 @@ PREPARE, RUN = 1, 2
 _MAX_TEST_SECONDS = 1.0
 # Some tools' runtimes run out of thread keys after about 1000 instances in one process.
 _MAX_INSTANCES = 400
+_NO_MEMORY = "not enough memory for the FMU and what surrounds it"
 # Growth in memory after which a worker that leaks is replaced.
 _MAX_GROWTH_KIB = 256 << 10
 
@@ -90,6 +91,8 @@ class _Worker:
             return Reply("failed", str(error))
         except FalsifierError as error:
             return Reply("unusable", str(error))
+        except MemoryError:
+            return Reply("unusable", _NO_MEMORY)
         return Reply()
 
     def _load(self) -> Session:
@@ -115,6 +118,8 @@ class _Worker:
             return Reply("timeout" if error.status == "timeout" else "failed", str(error), at)
         except FalsifierError as error:
             return Reply("unusable", str(error))
+        except MemoryError:
+            return Reply("failed", _NO_MEMORY)
         if self._reuse is None and time.perf_counter() - started > _MAX_TEST_SECONDS:
             self._reuse = "process" if "instance" in self._order.untrusted else "instance"
         return Reply(more=self._reuse is None, leaving=self._reuse is not None and self._is_spent())

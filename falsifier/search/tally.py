@@ -57,6 +57,7 @@ class Tally:
         self._failures = 0
         self._robustness: list[float] = []
         self._missing: set[int] = set()
+        self._has_ended = False
         self._latest: VerdictRecord | None = None
 
     @property
@@ -79,6 +80,11 @@ class Tally:
         """Smallest robustness so far."""
         return None if self.best is None else self._robustness[self.best]
 
+    @property
+    def is_incomplete(self) -> bool:
+        """Whether a repair has dropped evaluations that are still to be carried out again."""
+        return bool(self._missing) and not self._has_ended
+
     def begin(self) -> None:
         """Set the status to running even if the first record was skipped by the reader."""
         if self.status == "waiting":
@@ -86,6 +92,7 @@ class Tally:
 
     def add(self, record: Record) -> None:
         """Update the numbers with one record."""
+        self._has_ended = isinstance(record, EndedRecord)
         if self.counterexample is not None and not self._is_missing(record):
             return
         if self.counterexample is None:

@@ -18,8 +18,8 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--effort", "low"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),
         (["run", "gone.fmu", "--stl", "G (x >= 0)"], "gone.fmu: no such file"),
-        (["run", "gone.fmu"], "--stl"),
-        (["resume", "nowhere"], "not a run directory"),
+        (["run", "gone.fmu"], "gone.fmu: no such file"),
+        (["resume", "nowhere"], "nowhere: no such directory"),
         (["info", "gone.fmu"], "gone.fmu: no such file"),
         (["rn", "AT1"], "did you mean 'run'"),
         (

@@ -25,53 +25,8 @@ from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
+from tests.hostile.damage import DAMAGES, blank, cut, double_line, flip, lose_line
 from tests.problems import hard, impossible
-
-Damage = Callable[[bytes, Random], bytes]
-
-
-def flip(content: bytes, random: Random) -> bytes:
-    """Flip one bit."""
-    changed = bytearray(content)
-    changed[random.randrange(len(changed))] ^= 1 << random.randrange(8)
-    return bytes(changed)
-
-
-def cut(content: bytes, random: Random) -> bytes:
-    """Lose the end."""
-    return content[: random.randrange(len(content))]
-
-
-def lose_line(content: bytes, random: Random) -> bytes:
-    """Lose a line."""
-    lines = content.splitlines(keepends=True)
-    del lines[random.randrange(len(lines))]
-    return b"".join(lines)
-
-
-def double_line(content: bytes, random: Random) -> bytes:
-    """Repeat a line somewhere."""
-    lines = content.splitlines(keepends=True)
-    lines.insert(random.randrange(len(lines) + 1), random.choice(lines))
-    return b"".join(lines)
-
-
-def swap_lines(content: bytes, random: Random) -> bytes:
-    """Swap two lines."""
-    lines = content.splitlines(keepends=True)
-    i, j = random.randrange(len(lines)), random.randrange(len(lines))
-    lines[i], lines[j] = lines[j], lines[i]
-    return b"".join(lines)
-
-
-def blank(content: bytes, random: Random) -> bytes:
-    """Fill a block with zeros, as a file system may after a power failure."""
-    start = random.randrange(len(content))
-    end = min(len(content), start + random.randrange(1, 200))
-    return content[:start] + bytes(end - start) + content[end:]
-
-
-DAMAGES: tuple[Damage, ...] = (flip, flip, flip, cut, lose_line, double_line, swap_lines, blank)
 
 
 def answer(asked: ChatRequest) -> str:
@@ -249,6 +204,24 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         assert done.exit_code == 0, done.output
         resume_campaign(tmp_path / "c")
         assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
+
+
+def test_a_dropped_evaluation_of_a_finished_run_is_repeated_by_its_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work_in_threads(monkeypatch)
+    run_campaign(request("hard", seeds=1, budget=40), tmp_path)
+    (run,) = (tmp_path / "runs").iterdir()
+    wanted = outcomes(tmp_path)
+    assert wanted[0][1] == "falsified"
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    first = next(i for i, line in enumerate(lines) if b'"kind":"evaluated"' in line)
+    lines[first] = flip(lines[first][60:-2], Random(1)).join([lines[first][:60], lines[first][-2:]])
+    (run / "journal.jsonl").write_bytes(b"".join(lines))
+    repair(run)
+    assert outcomes(tmp_path) != wanted
+    resume_campaign(tmp_path)
+    assert outcomes(tmp_path) == wanted
 
 
 def test_a_damaged_campaign_file_gives_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

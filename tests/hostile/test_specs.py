@@ -162,6 +162,8 @@ def described(text: str) -> Description:
         (FMI2.format(scalar(reference="-1")), "does not fit 32 bits"),
         (FMI2.format(scalar(reference="9" * 5000)), "does not follow FMI 2.0"),
         (FMI2.format(scalar(name="x" * 20_000_000)), "more than 10000 characters"),
+        (FMI2.replace('Name="m"', f'Name="{"m" * 20_000_000}"').format(""), "more than 10000 characters"),
+        (FMI2.replace('ier="m"', f'ier="{"m" * 20_000_000}"').format(""), "more than 10000 characters"),
         (FMI2.format(scalar(typed='<Real min="low"/>')), "could not convert"),
         (
             FMI3.format('<Float64 name="x" valueReference="1"><Dimension start="4000000000"/></Float64>'),
@@ -172,12 +174,29 @@ def described(text: str) -> Description:
             "-3 elements",
         ),
     ],
-    ids=range(9),
+    ids=range(11),
 )
 def test_descriptions_that_no_model_has_are_refused(text: str, message: str) -> None:
     with pytest.raises(ModelError, match=message) as error:
         described(text)
     assert clear(error).startswith("m.fmu: ")
+
+
+def test_texts_without_end_are_cut() -> None:
+    info = described(FMI2.replace(" guid", f' description="{"d" * 1_000_000}" guid').format("")).info
+    assert len(info.description) < 11_000
+
+
+def test_descriptions_of_any_size_are_refused_before_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("falsifier.fmu.archive._MAX_TEXT_BYTES", 2 << 20)
+    path = tmp_path / "a.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", b"<" * (3 << 20))
+    with pytest.raises(ModelError, match="has 3 MiB, more than 2") as error:
+        read_description(path)
+    clear(error)
 
 
 @pytest.mark.parametrize("limit", ["nan", "NaN", "inf", "-INF"])

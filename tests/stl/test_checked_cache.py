@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from tests.hostile.test_damage import DAMAGES
+from tests.hostile.damage import DAMAGES
 
 CODE = """
 from falsifier.stl.numba_compilation import compiled
