@@ -19,7 +19,7 @@ class Requirement:
         description: its meaning in words.
 
     Raises:
-        SpecError: if the name is empty, or the formula is not parsed.
+        SpecError: if the name is no text, or the formula is not parsed.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Requirement:
     description: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
+        if not isinstance(self.name, str):
             raise SpecError(f"requirement: expected a name, got {self.name!r}")
         if not isinstance(self.formula, Formula):
             raise SpecError(f"requirement {self.name!r}: expected a formula; use parse({self.formula!r})")

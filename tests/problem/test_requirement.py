@@ -32,6 +32,6 @@ def test_what_cannot_be_judged_names_file_key_and_place(text: str, named: str) -
 
 def test_a_requirement_has_a_name_and_a_parsed_formula() -> None:
     with pytest.raises(SpecError, match="expected a name"):
-        Requirement("", parse("G (x < 1)"))
+        Requirement(None, parse("G (x < 1)"))  # type: ignore[arg-type]
     with pytest.raises(SpecError, match=r"requirement 'low': expected a formula; use parse\('G \(x < 1\)'\)"):
         Requirement("low", "G (x < 1)")  # type: ignore[arg-type]

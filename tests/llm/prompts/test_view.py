@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
@@ -27,4 +29,6 @@ def test_units_descriptions_and_types_by_name() -> None:
 
 
 def test_the_formulas_outputs_are_its_signals_that_are_not_searched() -> None:
-    assert View.of(lag_problem("G[0,10] (u + x <= 3 and v >= x)")).formula_outputs == ("x", "v")
+    problem = lag_problem("G[0,10] (u + x <= 3 and v >= x)", inputs=2)
+    partly = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
+    assert View.of(partly).formula_outputs == ("x", "v")
