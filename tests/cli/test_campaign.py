@@ -59,6 +59,7 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
         seen.append(request)
         raise SpecError("seen")
 
+    monkeypatch.setattr("falsifier.cli.campaign.check_request", lambda *_, **__: None)
     monkeypatch.setattr("falsifier.cli.campaign.run_campaign", record)
     command(
         *(
@@ -96,6 +97,7 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
         seen.append(request)
         raise SpecError("seen")
 
+    monkeypatch.setattr("falsifier.cli.campaign.check_request", lambda *_, **__: None)
     monkeypatch.setattr("falsifier.cli.campaign.run_campaign", record)
     command("bench", "--suite", "arch-comp", "--engine", "uniform")
     command("bench", "--suite", "arch-comp", "--instance", "2", "--engine", "uniform")
