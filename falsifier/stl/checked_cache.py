@@ -1,4 +1,4 @@
-"""Numba's cache files with a checksum: damaged machine code is compiled again instead of run."""
+"""Numba's cache files, checked: machine code that is damaged or older than its sources is compiled again."""
 
 import pickle
 from contextlib import suppress
@@ -37,11 +37,33 @@ class _CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
         return super()._load_data(name)
 
 
+# Sources of the compiled functions of each module, with those of the compiled functions that it imports.
+_SOURCES: dict[str, frozenset[str]] = {}
+
+
 def check_cache(function: Any) -> None:
-    """Let a compiled function's cache notice damage."""
-    file = getattr(getattr(function, "_cache", None), "_cache_file", None)
+    """Let a compiled function's cache notice damage, and changes in what the function calls.
+
+    Numba looks at the function's own file, but the machine code contains functions and constants of others.
+    """
+    file: Any = getattr(getattr(function, "_cache", None), "_cache_file", None)
+    sources = _sources(function.py_func)
     if type(file) is IndexDataCacheFile:
         file.__class__ = _CheckedFile
+        file._source_stamp = (file._source_stamp, *sorted(_stamp(Path(source)) for source in sources))
+
+
+def _sources(function: Any) -> frozenset[str]:
+    """Return the files of a function's module and of the modules with compiled functions that it imports."""
+    used = {getattr(value, "__module__", None) for value in function.__globals__.values()}
+    imported = (_SOURCES[module] for module in used - {function.__module__} if module in _SOURCES)
+    _SOURCES[function.__module__] = frozenset({function.__code__.co_filename}).union(*imported)
+    return _SOURCES[function.__module__]
+
+
+def _stamp(source: Path) -> tuple[str, float, int]:
+    found = source.stat()
+    return source.name, found.st_mtime, found.st_size
 
 
 def _check(content: bytes) -> None:

@@ -1,12 +1,16 @@
-"""The cache of machine code after damage, and on a full disk."""
+"""The cache of machine code after damage, after changes, and on a full disk."""
 
 import importlib.util
+import os
+import subprocess
+import sys
 from pathlib import Path
 from random import Random
 from types import ModuleType
 
 import pytest
 
+from tests.command import ROOT
 from tests.hostile.damage import DAMAGES
 
 CODE = """
@@ -40,6 +44,26 @@ def test_damaged_machine_code_is_compiled_again(tmp_path: Path) -> None:
         assert imported(path).doubled(4.0) == 8.0
     again = imported(path).doubled
     assert again(4.0) == 8.0 and sum(again.stats.cache_hits.values()) == 1
+
+
+def test_a_change_in_what_a_function_calls_makes_it_be_compiled_again(tmp_path: Path) -> None:
+    (tmp_path / "callee.py").write_text(CODE)
+    (tmp_path / "caller.py").write_text(
+        "from callee import doubled\nfrom falsifier.stl.numba_compilation import compiled\n\n"
+        "@compiled\ndef called(x):\n    return doubled(x) + 1.0\n"
+    )
+    program = (
+        "import caller; called = caller.called; print(called(4.0), sum(called.stats.cache_hits.values()))"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+
+    def printed() -> str:
+        command = [sys.executable, "-c", program]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+
+    assert [printed(), printed()] == ["9.0 0\n", "9.0 1\n"]
+    (tmp_path / "callee.py").write_text(CODE.replace("2.0 * x", "2.0 * x + 0.5"))
+    assert printed() == "9.5 0\n"
 
 
 def test_a_cache_that_cannot_be_written_is_no_failure(
