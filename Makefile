@@ -21,7 +21,7 @@ types: .venv/test
 	$(BIN)/mypy
 
 pytest: .venv/test .venv-export/installed
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist worksteal
 
 docs: .venv/test
 	$(BIN)/mkdocs build --strict

@@ -65,7 +65,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
     try:
         content = tomllib.loads(file_path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError):
+    # Also not UTF-8, integers of any length, nested without end, unreadable.
+    except (ValueError, RecursionError, OSError):
         return None
     if not {"model", "requirements"} <= content.keys():
         return None
@@ -77,32 +78,38 @@ class SpecFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield one item per requirement."""
+        from falsifier.core.literals import one_line
         from falsifier.errors import SpecError
         from falsifier.problem.spec import read_spec
 
         try:
             spec = read_spec(self.path)
         except SpecError as error:
-            raise self.CollectError(str(error)) from None
+            raise self.CollectError(one_line(str(error))) from None
         for name in spec.requirements:
-            item = RequirementItem.from_parent(self, name=name)
+            item = RequirementItem.from_parent(self, name=one_line(name), requirement=name)
             item.add_marker(pytest.mark.falsifier)
             yield item
 
 
 class RequirementItem(pytest.Item):
-    """One requirement."""
+    """One requirement; its name is shown without what a terminal would act on."""
+
+    def __init__(self, *, requirement: str, **given: Any) -> None:
+        super().__init__(**given)
+        self._requirement = requirement
 
     def runtest(self) -> None:
         """Check the requirement with the options of the command line."""
-        _check(self, f"{self.path}:{self.name}", {})
+        _check(self, f"{self.path}:{self._requirement}", {})
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """Show only the message of an expected failure, without a traceback through the plugin."""
+        from falsifier.core.printable import printable
         from falsifier.errors import FalsifierError
 
-        if isinstance(excinfo.value, FalsifiedError | FalsifierError):
-            return str(excinfo.value)
+        if isinstance(excinfo.value, FalsifiedError | FalsifierError | OSError | MemoryError):
+            return printable(str(excinfo.value)) or "not enough memory"
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
@@ -169,6 +176,7 @@ def _setting(config: pytest.Config, name: str) -> Any:
 
 def _message(item: pytest.Item, checked: "Checked") -> str:
     """The counterexample, its picture, the command that replays it, and the explanation."""
+    from falsifier.core.files import file_name
     from falsifier.core.words import candidate_lines
     from falsifier.counterexamples.explain import explain
     from falsifier.views.plotting import plot_evaluation, save_figure
@@ -176,7 +184,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     problem, found = checked.problem, checked.counterexample
     assert found is not None
     pictures = item.config.cache.mkdir("falsifier") if item.config.cache else item.config.rootpath
-    picture = pictures / f"{problem.name}.png"
+    picture = pictures / f"{file_name(problem.name)}.png"
     save_figure(plot_evaluation(problem, found.evaluation), picture)
     how = "stored counterexample" if checked.result is None else "counterexample found by a search"
     lines = [

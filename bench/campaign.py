@@ -3,7 +3,6 @@
 Usage: python bench/campaign.py; prints the table. Committed result: bench/campaign.md.
 """
 
-import json
 import platform
 import shutil
 import tempfile
@@ -23,10 +22,18 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import open_journal, write_manifest
+from falsifier.search.journal import open_journal, read_journal, save_trajectory, write_manifest
 from falsifier.search.loop import Live, search
 from falsifier.search.manifest import describe, environment
-from falsifier.search.records import ConfirmedRecord, EndedRecord, EvaluatedRecord, VerdictRecord
+from falsifier.search.records import (
+    AskedRecord,
+    ConfirmedRecord,
+    EndedRecord,
+    EvaluatedRecord,
+    Record,
+    VerdictRecord,
+    line_of,
+)
 from falsifier.search.request import RunRequest
 from falsifier.search.run import falsify
 from falsifier.views.report import html_report
@@ -120,12 +127,10 @@ def long_journal(run: Path, place: Path) -> tuple[float, int]:
     """Return the time in s to load a journal that repeats a run's lines, and its number of simulations."""
     place.mkdir()
     shutil.copy(run / "manifest.json", place)
-    pairs = [
-        line for line in (run / "journal.jsonl").read_text().splitlines() if '"kind":"ended"' not in line
-    ]
-    with (place / "journal.jsonl").open("w") as file:
+    pairs = [record for record in read_journal(run) if record.kind != "ended"]
+    with (place / "journal.jsonl").open("wb") as file:
         for i in range(2 * LONG_JOURNAL):
-            file.write(pairs[i % len(pairs)] + "\n")
+            file.write(line_of(pairs[i % len(pairs)], i + 1))
     started = perf_counter()
     count = len(load_run(place).robustness)
     return perf_counter() - started, count
@@ -160,20 +165,22 @@ def make_run(request: RunRequest, place: Path) -> None:
     evaluation = evaluate(problem, candidate)
     assert evaluation.trajectory is not None
     assert evaluation.verdict is not None
-    evaluation.trajectory.save(place / "trajectories" / f"{BUDGET - 1}.npz")
+    trajectory = save_trajectory(place, BUDGET - 1, evaluation.trajectory)
     verdict = VerdictRecord.of(evaluation.verdict)
     assert verdict is not None
-    asked = json.dumps(candidate.to_json())
-    with (place / "journal.jsonl").open("w") as file:
-        for i in range(BUDGET):
-            file.write(f'{{"kind":"asked","first":{i},"n":1,"candidates":[{asked}],"seconds":0.0001,')
-            file.write(f'"requirement":"{problem.name}"}}\n')
-            falling = verdict.model_copy(update={"robustness": float(BUDGET - i) if i < BUDGET - 1 else -1.0})
-            record = EvaluatedRecord(index=i, status="ok", verdicts={problem.name: falling}, seconds=0.01)
-            if i == BUDGET - 1:
-                record = record.model_copy(update={"trajectory": f"trajectories/{i}.npz"})
-            file.write(record.model_dump_json() + "\n")
-        confirmed = ConfirmedRecord(
+    records: list[Record] = []
+    for i in range(BUDGET):
+        records.append(
+            AskedRecord(
+                first=i, n=1, candidates=[candidate.to_json()], seconds=0.0001, requirement=problem.name
+            )
+        )
+        falling = verdict.model_copy(update={"robustness": float(BUDGET - i) if i < BUDGET - 1 else -1.0})
+        last = trajectory if i == BUDGET - 1 else None
+        judged = {problem.name: falling}
+        records.append(EvaluatedRecord(index=i, status="ok", verdicts=judged, seconds=0.01, trajectory=last))
+    records.append(
+        ConfirmedRecord(
             index=BUDGET - 1,
             requirement=problem.name,
             outcome="confirmed",
@@ -182,10 +189,10 @@ def make_run(request: RunRequest, place: Path) -> None:
             reason="written by a benchmark",
             spent={"simulations": BUDGET},
         )
-        file.write(confirmed.model_dump_json() + "\n")
-        file.write(
-            EndedRecord(status="falsified", reason="", spent={"simulations": BUDGET}).model_dump_json() + "\n"
-        )
+    )
+    records.append(EndedRecord(status="falsified", reason="", spent={"simulations": BUDGET}))
+    lines = (line_of(record, number) for number, record in enumerate(records, 1))
+    (place / "journal.jsonl").write_bytes(b"".join(lines))
 
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ def installed(module: str) -> bool:
 
 
 def _rtamt() -> Any:
-    from falsifier.stl.reference import _rtamt as imported
+    from falsifier.stl.second_monitor import _rtamt as imported
 
     return imported()
 

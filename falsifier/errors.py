@@ -13,14 +13,36 @@ from typing import Literal
 _SHOWN_INPUT = 60
 # Maximum number of known names in a message: all bundled requirements fit.
 _LISTED = 40
+# Maximum number of characters of a message; names and values in it come from files of any size.
+_LONGEST_MESSAGE = 2000
+# Maximum number of characters of a name that is compared with known names, or listed.
+_LONGEST_NAME = 100
+
+# What pydantic says, by its beginning, and how we say it; {} is what follows "Input should be".
+_VALIDATORS = (
+    ("Input should be a valid number", "expected a number"),
+    ("Input should be a valid integer", "expected a whole number"),
+    ("Input should be a valid string", "expected text"),
+    ("Input should be a valid boolean", "expected true or false"),
+    ("Input should be a valid list", "expected a list"),
+    ("Input should be a valid tuple", "expected a list"),
+    ("Input should be a valid dictionary", "expected a table of keys and values"),
+    ("Input should be an object", "expected a table of keys and values"),
+    ("Input should be greater than or equal to", "expected a number {}"),
+    ("Input should be greater than", "expected a number {}"),
+    ("Input should be less than", "expected a number {}"),
+)
 
 FailureStatus = Literal["failed", "crashed", "timeout"]
 
 
 class FalsifierError(Exception):
-    """Base of all errors that the package raises on purpose."""
+    """Base of all errors that the package raises on purpose; messages that are too long lose their middle."""
 
     exit_code = 2
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_shortened(message, _LONGEST_MESSAGE))
 
 
 class SpecError(FalsifierError):
@@ -76,6 +98,12 @@ class SimulationError(FalsifierError):
         return _simulation_error, (str(self), self.status, self.time, self.log)
 
 
+class MachineError(FalsifierError):
+    """The machine does not grant what is needed."""
+
+    exit_code = 3
+
+
 class MonitorError(FalsifierError):
     """A trajectory cannot be evaluated: NaN, unequal lengths, missing signal, too short for the formula."""
 
@@ -104,22 +132,34 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     >>> did_you_mean("sped", ["rpm", "speed"])
     "did you mean 'speed'? Known: rpm, speed"
     """
-    names = list(dict.fromkeys(known))
+    name = name[:_LONGEST_NAME]
+    names = list(dict.fromkeys(_shortened(other, _LONGEST_NAME) for other in known))
     shown = [*names[:_LISTED], *(["..."] if len(names) > _LISTED else [])]
     listing = f"Known: {', '.join(shown) or 'none'}"
+    # Also names that differ in the case of letters only.
+    folded = {other.casefold(): other for other in reversed(names)}
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"did you mean {near[0]!r}? {listing}" if near else listing
+    near = near or [folded[n] for n in difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)]
+    found = folded.get(name.casefold()) or next(iter(near), None)
+    return f"did you mean {found!r}? {listing}" if found else listing
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - most // 4]} ... {text[-most // 4 :]}"
 
 
 def rejected(message: str, given: object) -> str:
-    """Return a validator's message, with the rejected value added if it states only what was expected.
+    """Return a validator's message in our words, with the rejected value if it states only what was expected.
 
     >>> rejected("Input should be 'free' or 'fixed'", "fixd")
-    "Input should be 'free' or 'fixed', got 'fixd'"
+    "expected 'free' or 'fixed', got 'fixd'"
     """
     message = message.removeprefix("Value error, ")
     if not message.startswith("Input should"):
         return message
+    message = next((own for begin, own in _VALIDATORS if message.startswith(begin)), "expected {}").format(
+        message.partition(" be ")[2] or message
+    )
     text = repr(given)
     return f"{message}, got {text if len(text) <= _SHOWN_INPUT else f'{text[:_SHOWN_INPUT]} ...'}"
 

@@ -5,10 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
+from tests.forking import forker
 from tests.patience import HANG
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -33,16 +36,39 @@ class Done:
         return loaded
 
 
-def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None) -> Done:
-    """Run ``falsifier`` with these arguments in a folder, without keys in the environment."""
+def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None, fresh: bool = False) -> Done:
+    """Run ``falsifier`` with these arguments in a folder, without keys in the environment.
+
+    Args:
+        arguments: the command line after the program's name.
+        cwd: the folder.
+        env: variables beyond those of the tests.
+        fresh: start a new interpreter, for tests of what is imported or what variables do to the interpreter.
+    """
     clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
+    environment = clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "160"} | (env or {})
+    if not fresh and forker().lock.acquire(blocking=False):
+        try:
+            return _forked(arguments, cwd, environment)
+        finally:
+            forker().lock.release()
     done = subprocess.run(
         [sys.executable, "-c", "from falsifier.cli import main; main()", *arguments],
         cwd=cwd,
-        env=clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "160"} | (env or {}),
+        env=environment,
         capture_output=True,
         text=True,
         timeout=HANG,
         check=False,
     )
     return Done(done.returncode, done.stdout, done.stderr)
+
+
+def _forked(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Done:
+    with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open() as nothing:
+        code = forker().run(arguments, folder, environment, nothing, out, err)
+        texts = []
+        for stream in (out, err):
+            stream.seek(0)
+            texts.append(stream.read().decode())
+    return Done(code, *texts)

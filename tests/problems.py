@@ -42,6 +42,16 @@ def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
     return {"x": x}
 
 
+def mostly_broken(
+    times: Array, inputs: dict[str, Array], parameters: dict[str, float]
+) -> Mapping[str, Array]:
+    """Give NaN unless the input ends in the lowest fifth of its range."""
+    x = lag(times, inputs, parameters)["x"].copy()
+    if inputs["u"][-1] > -0.6:
+        x[5] = np.nan
+    return {"x": x}
+
+
 def never(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Fail always."""
     raise RuntimeError("out of order")

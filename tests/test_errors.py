@@ -33,6 +33,8 @@ def test_known_names_are_listed_with_the_nearest_first() -> None:
     assert "did you mean" not in far
     assert "rpm, speed" in far
     assert "none" in did_you_mean("x", [])
+    assert "did you mean 'AT1'?" in did_you_mean("at1", ["CC", "AT", "AT1", "AT2"])
+    assert "did you mean 'Throttle'?" in did_you_mean("THROTLE", ["brake", "Throttle"])
     many = did_you_mean("name7", [f"name{i}" for i in range(100)])
     assert "'name7'" in many
     assert "name39" in many and "name40" not in many
@@ -42,8 +44,24 @@ def test_known_names_are_listed_with_the_nearest_first() -> None:
     ("message", "given", "text"),
     [
         ("Value error, low < high", [1, 0], "low < high"),
-        ("Input should be 1 or 2", 3, "Input should be 1 or 2, got 3"),
+        ("Input should be 1 or 2", 3, "expected 1 or 2, got 3"),
         ("Field required", None, "Field required"),
+        ("Input should be greater than 0", -5.0, "expected a number greater than 0, got -5.0"),
+        (
+            "Input should be greater than or equal to 1",
+            0,
+            "expected a number greater than or equal to 1, got 0",
+        ),
+        (
+            "Input should be a valid number, unable to parse string as a number",
+            "x",
+            "expected a number, got 'x'",
+        ),
+        (
+            "Input should be a valid integer, got a number with a fractional part",
+            2.5,
+            "expected a whole number, got 2.5",
+        ),
     ],
 )
 def test_a_rejected_value_is_shown_where_only_the_expected_one_is_told(

@@ -146,3 +146,33 @@ def test_importing_the_plugin_loads_nothing_else() -> None:
         check=True,
     )
     assert done.stdout.split() == ["pytest_falsifier"]
+
+
+HOSTILE = """
+[model]
+fmu = "../fmus/Misdeeds_2.fmu"
+stop_time = 1.0
+output_interval = 0.1
+[parameters.misdeed]
+range = [1, 3]
+[requirements."../../\\u001b[31mred\\nline"]
+formula = "y >= -1"
+"""
+
+
+def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None:
+    for name in ("fmus", "specs"):
+        (tmp_path / name).mkdir()
+    shutil.copy(ROOT / "tests" / "fixtures" / "fmus" / "Misdeeds_2.fmu", tmp_path / "fmus")
+    (tmp_path / "specs" / "hostile.toml").write_text(HOSTILE)
+    (tmp_path / "specs" / "deep.toml").write_text(f"a = {'[' * 100_000}{']' * 100_000}")
+    (tmp_path / "specs" / "long.toml").write_text(f"a = {'9' * 5000}")
+    (tmp_path / "specs" / "bytes.toml").write_bytes(b"\xff\xfe[model]")
+    (tmp_path / "specs" / "gone.toml").symlink_to("/nonexistent")
+    done = run_pytest(
+        tmp_path, "--falsifier", "--falsifier-budget", "1", "--falsifier-engine", "corners", "-q"
+    )
+    assert done.returncode == 1
+    assert "1 failed" in done.stdout
+    assert "\x1b" not in done.stdout and "Traceback" not in done.stdout
+    assert "the FMU's process crashed" in done.stdout

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import Run, load
-from falsifier.campaigns.suites import bundled_target
+from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS, bundled_target
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
@@ -44,7 +45,6 @@ COLUMNS = (
     "robustness",
     "stop time",
 )
-BUDGET = 1500
 _PROFILES = {"1": None, "2": "instance2"}
 # The competition's names of our requirements: (system, property).
 _NAMES = {
@@ -141,7 +141,9 @@ def read_rows(path: Path) -> list[Row]:
         return [_row(number, cells, path) for number, cells in enumerate(csv.DictReader(file), start=1)]
 
 
-def validate(rows: Iterable[Row], *, budget: int = BUDGET, find: Finder | None = None) -> list[Finding]:
+def validate(
+    rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS, find: Finder | None = None
+) -> list[Finding]:
     """Re-simulate all claimed counterexamples.
 
     Args:
@@ -169,8 +171,8 @@ def tolerance(requirement: str) -> float:
 def _exported(run: Run) -> dict[str, object]:
     system, property_ = _NAMES.get(run.requirement, (run.manifest.model.rpartition(".")[2], run.requirement))
     row: dict[str, object] = {
-        "system": system,
-        "property": property_,
+        "system": csv_cell(system),
+        "property": csv_cell(property_),
         "instance": next((i for i, p in _PROFILES.items() if p == (run.method.profile or None)), "1"),
         "input": "[]",
         "parameters": "[]",

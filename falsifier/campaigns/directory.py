@@ -18,7 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier.campaigns.plan import CampaignRequest
 from falsifier.core.files import write_whole
-from falsifier.errors import JournalError
+from falsifier.core.sealing import check_seal, seal
+from falsifier.errors import JournalError, rejected
 from falsifier.search.journal import holds_run
 from falsifier.search.request import RunRequest
 
@@ -41,6 +42,7 @@ class CampaignRecord(BaseModel):
     started: str = Field(description="Date and time in UTC.")
     request: CampaignRequest
     hashes: dict[str, str] = Field(description="SHA-256 of all FMUs and specs, by path.")
+    sum: str = Field("", description="Checksum of the file up to here.")
 
     @property
     def runs(self) -> dict[str, RunRequest]:
@@ -55,7 +57,7 @@ def is_campaign(directory: Path) -> bool:
 
 def write_campaign(directory: Path, record: CampaignRecord) -> None:
     """Write campaign.json."""
-    write_whole(directory / CAMPAIGN, record.model_dump_json(indent=1) + "\n")
+    write_whole(directory / CAMPAIGN, seal(record.model_dump_json(indent=2, exclude={"sum"})))
 
 
 def read_campaign(directory: Path) -> CampaignRecord:
@@ -65,13 +67,20 @@ def read_campaign(directory: Path) -> CampaignRecord:
         JournalError: if there is none, or it is invalid.
     """
     try:
-        return CampaignRecord.model_validate_json((directory / CAMPAIGN).read_bytes())
+        content = (directory / CAMPAIGN).read_bytes()
+        check_seal(content)
+        return CampaignRecord.model_validate_json(content)
     except FileNotFoundError:
         raise JournalError(f"{directory}: not a campaign directory: it contains no {CAMPAIGN}") from None
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
-        raise JournalError(f"{directory}/{CAMPAIGN}: {key}: {first['msg']}") from None
+        message = rejected(first["msg"], first["input"])
+        raise JournalError(f"{directory}/{CAMPAIGN}: {key}: {message}") from None
+    except (ValueError, OSError) as error:
+        raise JournalError(
+            f"{directory}/{CAMPAIGN} is damaged: {error}; this campaign cannot be continued: start a new one"
+        ) from None
 
 
 def campaign_mark(directory: Path) -> str:
@@ -101,6 +110,8 @@ def run_directories(directory: Path) -> list[Path]:
     below = sorted(path for path in directory.glob("*") if holds_run(path))
     if below:
         return below
+    if not directory.exists():
+        raise JournalError(f"{directory}: no such directory")
     raise JournalError(
         f"{directory}: not a run or campaign directory: it contains neither {CAMPAIGN} nor a run's manifest"
     )

@@ -14,6 +14,8 @@ from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10
+# Maximum length of a run's name before its hash; file systems allow 255 bytes.
+_READABLE_LENGTH = 120
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -146,10 +148,9 @@ def method_of(request: RunRequest) -> Method:
 
 def run_name(request: RunRequest) -> str:
     """Name of a run's directory: readable, and unique by a hash of the request."""
-    requirement = re.split(r"[:/]", request.problems[0].target)[-1]
     digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
-    readable = f"{requirement}-{method_of(request).label}-{request.seed}"
-    return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable).strip('-.')}-{digest}"
+    readable = f"{request.problems[0].name}-{method_of(request).label}-{request.seed}"
+    return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable)[:_READABLE_LENGTH].strip('-.')}-{digest}"
 
 
 def _llm_settings(method: Method, asking: LLMSettings | None) -> LLMSettings | None:

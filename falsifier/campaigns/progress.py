@@ -2,12 +2,19 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import reduce
 from pathlib import Path
 
-from falsifier.campaigns.directory import read_campaign, run_directory
+from falsifier.campaigns.directory import (
+    is_campaign,
+    is_worked_on,
+    read_campaign,
+    run_directories,
+    run_directory,
+)
 from falsifier.campaigns.plan import Method, method_of
+from falsifier.search import manifest
 from falsifier.search.budget import Spent
 from falsifier.search.journal import JournalReader
 from falsifier.search.request import RunRequest
@@ -67,7 +74,11 @@ class Progress:
     @property
     def spent(self) -> Spent:
         """What all runs together have spent; the cost is None if that of any run is unknown."""
-        return total(run.spent for run in self.runs)
+        searches: dict[str, Spent] = {}  # requirements that share a search also share what it has spent
+        for run in self.runs:
+            known = searches.setdefault(run.name, run.spent)
+            searches[run.name] = max(known, run.spent, key=lambda spent: spent.simulations)
+        return total(searches.values())
 
     def by_requirement(self) -> dict[str, "Progress"]:
         """Progress of each requirement."""
@@ -84,11 +95,13 @@ class Progress:
 
 @dataclass(slots=True)
 class _Followed:
-    """A run's journal and the numbers read from it so far."""
+    """One requirement in a run's journal, and the numbers read from it so far; None: the run has only one."""
 
     name: str
     request: RunRequest
     directory: Path
+    method: Method
+    requirement: str | None = None
     tally: Tally = field(init=False)
     reader: JournalReader = field(init=False)
 
@@ -96,7 +109,8 @@ class _Followed:
         self.begin()
 
     def begin(self) -> None:
-        self.tally, self.reader = Tally(), JournalReader(self.directory, with_candidates=False)
+        self.tally = Tally(self.requirement)
+        self.reader = JournalReader(self.directory, with_candidates=False)
 
     def read(self) -> None:
         if self.reader.shrank:  # an incomplete line was dropped, or the directory was replaced
@@ -110,10 +124,10 @@ class _Followed:
         tally = self.tally
         return RunProgress(
             name=self.name,
-            requirement=self.request.problems[0].name,
-            method=method_of(self.request),
+            requirement=self.requirement or self.request.problems[0].name,
+            method=self.method,
             seed=self.request.seed,
-            status=tally.status,
+            status="running" if tally.is_incomplete else tally.status,
             reason=tally.reason,
             best=tally.best_robustness,
             spent=tally.spent,
@@ -121,15 +135,37 @@ class _Followed:
 
 
 class Follower:
-    """Follows a campaign's directory; each look reads only what was written since the last one.
+    """Follows the directory of a campaign, of a run, or one with runs in it.
+
+    Each look reads only what was written since the last one.
 
     Raises:
-        JournalError: if the directory contains no campaign.
+        JournalError: if the directory contains neither a campaign nor a run.
     """
 
     def __init__(self, directory: Path) -> None:
-        runs = read_campaign(directory).runs
-        self._runs = [_Followed(n, r, run_directory(directory, n)) for n, r in runs.items()]
+        if is_campaign(directory):
+            runs = read_campaign(directory).runs
+            self._places = [directory]
+            self._runs = [_Followed(n, r, run_directory(directory, n), method_of(r)) for n, r in runs.items()]
+            return
+        self._places = run_directories(directory)
+        self._runs = []
+        for place in self._places:
+            described = manifest.read(place)
+            method = replace(
+                method_of(described.request),
+                parameterization=described.parameterization,
+                together=described.shared,
+            )
+            self._runs += [
+                _Followed(str(place), described.request, place, method, n) for n in described.names
+            ]
+
+    @property
+    def is_worked_on(self) -> bool:
+        """Whether a process still works on the campaign, or on any of the runs."""
+        return any(map(is_worked_on, self._places))
 
     def look(self) -> Progress:
         """Read what is new, and return the current progress."""

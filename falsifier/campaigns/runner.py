@@ -75,7 +75,7 @@ def run_campaign(
         ChatError: for an unknown provider or a missing key.
         ModelError: if an FMU cannot be used, or the cluster cannot be reached.
     """
-    _check(request.named().values(), local=executor is None)
+    check_request(request, executor=executor)
     with locked(directory):
         if is_campaign(directory):
             raise JournalError(
@@ -202,18 +202,22 @@ class _Watch:
         self._stop.write_text(f"{reason}\n", encoding="utf-8")
 
 
-def _check(requests: Iterable[RunRequest], *, local: bool) -> None:
-    """Reject unknown names and missing keys before anything is loaded or written.
+def check_request(request: CampaignRequest, *, executor: str | None) -> None:
+    """Check names and keys before anything is loaded or written.
 
     Keys are checked only for runs on this machine: the workers of a cluster have their own environment.
+
+    Raises:
+        SpecError: for an unknown engine or prompt variant.
+        ChatError: for an unknown provider or a missing key.
     """
-    requests = tuple(requests)
-    for request in requests:
-        check_names(request)
-    if local:
+    runs = tuple(request.named().values())
+    for run in runs:
+        check_names(run)
+    if executor is None:
         from falsifier.llm.connect import preflight
 
-        for name, api_base in {(r.llm.name, r.llm.api_base) for r in requests if r.llm is not None}:
+        for name, api_base in {(r.llm.name, r.llm.api_base) for r in runs if r.llm is not None}:
             preflight(name, api_base=api_base)
 
 

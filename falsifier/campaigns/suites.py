@@ -5,10 +5,13 @@ import tomllib
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.loading import find_spec
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.problem.spec import read_spec
 
 SUITES = ("arch-comp",)
+# The competition's protocol: simulations per run, and the parameterization that published results have.
+PROTOCOL_SIMULATIONS = 1500
+PROTOCOL_PARAMETERIZATION: Parameterization = "fixed"
 
 
 def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]:

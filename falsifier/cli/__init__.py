@@ -1,18 +1,42 @@
 """The command line. The modules of commands are imported only when a command is used."""
 
+import errno
 import os
 import sys
 import traceback
+from contextlib import suppress
 from importlib import import_module
 from typing import NoReturn
 
 import click
 
 from falsifier import __version__
+from falsifier.cli.streams import (
+    INTERRUPTED,
+    end_at_interrupts,
+    open_streams,
+    settle_streams,
+    stop_at_interrupts,
+)
+from falsifier.core.memory import check_memory_limits
 from falsifier.errors import FalsifierError, did_you_mean
+from falsifier.views.terminal import warn
 
 # Exit code that a shell reports for a program whose pipe was closed: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
+_FAILED = 3
+# What a machine has run out of: disk, quota, memory, files, processes.
+_EXHAUSTED = frozenset(
+    (
+        errno.ENOSPC,
+        errno.EDQUOT,
+        errno.EFBIG,
+        errno.ENOMEM,
+        errno.EMFILE,
+        errno.ENFILE,
+        errno.EAGAIN,
+    )
+)
 
 # name: (module, summary in --help)
 _COMMANDS = {
@@ -25,6 +49,7 @@ _COMMANDS = {
     "robustness-map": ("falsifier.cli.counterexample", "Map the robustness around a counterexample."),
     "bench": ("falsifier.cli.campaign", "Run requirements x methods x seeds, and print a table."),
     "watch": ("falsifier.cli.campaign", "Follow a running campaign from another terminal."),
+    "repair": ("falsifier.cli.repair", "Drop what is damaged in the files of a run or campaign."),
     "report": ("falsifier.cli.report", "Report on a run or campaign: HTML, Markdown, JUnit XML."),
     "validate": ("falsifier.cli.report", "Re-simulate counterexamples in ARCH-COMP format."),
     "info": ("falsifier.cli.inspect", "Show an FMU's interfaces, variables, units and ranges."),
@@ -79,44 +104,63 @@ def cli() -> None:
     """Run the given command; its help text is _HELP."""
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point; no error ends with exit code 1, which means falsified."""
     # The engines' matrices are small: threads of the linear algebra library would only slow them down.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    open_streams()
+    stop_at_interrupts()
+    code = _carried_out(sys.argv[1:])
+    end_at_interrupts(code)
+    settle_streams()
+    sys.exit(code)
+
+
+def _carried_out(arguments: list[str]) -> int:
+    """Carry out a command; return its exit code."""
     try:
+        check_memory_limits()
         # Not cli.main: it ends with exit code 1, which means falsified, if a pipe is closed.
-        with cli.make_context("falsifier", sys.argv[1:]) as context:
+        with cli.make_context("falsifier", arguments) as context:
             cli.invoke(context)
-        sys.exit(0)
+        return 0
+    except SystemExit as end:
+        return _FAILED if isinstance(end.code, str) else int(end.code or 0)
     except click.exceptions.Exit as end:
-        sys.exit(end.exit_code)
+        return end.exit_code
     except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except BrokenPipeError:  # the reader, such as head, has stopped reading
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that flushing at exit succeeds
-        sys.exit(_PIPE_CLOSED)
+        with suppress(OSError):
+            error.show()
+        return 2
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
-        sys.exit(130)
+        warn("interrupted")
+        return INTERRUPTED
     except FalsifierError as error:
-        click.echo(f"falsifier: {error}", err=True)
-        sys.exit(error.exit_code)
+        warn(f"falsifier: {error}")
+        return error.exit_code
+    except BrokenPipeError:  # who read the output has seen enough
+        return _PIPE_CLOSED
     except OSError as error:
-        if error.filename is None:
-            _report_defect()
-        click.echo(
-            f"falsifier: {error.filename}: {error.strerror}; choose a readable and writable location, for "
-            "example with --out DIR",
-            err=True,
-        )
-        sys.exit(2)
+        return _report_refusal(error)
+    except MemoryError:
+        warn("falsifier: not enough memory; free some, or raise the limit (ulimit)")
+        return _FAILED
     except Exception:
-        _report_defect()
+        warn(f"{traceback.format_exc()}falsifier: this is a defect of falsifier itself; please report it")
+        return _FAILED
 
 
-def _report_defect() -> NoReturn:
-    """Print the exception that is being handled and exit with the code of a failure."""
-    traceback.print_exc()
-    click.echo("falsifier: internal error: this is a bug; please report it with the lines above", err=True)
-    sys.exit(3)
+def _report_refusal(error: OSError) -> int:
+    """Print what the operating system refused; return the exit code."""
+    where = "" if error.filename is None else f"{error.filename}: "
+    if error.errno in _EXHAUSTED:
+        warn(f"falsifier: {where}{error.strerror}; free some, then run the command again")
+        return _FAILED
+    if error.filename is None:
+        warn(f"falsifier: {error}")
+        return _FAILED
+    warn(
+        f"falsifier: {where}{error.strerror}; choose a readable and writable location, for example with "
+        "--out DIR"
+    )
+    return 2

@@ -1,12 +1,11 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
 import shlex
-import sys
 import time
 from datetime import datetime
 from itertools import product
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NoReturn, get_args
 
 import click
 
@@ -16,15 +15,17 @@ from falsifier.campaigns import (
     Method,
     Outcome,
     cross,
-    is_worked_on,
     run_campaign,
     suite,
 )
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
-from falsifier.campaigns.suites import SUITES
+from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.runner import check_request
+from falsifier.campaigns.suites import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.cli.options import (
+    DEFAULT_PARAMETERIZATION,
     asking,
     asking_options,
     budget_option,
@@ -40,26 +41,28 @@ from falsifier.cli.options import (
     parameterization_option,
     profile_option,
     quiet_option,
+    refuse_limits_without_llm,
     seed_option,
     total_options,
     variant_option,
 )
+from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
-from falsifier.search.budget import Budget
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.request import Effort, LLMSettings
-from falsifier.views.campaign_text import campaign_display, overall_line
+from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
+from falsifier.views.terminal import warn
 
 # Time in s between two updates of falsifier watch.
 _WATCH_PERIOD = 0.5
-# Simulations per run that the competition's protocol allows.
-_PROTOCOL_BUDGET = 1500
 
 _BENCH_HELP = """Run requirements x methods x seeds and print a table in the format of the ARCH-COMP category.
 
 TARGETS are requirements (AT1) or specs with all their requirements (my.toml); without any, give --suite.
+Each run has the defaults of falsifier run; with --suite, those of the competition.
 
 \b
 falsifier bench --suite arch-comp --engine surrogate --runs 10 --budget 1500 --jobs 2
@@ -78,7 +81,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     help="Parameterization of the suite, as the category numbers it.",
 )
 @profile_option
-@parameterization_option(multiple=True)
+@parameterization_option(multiple=True, suite=PROTOCOL_PARAMETERIZATION)
 @engine_option(multiple=True)
 @llm_option(multiple=True)
 @effort_option
@@ -92,7 +95,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     help="Number of runs per requirement and method, each with its own seed.",
 )
 @seed_option("Random seed of the first run; the others count up.")
-@budget_option(_PROTOCOL_BUDGET, note=" per run")
+@budget_option(suite=PROTOCOL_SIMULATIONS, note=" per run")
 @limit_options(note=" per run")
 @total_options
 @click.option(
@@ -123,7 +126,7 @@ def bench(
     variants: tuple[str, ...],
     runs: int,
     seed: int,
-    budget: int,
+    budget: int | None,
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
@@ -147,6 +150,12 @@ def bench(
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
+    if not llms:
+        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
+    if not parameterization:
+        parameterization = (PROTOCOL_PARAMETERIZATION if suite_name else DEFAULT_PARAMETERIZATION,)
+    if budget is None:
+        budget = PROTOCOL_SIMULATIONS if suite_name else DEFAULT_SIMULATIONS
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
     methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)
@@ -162,8 +171,9 @@ def bench(
         calls=calls,
         suite=suite_name,
     )
+    check_request(request, executor=executor)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
-    click.echo(f"{counted(len(request.runs), 'run')} in {directory}", err=True)
+    warn(f"{counted(len(request.runs), 'run')} in {directory}")
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
@@ -173,23 +183,25 @@ def bench(
 @directory_argument
 @click.option("--once", is_flag=True, help="Print the current progress and exit.")
 def watch(*, directory: Path, once: bool) -> None:
-    """Follow the campaign in DIRECTORY from another terminal until it ends or is stopped.
+    """Follow the run or campaign in DIRECTORY from another terminal until it ends or is stopped.
 
     This writes nothing to DIRECTORY.
     """
     follower = Follower(directory)
-    working = is_worked_on(directory)
+    working = follower.is_worked_on
     if not once:
         with campaign_display() as show:
             while working:
                 show(follower.look())
                 time.sleep(_WATCH_PERIOD)
-                working = is_worked_on(directory)
+                working = follower.is_worked_on
             show(follower.look())
     progress = follower.look()  # after the lock was released: by then everything has been written
-    click.echo(overall_line(progress, None, stopped=not working))
+    for run in () if is_campaign(directory) else progress.runs:
+        say(run_line(run))
+    say(overall_line(progress, None, stopped=not working))
     if not working and progress.finished < len(progress.runs):
-        click.echo(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
+        say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
 
 
 def resume_campaign(
@@ -201,7 +213,7 @@ def resume_campaign(
     finish(directory, outcome, table="main", as_json=as_json)
 
 
-def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> None:
+def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> NoReturn:
     """Save all tables, print one of them, and exit with the campaign's exit code."""
     runs, published = load(directory), read_published()
     for name, make in TABLES.items():
@@ -211,14 +223,14 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
             write_whole(directory / f"table-{name}.csv", made.csv())
     data = statistics_json(runs)
     write_whole(directory / "table.json", data)
-    click.echo(data if as_json else TABLES[table](runs, published).text(), nl=not as_json)
     again = f"falsifier resume {shlex.quote(str(directory))}"
     if outcome.reason:
-        click.echo(f"stopped: {outcome.reason}; to continue: {again}", err=True)
+        warn(f"stopped: {outcome.reason}; to continue: {again}")
     failed = outcome.progress.counts["failed"]
     if failed:
-        click.echo(f"{counted(failed, 'run')} failed; to retry: {again}", err=True)
-    sys.exit(3 if failed or outcome.reason else 0)
+        warn(f"{counted(failed, 'run')} failed; to retry: {again}")
+    text = data if as_json else TABLES[table](runs, published).text()
+    conclude(text, 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:

@@ -1,7 +1,6 @@
 """Commands on counterexamples: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``."""
 
 import json
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
@@ -21,6 +20,7 @@ from falsifier.cli.options import (
     seed_option,
     store_option,
 )
+from falsifier.cli.output import conclude, say
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.store import (
@@ -39,7 +39,7 @@ from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm, other_interface
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.views.text import warn
+from falsifier.views.terminal import warn
 
 # Shrinking usually reaches a local minimum with fewer simulations.
 _SHRINK_BUDGET = 500
@@ -66,8 +66,8 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
         judged.model.close()
     if replayed.status == "does not fit":
         raise CandidateError(replayed.text)
-    click.echo(json.dumps(_replayed_json(replayed), indent=2) if as_json else replayed.text)
-    sys.exit(1 if replayed.status == "violates" else 0)
+    text = json.dumps(_replayed_json(replayed), indent=2) if as_json else replayed.text
+    conclude(text, 1 if replayed.status == "violates" else 0)
 
 
 @click.command()
@@ -76,17 +76,16 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
 @click.option(
     "--margin",
     type=float,
-    default=0.0,
-    show_default=True,
-    help="Keep the robustness at or below minus this value.",
+    help="Margin to keep: the robustness stays at or below minus this value. Default: half of the "
+    "original's; 0: any violation will do.",
 )
 @out_option("File to write; default: shrunk.json in RUN's directory.")
 @store_option
 @json_option
 def shrink(
-    *, run: Path, budget: int, margin: float, out: Path | None, store: Path | None, as_json: bool
+    *, run: Path, budget: int, margin: float | None, out: Path | None, store: Path | None, as_json: bool
 ) -> None:
-    """Make a counterexample as simple as possible such that it still violates; the original is kept.
+    """Make a counterexample as simple as possible while it still violates; the original is kept.
 
     RUN is a run directory or a counterexample file.
     """
@@ -118,13 +117,16 @@ def shrink(
     if as_json:
         content = _confirmation_json(confirmation)
         content |= {"minimal": shrunk.minimal, "simulations": shrunk.simulations}
-        click.echo(json.dumps(content | {"files": list(map(str, written))}, indent=2))
+        content |= {"least_margin": shrunk.least_margin}
+        say(json.dumps(content | {"files": list(map(str, written))}, indent=2))
         return
-    click.echo(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
-    click.echo(f"  {confirmation.outcome:<13}  {confirmation.reason}")
+    say(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
+    say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
+    half = ", half of the original's; --margin changes it" if margin is None else ""
+    say(f"  margin         at least {shrunk.least_margin:.6g} was kept{half}")
     for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
-        click.echo(f"  {line}")
-    click.echo(f"  files          {', '.join(map(str, written))}")
+        say(f"  {line}")
+    say(f"  files          {', '.join(map(str, written))}")
 
 
 @click.command()
@@ -157,11 +159,11 @@ def explain(*, run: Path, llm: str | None, effort: str | None, api_base: str | N
         effects = [{**asdict(e), "needed": e.needed} for e in explanation.effects]
         told = {"llm": llm, "words": words} if words else None
         content = {"text": explanation.text, "effects": effects, "told_by": told}
-        click.echo(json.dumps(content, indent=2))
+        say(json.dumps(content, indent=2))
         return
-    click.echo(explanation.text)
+    say(explanation.text)
     if words is not None:
-        click.echo(f"\nIn the words of {llm}, which may be wrong:\n{words}")
+        say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
 
 
 @click.command()
@@ -182,7 +184,7 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
     if store is not None:
         written.append(Database(store).save(problem, stored))
     for path in written:
-        click.echo(str(path))
+        say(str(path))
 
 
 @click.command("robustness-map")
@@ -224,10 +226,10 @@ def robustness_map(
             "deciding": [found.coordinates[i].label for i in found.axes],
             "picture": str(picture),
         }
-        click.echo(json.dumps(content, indent=2))
+        say(json.dumps(content, indent=2))
         return
-    click.echo(f"{problem.name}: {found.text}")
-    click.echo(f"  picture        {picture}")
+    say(f"{problem.name}: {found.text}")
+    say(f"  picture        {picture}")
 
 
 def _beside(run: Path, name: str) -> Path:

@@ -2,21 +2,36 @@
 
 from pathlib import Path
 
+from falsifier.core.literals import one_line
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
 from falsifier.evaluation.confirm import Confirmation
+from falsifier.views.terminal import warn
 
 
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
     """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
 
+    A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it.
+
     Args:
         confirmation: the violation.
         directory: where to write.
         name: name of the JSON file; the picture has the same name, with the extension .png.
-    """
-    from falsifier.views.plotting import plot_evaluation, save_figure
 
+    Raises:
+        OSError: if the JSON file cannot be written.
+    """
     data = save(to_store(confirmation), directory / name)
     picture = data.with_suffix(".png")
-    save_figure(plot_evaluation(confirmation.problem, confirmation.evaluation), picture)
+    try:
+        _draw(confirmation, picture)
+    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
+        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
+        return [data]
     return [data, picture]
+
+
+def _draw(confirmation: Confirmation, picture: Path) -> None:
+    from falsifier.views.plotting import plot_evaluation, save_figure
+
+    save_figure(plot_evaluation(confirmation.problem, confirmation.evaluation), picture)

@@ -3,7 +3,6 @@
 import json
 import shlex
 import sys
-from dataclasses import asdict
 from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,29 +10,25 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.options import json_option, out_option, profile_option
+from falsifier.cli.output import say
 from falsifier.core.files import bundled
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
-from falsifier.problem.defaults import default_interface, default_interval
-from falsifier.problem.loading import load_problems
+from falsifier.problem.defaults import default_interface
+from falsifier.problem.grid import choose_grid
+from falsifier.problem.loading import find_spec, load_problems
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
-from falsifier.problem.starter import starter_spec
+from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
+from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
-    from rich.console import Console
-    from rich.table import Table
 
-# Maximum rows of a table: models may have thousands of parameters or states.
-_SHOWN_VARIABLES = 60
-# Simulated time in s for info --check if the FMU states no stop time.
-_CHECKED_SECONDS = 10.0
-_NO_INTERFACE = "no interface that can be simulated (scheduled execution is not supported)"
-# Text width if the output is not a terminal.
-_PIPED_WIDTH = 160
+# Maximum number of variables that are compared if the FMU declares no outputs.
+_CHECKED_VARIABLES = 50
 
 
 @click.command()
@@ -49,16 +44,17 @@ _PIPED_WIDTH = 160
 def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     """Show an FMU's interfaces, variables, units and ranges.
 
-    FMU is an FMU, the name of a bundled one (AT), or a spec file, which stands for its FMU.
+    FMU is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
+    two stand for their FMU.
     """
     from falsifier.fmu import read_info
 
     source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
     found = read_info(source)
     if as_json:
-        click.echo(json.dumps(asdict(found), indent=2))
+        say(info_json(found))
         return
-    _print_info(found, everything=everything)
+    say(info_text(found, everything=everything))
     if checked:
         _print_convergence(source, found)
 
@@ -71,7 +67,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
     from falsifier.fmu.build import build as compile_sources
 
     written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
-    click.echo(f"{written} written")
+    say(f"{written} written")
 
 
 @click.command()
@@ -79,7 +75,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(*, fmu: Path, out: Path | None, force: bool) -> None:
-    """Write a starter spec for an FMU: valid, and to be completed with ranges and requirements."""
+    """Write a starter spec for an FMU: valid as written; fill in ranges and requirements."""
     from falsifier.fmu import FmuModel, read_info
 
     source = _existing_fmu(fmu)
@@ -92,7 +88,7 @@ def init(*, fmu: Path, out: Path | None, force: bool) -> None:
     path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
     load_problems(str(path))
     command = f"falsifier run {shlex.quote(str(path))}"
-    click.echo(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
+    say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 
 
 @click.command()
@@ -100,8 +96,11 @@ def init(*, fmu: Path, out: Path | None, force: bool) -> None:
 @profile_option
 def check(*, target: str, profile: str | None) -> None:
     """Check the keys, signals, ranges and formulas of a spec file without simulating."""
-    for problem in load_problems(target, profile=profile):
-        click.echo(_problem_line(problem))
+    problems = load_problems(target, profile=profile)
+    for problem in problems:
+        say(_problem_line(problem))
+    for note in dict.fromkeys(note for problem in problems for note in problem.notes):
+        say(f"note: {note}")
 
 
 @click.command()
@@ -115,7 +114,7 @@ def check(*, target: str, profile: str | None) -> None:
 )
 def schema(*, what: str) -> None:
     """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
-    click.echo(json.dumps(_schema(what), indent=2))
+    say(json.dumps(_schema(what), indent=2))
 
 
 def _schema(what: str) -> dict[str, Any]:
@@ -131,14 +130,17 @@ def _schema(what: str) -> dict[str, Any]:
 def _print_convergence(fmu: Path, found: ModelInfo) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.fmu import FmuModel
-    from falsifier.fmu.step_check import step_convergence
+    from falsifier.fmu.step_effect import step_convergence
 
     interface = default_interface(found)
     if interface is None:
-        raise SpecError(f"{fmu}: {_NO_INTERFACE}; export the model for co-simulation or model exchange")
-    stop_time = found.stop_time or _CHECKED_SECONDS
-    outputs = tuple(v.name for v in found.outputs if v.kind != "string")
-    experiment = Experiment(stop_time, default_interval(found, stop_time), outputs)
+        raise SpecError(f"{fmu}: {NO_INTERFACE}; export the model for co-simulation or model exchange")
+    stop_time = found.stop_time or DEFAULT_STOP_TIME
+    outputs = tuple(v.name for v in found.observables if v.kind != "string")[:_CHECKED_VARIABLES]
+    if not outputs:
+        raise SpecError(f"{fmu}: the FMU has no output, state or other computed variable to compare")
+    grid = choose_grid(stop_time, fmu_step=found.step_size)
+    experiment = Experiment(stop_time, grid.interval, outputs)
     signals = {
         v.name: Signal.evenly([v.low, v.high, v.low], stop_time=stop_time, interpolation="linear")
         for v in found.inputs
@@ -149,12 +151,15 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         movements = step_convergence(model, experiment, signals)
     finally:
         model.close()
-    click.echo(
-        f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s"
+    say(
+        f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s "
+        f"({grid.reason}):"
     )
+    if not found.outputs:
+        say("  the FMU declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         unit = f" {found[name].unit}" if found[name].unit else ""
-        click.echo(
+        say(
             f"  {name} changes by at most {moved.largest:.3g}{unit}, at {moved.time:.4g} s "
             f"({100 * moved.relative:.2f} % of its range)"
         )
@@ -166,6 +171,9 @@ def _existing_fmu(fmu: Path) -> Path:
     inside = bundled("fmus") / f"{fmu.name.removesuffix('.fmu')}.fmu"
     if fmu.parent == Path() and inside.is_file():
         return inside
+    if fmu.parent == Path() and not fmu.suffix:
+        spec = find_spec(str(fmu))[0]  # the name of a bundled requirement
+        return spec.parent / read_spec(spec).model.fmu
     raise SpecError(f"{fmu}: no such file; expected the path of an FMU, or the name of a bundled one")
 
 
@@ -182,73 +190,3 @@ def _problem_line(problem: Problem) -> str:
     ]
     searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
-
-
-def _print_info(found: ModelInfo, *, everything: bool) -> None:
-    from rich.console import Console
-
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPED_WIDTH)
-    # Captured and printed by click: if a pipe is closed, rich would exit with code 1, which means falsified.
-    with console.capture() as text:
-        _describe(console, found, everything=everything)
-    click.echo(text.get(), nl=False)
-
-
-def _describe(console: "Console", found: ModelInfo, *, everything: bool) -> None:
-    console.print(
-        f"[bold]{found.name}[/bold]  FMI {found.fmi_version}, {', '.join(found.interfaces) or _NO_INTERFACE}"
-    )
-    if found.clocks:
-        console.print(
-            f"cannot be simulated: its input clocks ({', '.join(found.clocks)}) need external ticks, which "
-            "are not supported; export the model without input clocks",
-            markup=False,
-        )
-    if found.description:
-        console.print(found.description, markup=False)
-    console.print(
-        f"platforms: {', '.join(found.platforms) or 'none'}; generated by {found.tool or 'an unknown tool'}",
-        markup=False,
-    )
-    experiment = (
-        f"{label} {value:g}{unit}"
-        for label, value, unit in (
-            ("stop time", found.stop_time, " s"),
-            ("step", found.step_size, " s"),
-            ("tolerance", found.tolerance, ""),
-        )
-        if value is not None
-    )
-    console.print(f"default experiment: {', '.join(experiment) or 'none'}", markup=False)
-    groups = {
-        "inputs": found.inputs,
-        "outputs": found.outputs,
-        "parameters": found.parameters,
-        "states": tuple(v for v in found.variables if v.is_state),
-    }
-    if everything:
-        shown = {v.name for group in groups.values() for v in group}
-        groups["other variables"] = tuple(v for v in found.variables if v.name not in shown)
-    for title, variables in groups.items():
-        if variables:
-            limit = len(variables) if everything else _SHOWN_VARIABLES
-            console.print(_table(title, variables[:limit]))
-            if len(variables) > limit:
-                console.print(f"... and {len(variables) - limit} more; --all shows all {title}")
-
-
-def _table(title: str, variables: tuple[Variable, ...]) -> "Table":
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for column in ("name", "type", "unit", "min", "max", "start", "description"):
-        table.add_column(column, justify="right" if column in ("min", "max", "start") else "left")
-    for v in variables:
-        unit = f"{v.unit} (displayed in {v.display_unit})" if v.display_unit else v.unit
-        cells = (v.name, v.kind, unit, _cell(v.low), _cell(v.high), _cell(v.start), v.description)
-        table.add_row(*(cell.replace("[", "\\[") for cell in cells))
-    return table
-
-
-def _cell(value: float | str | None) -> str:
-    return "" if value is None else f"{value:g}" if isinstance(value, int | float) else value

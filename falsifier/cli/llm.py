@@ -16,6 +16,7 @@ from falsifier.cli.options import (
     problem_source,
     variant_option,
 )
+from falsifier.cli.output import say
 from falsifier.core.words import counted
 from falsifier.problem.loading import load_source
 
@@ -61,15 +62,15 @@ def prompt(
     if samples is not None and directory is None:
         raise click.UsageError("--samples requires --run DIR")
     problem = load_source(problem_source(options))
-    evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else []
-    told = evaluations[:samples]
+    evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else {}
+    told = list(evaluations.values())[:samples]
     settings = HybridSettings()
     count = 1 if engine == "llm" else settings.count if told else settings.opening
     messages = preview(problem, variant=variant, evaluations=told, count=count, anonymous=anonymous)
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
         tools = (preview_tool(problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous),)
-    click.echo(_as_json(messages, tools) if as_json else _as_text(messages, tools))
+    say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
 
 
 def _as_json(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
@@ -112,7 +113,7 @@ def check(*, name: str, api_base: str | None, effort: str | None) -> None:
     found = check_llm(name, api_base=api_base, effort=effort)
     price = "unknown" if found.price is None else str(found.price)
     key = f"key from {found.key}" if found.key else "no key needed"
-    click.echo(
+    say(
         f"{found.llm}: replied {found.reply!r} after {found.seconds:.1f} s "
         f"({counted(found.usage.tokens, 'token')}); {key}; price: {price}"
     )

@@ -5,6 +5,7 @@ or add a remark, a function makes the option.
 """
 
 import logging
+import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -15,9 +16,13 @@ import click
 from falsifier.core.secrets import is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.prompts.variants import DEFAULT_VARIANT
-from falsifier.problem.options import changes_from_options
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.shorthand import changes_from_options
+from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.search.budget import DEFAULT_SIMULATIONS
 from falsifier.search.request import Effort, LLMSettings
+
+# What a price is, in errors; $0.25 and $2 per million tokens, as providers state prices.
+_PRICE = "expected SENT:RECEIVED in US dollars per 1000 tokens sent and received, for example 0.00025:0.002"
 
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
@@ -36,14 +41,18 @@ def profile_option(command: Function) -> Function:
     )(command)
 
 
-def parameterization_option(*, multiple: bool = False) -> Decorator:
-    # Campaigns are compared with published results, which exist for the fixed parameterization only.
+# What a search does unless it is told otherwise: the same for one run and for each run of a campaign.
+DEFAULT_PARAMETERIZATION: Parameterization = "free"
+
+
+def parameterization_option(*, multiple: bool = False, suite: Parameterization = "fixed") -> Decorator:
+    default = DEFAULT_PARAMETERIZATION
     return click.option(
         "--parameterization",
         type=click.Choice(["free", "fixed"]),
         multiple=multiple,
-        default=("fixed",) if multiple else "free",
-        show_default=True,
+        default=() if multiple else default,
+        show_default=f"{default}; with --suite {suite}" if multiple else True,
         help=_repeatable(
             "free: engines may choose control points within the spec's limits; fixed: the spec's own.",
             multiple=multiple,
@@ -77,7 +86,7 @@ def problem_options(command: Function) -> Function:
             "parameters",
             multiple=True,
             metavar="NAME=VALUE",
-            help="Parameter or start value to set. NAME=LOW:HIGH: search it. Repeatable.",
+            help="Parameter, start value or string to set. NAME=LOW:HIGH: search it. Repeatable.",
         ),
         click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
         click.option(
@@ -86,12 +95,18 @@ def problem_options(command: Function) -> Function:
             metavar="SECONDS",
             help="Step of the output grid on which the requirement is monitored.",
         ),
+        click.option(
+            "--time-limit",
+            type=float,
+            metavar="SECONDS",
+            help="Maximum wall-clock time of one simulation; default: the spec's, or 60.",
+        ),
     )
 
 
 def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the values of problem_options out of a command's keyword arguments."""
-    varied = ("inputs", "parameters", "stop_time", "output_interval", "interface")
+    varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
     stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization")}
     return ProblemSource(**stated, changes=changes)
@@ -199,6 +214,15 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
     return given | {"price": _price(price), "options": dict(map(_llm_option, pairs)), "cache": cache}
 
 
+def refuse_limits_without_llm(*, max_tokens: int | None, max_cost: float | None) -> None:
+    """Refuse limits of a language model although none is named.
+
+    Raises:
+        click.UsageError: naming the options.
+    """
+    _refuse_without_llm({"max_tokens": max_tokens, "max_cost": max_cost})
+
+
 def _refuse_without_llm(given: dict[str, Any]) -> None:
     stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value and key != "cache"]
     if stray:
@@ -214,7 +238,9 @@ def _price(text: str | None) -> tuple[float, float] | None:
     try:
         sent, received = (float(part) for part in text.split(":"))
     except ValueError:
-        raise click.UsageError(f"--price {text}: expected SENT:RECEIVED, for example 0.25:2") from None
+        raise click.UsageError(f"--price {text}: {_PRICE}") from None
+    if not all(math.isfinite(price) and price >= 0 for price in (sent, received)):
+        raise click.UsageError(f"--price {text}: prices must be finite and not negative; {_PRICE}")
     return sent, received
 
 
@@ -232,12 +258,14 @@ def _llm_option(text: str) -> tuple[str, str | float]:
         return name, value
 
 
-def budget_option(default: int, *, note: str = "") -> Decorator:
+def budget_option(
+    default: int = DEFAULT_SIMULATIONS, *, suite: int | None = None, note: str = ""
+) -> Decorator:
     return click.option(
         "--budget",
         type=int,
-        default=default,
-        show_default=True,
+        default=default if suite is None else None,
+        show_default=True if suite is None else f"{default}; with --suite {suite}",
         help=f"Maximum number of simulations{note}.",
     )
 
@@ -274,12 +302,16 @@ def total_options(command: Function) -> Function:
 
 
 def seed_option(text: str = "Random seed.") -> Decorator:
-    return click.option("--seed", type=int, default=0, show_default=True, help=text)
+    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=text)
 
 
 def jobs_option(what: str) -> Decorator:
     return click.option(
-        "--jobs", type=int, default=1, show_default=True, help=f"Number of {what} at a time on this machine."
+        "--jobs",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+        help=f"Number of {what} at a time on this machine.",
     )
 
 

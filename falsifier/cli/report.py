@@ -1,16 +1,19 @@
 """``falsifier report`` and ``falsifier validate``."""
 
 import json
-import sys
 from pathlib import Path
 
 import click
 
-from falsifier.campaigns.archcomp import BUDGET, Finding, export, read_rows
+from falsifier.campaigns.archcomp import Finding, export, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
+from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS
 from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
+from falsifier.cli.output import conclude, say
+from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.views.report import html_report, junit_report, markdown_report
+from falsifier.views.terminal import warn
 
 
 @click.command()
@@ -30,21 +33,21 @@ def report(
     """Report on the run or campaign in DIRECTORY: one self-contained HTML page."""
     if junit is not None:
         junit.write_text(junit_report(directory), encoding="utf-8")
-        click.echo(f"{junit} written", err=True)
+        warn(f"{junit} written")
     if arch_comp is not None:
         arch_comp.write_text(export(directory), encoding="utf-8")
-        click.echo(f"{arch_comp} written", err=True)
+        warn(f"{arch_comp} written")
     if markdown and out is None:
-        click.echo(markdown_report(directory), nl=False)
+        say(markdown_report(directory), nl=False)
         return
     path = out or directory / "report.html"
     path.write_text(markdown_report(directory) if markdown else html_report(directory), encoding="utf-8")
-    click.echo(f"{path} written", err=True)
+    warn(f"{path} written")
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
-@budget_option(BUDGET, note=" per run; claims that used more are rejected")
+@budget_option(PROTOCOL_SIMULATIONS, note=" per run; claims that used more are rejected")
 @json_option
 def validate(*, file: Path, budget: int, as_json: bool) -> None:
     """Re-simulate the counterexamples in FILE and report which of them are reproduced.
@@ -55,16 +58,17 @@ def validate(*, file: Path, budget: int, as_json: bool) -> None:
     """
     findings = check_rows(read_rows(file), budget=budget)
     if as_json:
-        click.echo(json.dumps([_finding_json(f) for f in findings], indent=2))
+        text = json.dumps([_finding_json(f) for f in findings], indent=2)
     else:
-        for f in findings:
-            rejected = (
-                "rejected: " if f.robustness is None else ""
-            )  # without a simulation the claim is invalid
-            robustness = "" if f.robustness is None else f", robustness {f.robustness:+.6g}"
-            click.echo(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
-        click.echo(f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted")
-    sys.exit(0 if all(f.holds for f in findings) else 1)
+        accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
+        text = "\n".join([*map(_finding_line, findings), accepted])
+    conclude(text, 0 if all(f.holds for f in findings) else 1)
+
+
+def _finding_line(f: Finding) -> str:
+    rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
+    robustness = "" if f.robustness is None else f", robustness {f.robustness:+.6g}"
+    return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
 
 
 def _finding_json(finding: Finding) -> dict[str, object]:

@@ -1,14 +1,13 @@
 """``falsifier run`` and ``falsifier resume``."""
 
 import json
-import sys
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
-from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.directory import is_campaign, run_directories
 from falsifier.cli.campaign import resume_campaign
 from falsifier.cli.files import write_counterexample
 from falsifier.cli.options import (
@@ -25,34 +24,61 @@ from falsifier.cli.options import (
     problem_options,
     problem_source,
     quiet_option,
+    refuse_limits_without_llm,
     seed_option,
     total_options,
 )
-from falsifier.errors import SpecError
+from falsifier.cli.output import conclude
+from falsifier.core.files import bundled, file_name
+from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.problem.loading import find_spec, sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
 from falsifier.search.run import resume as resume_run
+from falsifier.views.fmu_log import FmuLog
 from falsifier.views.progress import make_display
+from falsifier.views.terminal import warn
 from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 
 # If several requirements end differently, the first of these that occurs decides.
 _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}
 
 
-@click.command()
+class _OneTarget(click.Command):
+    """A command that says what to use instead if it is given several targets."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            if "unexpected extra argument" not in error.message:
+                raise
+            raise click.UsageError(
+                f"{error.message}; one run searches one target: for several, falsifier bench TARGET "
+                "TARGET ..., and for all requirements of one spec in one search, falsifier run SPEC --all",
+                ctx,
+            ) from None
+
+
+@click.command(cls=_OneTarget)
 @problem_options
 @engine_option()
 @llm_options
-@budget_option(100)
+@budget_option()
 @limit_options()
 @seed_option()
 @jobs_option("simulations")
 @click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
 @quiet_option
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
+@click.option(
+    "--fmu-log",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Ask the FMU for messages in every simulation, and write them to this file.",
+)
 @json_option
 def run(
     *,
@@ -66,6 +92,7 @@ def run(
     together: bool,
     quiet: bool,
     out: Path | None,
+    fmu_log: Path | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -77,6 +104,12 @@ def run(
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     source, llm = problem_source(options), llm_settings(options)
+    logs = [FmuLog(fmu_log)] if fmu_log else []
+    if fmu_log:
+        changes = source.changes.model_copy(update={"logging": True})
+        source = source.model_copy(update={"changes": changes})
+    if llm is None:
+        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     sources = _all_of(source) if together else (source,)
     with make_display(quiet=quiet) as display:
         results = falsify(
@@ -86,8 +119,8 @@ def run(
             seed=seed,
             budget=Budget(budget, seconds, max_tokens, max_cost),
             jobs=jobs,
-            directory=out or _new_directory(source.target),
-            listeners=[display],
+            directory=out or _new_directory(source.name),
+            listeners=[display, *logs],
         )
     _finish(results, as_json=as_json)
 
@@ -121,30 +154,54 @@ def resume(
         limits = Budget(*given) if any(x is not None for x in given) else None
         resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
         return
+    places = run_directories(directory)
+    results: list[Result] = []
     with make_display(quiet=quiet) as display:
-        results = resume_run(directory, listeners=[display])
+        for place in places:
+            try:
+                results += resume_run(place, listeners=[display])
+            except JournalError as error:  # such as a run whose problem was made in Python
+                if len(places) == 1:
+                    raise
+                warn(f"falsifier: {error}; left as it is")
+    if not results:
+        raise JournalError(f"{directory}: none of these {len(places)} runs can be continued here")
     _finish(results, as_json=as_json)
 
 
-def _finish(results: list[Result], *, as_json: bool) -> None:
+def _finish(results: list[Result], *, as_json: bool) -> NoReturn:
+    """Write the counterexamples, print the results, and end with the code of what the search found."""
     for result in results:
         if result.directory is not None:
             _write_counterexamples(result, result.directory)
+    for reason in {result.unrecorded for result in results} - {""}:
+        warn(f"falsifier: the end of the run could not be recorded: {reason}")
     if as_json:
         shown = [result_json(result) for result in results]
-        click.echo(json.dumps(shown[0] if len(shown) == 1 else shown, indent=2))
+        text = json.dumps(shown[0] if len(shown) == 1 else shown, indent=2)
     else:
-        click.echo(result_text(results[0]) if len(results) == 1 else results_text(results))
+        text = result_text(results[0]) if len(results) == 1 else results_text(results)
     statuses = {result.status for result in results}
-    sys.exit(next(code for status, code in _EXIT_CODES.items() if status in statuses))
+    conclude(text, next(code for status, code in _EXIT_CODES.items() if status in statuses))
 
 
 def _write_counterexamples(result: Result, directory: Path) -> None:
-    name = counterexample_name(result)
-    if result.counterexample is not None:
-        write_counterexample(result.counterexample, directory, name=name)
-    for i, fragile in enumerate(result.fragile, start=1):
-        write_counterexample(fragile, directory, name=name.replace("counterexample", f"fragile-{i}"))
+    """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
+    try:
+        name = counterexample_name(result)
+    except FalsifierError as error:
+        warn(f"falsifier: {error}")
+        return
+    found = [(name, result.counterexample)] if result.counterexample is not None else []
+    found += [
+        (f"fragile-{i}{name.removeprefix('counterexample')}", fragile)
+        for i, fragile in enumerate(result.fragile, start=1)
+    ]
+    for file, confirmation in found:
+        try:
+            write_counterexample(confirmation, directory, name=file)
+        except (OSError, FalsifierError) as error:
+            warn(f"falsifier: {directory / file} cannot be written: {error}")
 
 
 def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
@@ -153,17 +210,24 @@ def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
     Raises:
         SpecError: if the target is not a spec, or names one requirement.
     """
-    if source.target.endswith(".fmu") or source.target.startswith("python:") or source.stl is not None:
+    if source.parts.kind in ("fmu", "python") or source.stl is not None:
         raise SpecError(f"{source.target}: --all needs a spec with several requirements; drop --all")
     if find_spec(source.target)[1] is not None:
-        raise SpecError(f"{source.target}: --all needs the spec's name without a requirement")
+        raise SpecError(
+            f"{source.target} is one requirement; for all of its spec: falsifier run {_spec_of(source)} --all"
+        )
     return tuple(sources_of(source))
 
 
-def _new_directory(target: str) -> Path:
-    name = Path(target.rpartition(":")[2] or target).stem
+def _spec_of(source: ProblemSource) -> str:
+    """The spec's name if it is bundled, else its path."""
+    path = find_spec(source.target)[0]
+    return path.stem if path.parent == bundled("specs") else str(path)
+
+
+def _new_directory(name: str) -> Path:
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    base = Path("runs") / f"{name}-{stamp}"
+    base = Path("runs") / f"{file_name(name)}-{stamp}"
     return next(
         p for p in (base, *(base.with_name(f"{base.name}-{i}") for i in range(2, 1000))) if not p.exists()
     )

@@ -1,7 +1,43 @@
-"""Atomic file writes, and the folders bundled with the package."""
+"""File names made from any name, atomic file writes, and the folders bundled with the package."""
 
 import os
+import re
+from hashlib import sha256
 from pathlib import Path
+from unicodedata import normalize
+
+# Maximum length in bytes of what remains of a name; leaves room for the hash, prefixes and endings.
+_LONGEST_NAME = 120
+_HASH_DIGITS = 10
+_LOOKS_HASHED = re.compile(rf"(^|-)[0-9a-f]{{{_HASH_DIGITS}}}$")
+# Names that Windows reserves, with any ending.
+_DEVICES = frozenset(
+    ("CON", "PRN", "AUX", "NUL", *(f"{device}{i}" for device in ("COM", "LPT") for i in "0123456789¹²³"))
+)
+
+
+def file_name(name: str) -> str:
+    """Return a name for a file or folder that is safe everywhere: one component, no path, no device.
+
+    Names of letters, digits and ``_ - .`` stay as they are. Of all others a readable part remains, with a
+    hash of the name, so that different names give different files.
+
+    >>> file_name("AT1")
+    'AT1'
+    >>> file_name("../../etc/x"), file_name("")
+    ('etc-x-56da1a2ef2', 'e3b0c44298')
+    """
+    readable = _cut(re.sub(r"[^\w.-]+", "-", normalize("NFC", name)).strip("-."))
+    is_device = readable.partition(".")[0].upper() in _DEVICES
+    if readable and readable == name and not is_device and not _LOOKS_HASHED.search(name):
+        return name
+    digest = sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:_HASH_DIGITS]
+    readable = readable.replace(".", "-") if is_device else readable
+    return f"{readable}-{digest}" if readable else digest
+
+
+def _cut(text: str) -> str:
+    return text.encode("utf-8")[:_LONGEST_NAME].decode("utf-8", "ignore").strip("-.")
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:

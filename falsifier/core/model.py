@@ -2,18 +2,21 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import one_of, positive
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import SimulationError, did_you_mean
+from falsifier.errors import SimulationError, SpecError, did_you_mean
 
 Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
+_KINDS: tuple[str, ...] = get_args(Kind)
+_CAUSALITIES: tuple[str, ...] = get_args(Causality)
 
 # Smallest and largest number by type name; Integer (FMI 1 and 2) has 32 bits.
 _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
@@ -44,6 +47,11 @@ class Variable:
         literals: numbers of an enumeration's items by name.
         description: its meaning, from the model.
         type: name of its data type, such as ``Int8``; empty if unknown.
+        alias_of: the name to use instead, if the model has one variable for both; such a name can be read.
+        is_clocked: whether it belongs to clocks that never tick, so that it keeps its start value.
+
+    Raises:
+        SpecError: if the kind or the causality is not one of those that there are.
     """
 
     name: str
@@ -61,6 +69,17 @@ class Variable:
     literals: Mapping[str, int] = field(default_factory=dict)
     description: str = ""
     type: str = ""
+    alias_of: str = ""
+    is_clocked: bool = False
+
+    def __post_init__(self) -> None:
+        one_of("kind of a variable", self.kind, _KINDS)
+        one_of("causality of a variable", self.causality, _CAUSALITIES)
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether both ends of its range are known."""
+        return None not in self.limits
 
     @property
     def type_limits(self) -> tuple[int, int] | None:
@@ -87,11 +106,12 @@ class ModelInfo:
         interfaces: how it can be simulated.
         platforms: names of the platforms for which it contains binaries.
         tool: the tool that generated it.
+        start_time: start time of its default experiment in s, if given; simulations start at 0.
         stop_time: stop time of its default experiment in s, if given.
         step_size: step size of its default experiment in s, if given.
         tolerance: relative tolerance of its default experiment, if given.
         variables: all scalar variables.
-        clocks: names of the clocks that the importing tool would have to tick (FMI 3).
+        notes: what the user should know: what is ignored, unusual or needed, one sentence each.
     """
 
     name: str
@@ -100,11 +120,12 @@ class ModelInfo:
     interfaces: tuple[Interface, ...] = ()
     platforms: tuple[str, ...] = ()
     tool: str = ""
+    start_time: float | None = None
     stop_time: float | None = None
     step_size: float | None = None
     tolerance: float | None = None
     variables: tuple[Variable, ...] = ()
-    clocks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Variable:
         for variable in self.variables:
@@ -116,13 +137,13 @@ class ModelInfo:
         return any(v.name == name for v in self.variables)
 
     def with_causality(self, causality: Causality) -> tuple[Variable, ...]:
-        """Return the variables with this causality, in the model's order."""
-        return tuple(v for v in self.variables if v.causality == causality)
+        """Return the variables with this causality, in the model's order, except those of ignored clocks."""
+        return tuple(v for v in self.variables if v.causality == causality and not v.is_clocked)
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
-        """Input variables in the model's order."""
-        return self.with_causality("input")
+        """Input variables in the model's order; of several names for one input, the first."""
+        return tuple(v for v in self.with_causality("input") if not v.alias_of)
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
@@ -130,9 +151,21 @@ class ModelInfo:
         return self.with_causality("output")
 
     @property
+    def observables(self) -> tuple[Variable, ...]:
+        """Variables to write requirements about: the outputs; without any, the states or the locals."""
+        states = tuple(v for v in self.variables if v.is_state)
+        computed = (v for v in self.with_causality("local") if v.variability in ("continuous", "discrete"))
+        return self.outputs or states or tuple(computed)
+
+    @property
     def parameters(self) -> tuple[Variable, ...]:
-        """Parameters in the model's order."""
-        return self.with_causality("parameter")
+        """Parameters in the model's order; of several names for one parameter, the first."""
+        return tuple(v for v in self.with_causality("parameter") if not v.alias_of)
+
+
+# Relative tolerance for one time to be an integer multiple of another: with an interval of 1/30 s, rounding
+# prevents an exact multiple.
+GRID_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +180,10 @@ class Experiment:
             output interval.
         tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
         time_limit: maximum wall-clock time of one simulation in s.
+        strings: names and values of string parameters.
+
+    Raises:
+        SpecError: naming the attribute that is not as above.
     """
 
     stop_time: float
@@ -155,6 +192,24 @@ class Experiment:
     step_size: float | None = None
     tolerance: float | None = None
     time_limit: float = 60.0
+    strings: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("stop_time", "output_interval", "time_limit"):
+            positive(name, getattr(self, name))
+        for name in ("step_size", "tolerance"):
+            if (given := getattr(self, name)) is not None:
+                positive(name, given)
+        if not isinstance(self.outputs, tuple):
+            raise SpecError(f"outputs: expected a tuple of names, got {self.outputs!r}")
+        intervals = self.stop_time / self.output_interval
+        count = max(round(intervals), 1)
+        if abs(intervals - count) > GRID_ROUNDING * count:
+            raise SpecError(
+                f"stop_time = {self.stop_time:g} s is not an integer multiple of output_interval = "
+                f"{self.output_interval:g} s; try output_interval = {self.stop_time / count:g}",
+                key="output_interval",
+            )
 
     @property
     def samples(self) -> int:

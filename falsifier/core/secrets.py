@@ -43,8 +43,11 @@ _IN_TEXT = re.compile(
         )
     )
 )
-# Endings of environment variables whose values are removed from texts.
-_KEY_VARIABLES = ("_API_KEY", "_TOKEN", "_SECRET", "_ACCESS_KEY")
+# Environment variables whose values are removed from texts: fewer than those that are kept from FMUs, because
+# the values of others, such as a region or a path, may be part of any text.
+_KEY_VARIABLE = re.compile(
+    r"(_KEY|TOKEN|SECRET|PASSWORD|PASSWD|PASSPHRASE|_PASS|_PWD|(^|_)PAT|JWT|BEARER)$", re.IGNORECASE
+)
 # Shorter values are more likely ordinary words; removing them would garble messages.
 _SHORTEST = 6
 _REDACTED = "[redacted]"
@@ -74,13 +77,26 @@ def secrets_in(options: Mapping[str, Any]) -> list[str]:
 
 
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
-    """Return the text with secrets replaced: those given, those in the environment, and well-known keys."""
-    environment = (v for k, v in os.environ.items() if k.upper().endswith(_KEY_VARIABLES))
+    """Return a message with secrets replaced: given ones, held ones and whatever looks like a known key."""
+    return _IN_TEXT.sub(_REDACTED, redact_held(text, secrets))
+
+
+def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
+    """Return the text with only those secrets replaced that are given or in this process's environment.
+
+    For replies of language models, whose words and names may look like keys without being any.
+    """
+    held = (v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v))
     # Longest first: a secret that contains another one would otherwise be left in pieces.
-    for secret in sorted({*secrets, *environment}, key=len, reverse=True):
+    for secret in sorted({s.strip() for s in (*secrets, *held)}, key=len, reverse=True):
         if len(secret) >= _SHORTEST:
             text = text.replace(secret, _REDACTED)
-    return _IN_TEXT.sub(_REDACTED, text)
+    return text
+
+
+def holds_secrets(environment: Mapping[str, str]) -> bool:
+    """Whether an environment contains anything that ``scrubbed`` would remove."""
+    return len(scrubbed(environment)) < len(environment)
 
 
 def scrubbed(environment: Mapping[str, str]) -> dict[str, str]:

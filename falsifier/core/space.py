@@ -7,14 +7,15 @@ between vectors and candidates.
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from math import ceil, floor
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import finite, one_of, positive, whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.errors import CandidateError, did_you_mean
+from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal, even_times
+from falsifier.errors import CandidateError, SpecError, did_you_mean
 
 ValueKind = Literal["real", "integer", "boolean", "enumeration"]
 
@@ -30,10 +31,17 @@ class Freedom:
     Attributes:
         max_control_points: maximum number of control points.
         min_interval: minimum time in s between two control points.
+
+    Raises:
+        SpecError: if one of them is not positive.
     """
 
     max_control_points: int
     min_interval: float
+
+    def __post_init__(self) -> None:
+        whole("max_control_points", self.max_control_points, least=1)
+        positive("min_interval", self.min_interval)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +60,10 @@ class InputRange:
         description: its meaning, from the model.
         kind: type of its values; every type except real has integer values, held between control points.
         items: names and numbers of an enumeration's items.
+
+    Raises:
+        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them,
+            or the control points, interpolation or hold are not as above.
     """
 
     name: str
@@ -67,6 +79,14 @@ class InputRange:
     kind: ValueKind = "real"
     items: tuple[tuple[str, int], ...] = ()
 
+    def __post_init__(self) -> None:
+        what = f"input {self.name!r}"
+        _check_range(what, self)
+        whole(f"{what}: control_points", self.control_points, least=1)
+        one_of(f"{what}: interpolation", self.interpolation, INTERPOLATIONS)
+        if self.hold is not None:
+            positive(f"{what}: hold", self.hold)
+
 
 @dataclass(frozen=True, slots=True)
 class ParameterRange:
@@ -81,6 +101,9 @@ class ParameterRange:
         description: its meaning, from the model.
         kind: type of its value; every type except real has integer values.
         items: names and numbers of an enumeration's items.
+
+    Raises:
+        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them.
     """
 
     name: str
@@ -92,6 +115,9 @@ class ParameterRange:
     description: str = ""
     kind: ValueKind = "real"
     items: tuple[tuple[str, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        _check_range(f"parameter {self.name!r}", self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,11 +147,23 @@ class SearchSpace:
         inputs: searched input signals.
         parameters: searched parameters.
         stop_time: end of the simulation in s.
+
+    Raises:
+        SpecError: if the stop time is not positive, or a name occurs twice.
     """
 
     inputs: tuple[InputRange, ...]
     parameters: tuple[ParameterRange, ...]
     stop_time: float
+
+    def __post_init__(self) -> None:
+        positive("stop_time", self.stop_time)
+        for ranges, kind in ((self.inputs, InputRange), (self.parameters, ParameterRange)):
+            if not isinstance(ranges, tuple) or not all(isinstance(r, kind) for r in ranges):
+                raise SpecError(f"search space: expected a tuple of {kind.__name__}, got {ranges!r}")
+        for name in self.names:
+            if self.names.count(name) > 1:
+                raise SpecError(f"search space: {name!r} has two ranges; keep one")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -238,6 +276,19 @@ class SearchSpace:
         if admitted == (signal.times, signal.values, signal.hold):
             return signal
         return Signal(times, values, signal.interpolation, r.hold)
+
+
+def _check_range(what: str, ranged: InputRange | ParameterRange) -> None:
+    low, high = finite(f"{what}: low", ranged.low), finite(f"{what}: high", ranged.high)
+    if low > high:
+        raise SpecError(f"{what}: expected low <= high, got [{low:g}, {high:g}]")
+    one_of(f"{what}: kind", ranged.kind, get_args(ValueKind))
+    if ranged.kind == "real":
+        return
+    numbers = [n for _, n in ranged.items if low <= n <= high] if ranged.items else floor(high) >= ceil(low)
+    if not numbers:
+        missing = "item of the enumeration" if ranged.items else "integer"
+        raise SpecError(f"{what}: [{low:g}, {high:g}] contains no {missing}; widen the range")
 
 
 def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,19 +71,19 @@ class Trajectory:
         """Return this trajectory with further columns appended."""
         return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})}, self.log)
 
-    def save(self, path: Path) -> None:
+    def save(self, place: Path | IO[bytes]) -> None:
         """Write the trajectory, without its log, to a numpy archive (``.npz``)."""
         names = np.array(self.names)
         units = np.array([self.units.get(n, "") for n in self.names])
         stacked = (
             np.stack([self.columns[n] for n in self.names]) if self.columns else np.empty((0, len(self)))
         )
-        np.savez(path, times=self.times, names=names, units=units, columns=stacked)
+        np.savez(place, times=self.times, names=names, units=units, columns=stacked)
 
     @classmethod
-    def load(cls, path: Path) -> "Trajectory":
+    def load(cls, place: Path | IO[bytes]) -> "Trajectory":
         """Read a trajectory that ``save`` wrote."""
-        with np.load(path, allow_pickle=False) as archive:
+        with np.load(place, allow_pickle=False) as archive:
             names = [str(n) for n in archive["names"]]
             columns = archive["columns"]
             units = {n: str(u) for n, u in zip(names, archive["units"], strict=True) if str(u)}

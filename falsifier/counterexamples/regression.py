@@ -8,7 +8,7 @@ from falsifier.counterexamples.store import Database, Replayed, replay, to_store
 from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.problem import Problem
-from falsifier.search.budget import Budget
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
 
@@ -36,7 +36,7 @@ def check(
     problem: Problem,
     *,
     engine: str | None = None,
-    budget: Budget | int = 100,
+    budget: Budget | int = DEFAULT_SIMULATIONS,
     seed: int = 0,
     database: Database | None = None,
 ) -> Checked:

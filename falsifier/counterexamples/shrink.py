@@ -22,6 +22,9 @@ from falsifier.problem.problem import Problem
 Pass = Callable[[Problem, Candidate], Iterator[Candidate]]
 Progress = Callable[[Evaluation, int], None]
 
+# Share of the original's margin that a simpler counterexample keeps, unless another margin is demanded.
+KEPT_SHARE = 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class Shrunk:
@@ -32,12 +35,14 @@ class Shrunk:
         evaluation: the simplest violation found; the original if nothing simpler violates.
         simulations: number of simulations used.
         minimal: whether no pass can make it simpler; False if the budget ended first.
+        least_margin: the margin that every simpler counterexample had to keep.
     """
 
     original: Evaluation
     evaluation: Evaluation
     simulations: int
     minimal: bool
+    least_margin: float
 
 
 def shrink(
@@ -45,7 +50,7 @@ def shrink(
     evaluation: Evaluation,
     *,
     budget: int = 500,
-    margin: float = 0.0,
+    margin: float | None = None,
     progress: Progress = lambda evaluation, simulations: None,
 ) -> Shrunk:
     """Make a counterexample as simple as possible such that it still violates.
@@ -56,17 +61,19 @@ def shrink(
         problem: the problem whose requirement is violated.
         evaluation: the counterexample.
         budget: maximum number of simulations.
-        margin: the robustness must stay at or below minus this value.
+        margin: the robustness must stay at or below minus this value; default: half of the original's margin.
         progress: called with each simpler counterexample and the number of simulations so far.
 
     Raises:
         SpecError: if the evaluation does not violate by that margin.
     """
-    hunt = _Hunt(problem, budget, margin)
+    hunt = _Hunt(problem, budget, margin or 0.0)
     start = hunt.violation(problem.space.admit(evaluation.candidate))
     if start is None:
         violated = f"violated by {margin:g} or more" if margin else "violated"
         raise SpecError(f"nothing to shrink: {problem.name} is not {violated}")
+    if margin is None and start.robustness is not None:
+        hunt.margin = KEPT_SHARE * -start.robustness
     best, minimal = start, False
     try:
         hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
@@ -79,7 +86,7 @@ def shrink(
     except _BudgetUsedUpError:
         minimal = False
     unchanged = best.candidate.key == start.candidate.key
-    return Shrunk(evaluation, evaluation if unchanged else best, hunt.simulations, minimal)
+    return Shrunk(evaluation, evaluation if unchanged else best, hunt.simulations, minimal, hunt.margin)
 
 
 class _BudgetUsedUpError(Exception):

@@ -20,13 +20,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import write_whole
-from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError
+from falsifier.core.files import file_name, write_whole
+from falsifier.core.sealing import check_seal, seal
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source, reloadable, spec_file
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import ProblemSource, Target
 from falsifier.search import manifest
 from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.search.manifest import RequirementRecord
@@ -68,6 +69,7 @@ class StoredCounterexample(BaseModel):
     reason: str
     fmu_sha256: str | None = None
     falsifier: str = __version__
+    sum: str = Field("", description="Checksum of the file up to here; without it, nothing is checked.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,23 +138,38 @@ def save(stored: StoredCounterexample, path: Path) -> Path:
     """Write a counterexample file atomically, with the problem's paths relative to it; return its path."""
     request = stored.problem and _seen_from(stored.problem, path.parent)
     content = stored.model_copy(update={"problem": request}).model_dump(mode="json")
-    return write_whole(path, json.dumps(content, indent=2) + "\n")
+    del content["sum"]
+    return write_whole(path, seal(json.dumps(content, indent=2)))
 
 
-def load(path: Path) -> StoredCounterexample:
+def load(path: Path | str) -> StoredCounterexample:
     """Read a counterexample file, or the counterexample in a run directory.
 
     Raises:
         SpecError: naming the file and what is wrong with it.
     """
-    file = counterexample_file(path)
+    file = counterexample_file(Path(path))
     try:
-        stored = StoredCounterexample.model_validate_json(file.read_bytes())
+        content = file.read_bytes()
+        stored = StoredCounterexample.model_validate_json(content)
+    except OSError as error:
+        raise SpecError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise SpecError(f"not a counterexample file: {first['msg']}", file=str(file), key=key) from None
-    return stored.model_copy(update={"problem": stored.problem and _found_from(stored.problem, file.parent)})
+        why = rejected(first["msg"], first["input"])
+        if first["type"] == "json_invalid" or not key:
+            key, why = "", "expected the counterexample.json of a run, or a run directory"
+        raise SpecError(f"not a counterexample file: {why}", file=str(file), key=key) from None
+    try:
+        if stored.sum:
+            check_seal(content)
+    except ValueError as error:
+        raise SpecError(
+            f"damaged or edited: {error}; if it was edited on purpose, delete its key sum", file=str(file)
+        ) from None
+    found = stored.problem and _found_from(stored.problem, file.parent)
+    return stored.model_copy(update={"problem": found, "sum": ""})
 
 
 def counterexample_file(path: Path) -> Path:
@@ -185,13 +202,13 @@ def counterexample_file(path: Path) -> Path:
     return found[0]
 
 
-def file_name(requirement: str = "") -> str:
+def file_of(requirement: str = "") -> str:
     """Name of the counterexample's file in a run directory; with the requirement if several share a search.
 
-    >>> file_name(), file_name("AT1")
+    >>> file_of(), file_of("AT1")
     ('counterexample.json', 'counterexample-AT1.json')
     """
-    return f"counterexample-{requirement}.json" if requirement else FILE_NAME
+    return f"counterexample-{file_name(requirement)}.json" if requirement else FILE_NAME
 
 
 def keep_recorded(directory: Path) -> None:
@@ -204,12 +221,12 @@ def keep_recorded(directory: Path) -> None:
         return
     described = manifest.read(directory)
     records = read_journal(directory)
-    evaluations: dict[str, list[Evaluation]] = {}
+    evaluations: dict[str, dict[int, Evaluation]] = {}
     for record in records:
         if not isinstance(record, ConfirmedRecord) or record.outcome != "confirmed":
             continue
         name = record.requirement
-        file = directory / file_name(name if described.shared else "")
+        file = directory / file_of(name if described.shared else "")
         if file.exists():
             continue
         if name not in evaluations:
@@ -293,7 +310,7 @@ class Database:
 
     def _place(self, problem: Problem) -> Path:
         spec = None if problem.source is None else spec_file(problem.source)
-        return self.folder / (f"{spec.stem}.{problem.name}" if spec else problem.name)
+        return self.folder / file_name(f"{spec.stem}.{problem.name}" if spec else problem.name)
 
 
 def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
@@ -307,10 +324,10 @@ def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
 
 def _split(target: str) -> tuple[Path | None, str]:
     """Split a target into its file (None for a bundled name) and the rest with its colon."""
-    if target.endswith((".toml", ".fmu")):
-        return Path(target), ""
-    file, colon, requirement = target.rpartition(":")
-    return (Path(file), f":{requirement}") if colon and file.endswith(".toml") else (None, "")
+    parts = Target.parse(target)
+    if not parts.file:
+        return None, ""
+    return Path(parts.file), f":{parts.requirement}" if parts.requirement else ""
 
 
 def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
@@ -16,6 +16,13 @@ from falsifier.problem.problem import Problem
 # Single precision in the rollout of learnt dynamics, double precision elsewhere.
 Array = NDArray[np.floating[Any]]
 Vector = Array
+# Engines learn from numbers up to this one: products of larger ones overflow in single precision.
+_LARGEST = 1e25
+
+
+def learnable(numbers: ArrayLike) -> NDArray[np.float64]:
+    """Return numbers, of any shape, with infinite and huge ones cut to what can be calculated with."""
+    return np.clip(np.asarray(numbers, dtype=np.float64), -_LARGEST, _LARGEST)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from falsifier.engines.box import Array
+from falsifier.engines.box import Array, learnable
+
+# Limits of length scales in the unit box: far beyond them rounding makes the covariance indefinite.
+_SHORTEST, _LONGEST = 1e-3, 1e3
 
 
 def matern(distance: Array) -> Array:
@@ -60,7 +63,7 @@ def fit_lengths(
     points: Array, targets: Array, start: Array, rng: np.random.Generator, *, noise: float
 ) -> GaussianProcess:
     """Fit with the most likely of several length scales near ``start``, scaled jointly and individually."""
-    tried = [start * factor for factor in (1.0, 0.5, 0.8, 1.25, 2.0)]
+    tried = [np.clip(start * factor, _SHORTEST, _LONGEST) for factor in (1.0, 0.5, 0.8, 1.25, 2.0)]
     tried += [np.clip(start * np.exp(0.4 * rng.standard_normal(len(start))), 0.1, 20.0) for _ in range(12)]
     processes = [GaussianProcess.fit(points, targets, lengths, noise=noise) for lengths in tried]
     return max(processes, key=lambda process: process.evidence)
@@ -73,6 +76,7 @@ def standardised(costs: Array) -> Array:
     """
     from scipy.special import ndtri
 
+    costs = learnable(costs)
     count = len(costs)
     ranks = np.argsort(np.argsort(costs, kind="stable"), kind="stable") / max(count - 1, 1)
     scores = (costs - costs.mean()) / (costs.std() + 1e-12)

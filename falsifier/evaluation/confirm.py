@@ -150,10 +150,10 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
 
 
 def _second_monitor(problem: Problem, trajectory: Trajectory) -> tuple[float | None, str]:
-    from falsifier.stl import reference
+    from falsifier.stl import second_monitor
 
     try:
-        return reference.robustness(problem.requirement.formula, trajectory), ""
+        return second_monitor.robustness(problem.requirement.formula, trajectory), ""
     except FalsifierError as error:
         return None, f"could not be evaluated by rtamt: {error}"
 

@@ -16,6 +16,8 @@ from falsifier.errors import ModelError
 # Far more than exporters write (a few MB, or several hundred with tables), far less than fills a disk.
 _MAX_BYTES = 8 << 30
 _MAX_FILES = 100_000
+# A description of 100,000 variables takes 20 to 30 MB and seconds to read.
+_MAX_TEXT_BYTES = 128 << 20
 # Text compresses by a factor of 5 to 20, a file of zeros by 1000: only a zip bomb is both large and this
 # dense.
 _MAX_COMPRESSION = 300
@@ -74,13 +76,19 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def read_entry(path: Path, name: str) -> bytes:
-    """Return the contents of one file of an FMU.
+    """Return the contents of one text file of an FMU.
 
     Raises:
-        ModelError: if the archive is rejected or does not contain the file.
+        ModelError: if the archive is rejected or does not contain the file, or the file is too large.
     """
     with open_archive(path) as archive:
         try:
+            size = archive.getinfo(name).file_size
+            if size > _MAX_TEXT_BYTES:
+                raise ModelError(
+                    f"{path}: {name} has {size >> 20} MiB, more than {_MAX_TEXT_BYTES >> 20}; export the "
+                    "model with fewer variables"
+                )
             return archive.read(name)
         except KeyError:
             raise ModelError(
@@ -151,7 +159,8 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
             f"{path}: rejected because it would unpack to {total / 2**30:.1f} GiB; at most "
             f"{_MAX_BYTES >> 30} GiB are allowed"
         )
-    for name, count in Counter(entry.filename for entry in entries).items():
+    # Some tools list folders several times, which does no harm.
+    for name, count in Counter(entry.filename for entry in entries if not entry.is_dir()).items():
         if count > 1:
             raise ModelError(f"{path}: rejected because it contains {name!r} {count} times")
     for entry in entries:

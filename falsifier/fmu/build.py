@@ -1,37 +1,34 @@
 """Compiling an FMU that contains its C sources for this platform."""
 
 import importlib.util
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
+from falsifier.core.words import counted
 from falsifier.errors import ModelError
 from falsifier.fmu import archive
 from falsifier.fmu.description import read_description
+from falsifier.fmu.simulator import FmuModel
+from falsifier.fmu.sources import Sources, find_sources
 
 _COMPILERS = ("cc", "gcc", "clang")
 # Generated code of large models can take many minutes to compile.
 _TIME_LIMIT_SECONDS = 1800
-_SHOWN_LINES = 20
-
-
-@dataclass(frozen=True, slots=True)
-class _Sources:
-    """What one library is compiled from: file names below ``sources``, and preprocessor macros."""
-
-    files: tuple[str, ...]
-    defines: Mapping[str, str]
+_SHOWN_ERRORS = 5
+_ERROR = re.compile(r"\berror:|undefined (reference|symbol)", re.IGNORECASE)
 
 
 def build(path: Path, out: Path) -> Path:
     """Compile the sources of an FMU and write a copy of it with a library for this platform.
+
+    The copy is loaded before it is written.
 
     Args:
         path: path of an FMU with sources.
@@ -41,18 +38,19 @@ def build(path: Path, out: Path) -> Path:
         The path of the FMU that was written.
 
     Raises:
-        ModelError: if it has no sources, there is no compiler, or the sources do not compile.
+        ModelError: if it has no sources, there is no compiler, the sources do not compile, or the result
+            cannot be loaded.
     """
     description = read_description(path)
     with tempfile.TemporaryDirectory(prefix="falsifier-build-") as name:
         folder = Path(name)
         archive.extract(path, folder)
         for identifier in sorted(set(description.identifiers.values())):
-            sources = _find_sources(path, folder, description.major, identifier)
+            sources = find_sources(path, folder, description.major, identifier)
             target = folder / archive.library_file(description.info.fmi_version, identifier)
             target.parent.mkdir(parents=True, exist_ok=True)
-            _compile(path, folder / "sources", sources, target)
-        _pack(folder, out)
+            _compile(path, folder / "sources", sources, target, description.major)
+        _write(path, folder, out)
     return out
 
 
@@ -73,43 +71,15 @@ def compiler() -> list[str]:
     )
 
 
-def _find_sources(path: Path, folder: Path, major: int, identifier: str) -> _Sources:
-    """Return the files and macros of one library as listed in the FMU; if none are listed, all C files."""
-    listed = _listed_3(folder) if major == 3 else _listed_2(folder, identifier)
-    everything = sorted(str(p.relative_to(folder / "sources")) for p in (folder / "sources").glob("*.c"))
-    files = listed.files or tuple(everything)
-    if not files:
-        raise ModelError(f"{path}: contains no C sources; export it with sources or for this platform")
-    missing = [f for f in files if not (folder / "sources" / f).is_file()]
-    if missing:
-        raise ModelError(f"{path}: the source files {', '.join(missing)} are missing; export it again")
-    return _Sources(files, listed.defines)
-
-
-def _listed_2(folder: Path, identifier: str) -> _Sources:
-    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
-    for interface in (*root.findall("CoSimulation"), *root.findall("ModelExchange")):
-        files = tuple(f.attrib["name"] for f in interface.findall("SourceFiles/File"))
-        if files and interface.get("modelIdentifier") == identifier:
-            return _Sources(files, {})
-    return _Sources((), {})
-
-
-def _listed_3(folder: Path) -> _Sources:
-    build_description = folder / "sources" / "buildDescription.xml"
-    if not build_description.is_file():
-        return _Sources((), {})
-    root = ElementTree.parse(build_description).getroot()
-    files = tuple(f.attrib["name"] for f in root.findall("BuildConfiguration/SourceFileSet/SourceFile"))
-    macros = root.findall("BuildConfiguration/SourceFileSet/PreprocessorDefinition")
-    return _Sources(files, {m.attrib["name"]: m.get("value", "") for m in macros})
-
-
-def _compile(path: Path, folder: Path, sources: _Sources, target: Path) -> None:
+def _compile(path: Path, folder: Path, sources: Sources, target: Path, major: int) -> None:
     defines = [f"-D{name}={value}" if value else f"-D{name}" for name, value in sources.defines.items()]
+    # FMI 2 and 3 sources may put a prefix before all function names, which libraries must not have. It has no
+    # effect if the header is read before the sources define it.
+    header = ("-include", f"fmi{major}Functions.h") if major > 1 else ()
     command: Sequence[str] = [
-        *compiler(), "-O2", "-w", "-shared", "-fPIC", "-I.", f"-I{_headers()}", *defines,
-        *sources.files, *(() if sys.platform == "win32" else ("-lm",)), "-o", str(target),
+        *compiler(), "-O2", "-w", "-shared", "-fPIC", *(f"-I{name}" for name in sources.includes),
+        f"-I{_headers()}", *defines, *header, *sources.files,
+        *(() if sys.platform == "win32" else ("-lm",)), "-o", str(target),
     ]  # fmt: skip
     try:
         done = subprocess.run(
@@ -118,8 +88,16 @@ def _compile(path: Path, folder: Path, sources: _Sources, target: Path) -> None:
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ModelError(f"{path}: the compiler did not finish ({error})") from error
     if done.returncode:
-        said = "\n".join(done.stderr.strip().splitlines()[:_SHOWN_LINES])
-        raise ModelError(f"{path}: the sources do not compile with {command[0]}:\n{said}")
+        raise ModelError(f"{path}: the sources do not compile with {command[0]}: {_summary(done.stderr)}")
+
+
+def _summary(said: str) -> str:
+    """Return the compiler's errors in short: generated code repeats the same one hundreds of times."""
+    lines = said.strip().splitlines()
+    errors = [line.strip() for line in lines if _ERROR.search(line)]
+    shown = list(dict.fromkeys(errors))[:_SHOWN_ERRORS] or lines[-_SHOWN_ERRORS:]
+    count = f"{counted(len(errors), 'error')}, the first:" if len(errors) > len(shown) else ""
+    return "\n  ".join([count, *shown])
 
 
 def _headers() -> Path:
@@ -130,9 +108,17 @@ def _headers() -> Path:
     return Path(spec.submodule_search_locations[0]) / "c-code"
 
 
-def _pack(folder: Path, out: Path) -> None:
+def _write(path: Path, folder: Path, out: Path) -> None:
+    """Pack the folder, load the result, and only then move it to its place."""
     partial = out.with_name(out.name + ".partial")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as packed:
-        for file in sorted(p for p in folder.rglob("*") if p.is_file()):
-            packed.write(file, file.relative_to(folder).as_posix())
-    partial.replace(out)
+    try:
+        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as packed:
+            for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+                packed.write(file, file.relative_to(folder).as_posix())
+        for interface in read_description(partial).info.interfaces:
+            FmuModel(partial, interface).load()
+        partial.replace(out)
+    except ModelError as error:
+        raise ModelError(f"{path}: the sources compile, but the result cannot be used: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)

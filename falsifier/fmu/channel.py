@@ -1,15 +1,20 @@
 """Messages between this process, the nursery and the workers: small headers over a local stream socket.
 
-Workers run untrusted code, so they reply with numbers and text, never with pickles.
+Workers run untrusted code, which may write to the socket too. So they reply with numbers and text, never with
+pickles, and whatever does not look like a reply ends the connection.
 """
 
 import contextlib
+import math
 import os
+import select
 import socket
 import struct
 import time
 from dataclasses import dataclass
 from typing import Literal
+
+from falsifier.core.printable import printable
 
 Status = Literal["ok", "failed", "crashed", "timeout", "unusable"]
 # Waking up a process takes about 40 microseconds on either side, which is a lot compared with a simulation
@@ -19,7 +24,13 @@ QUICK_SECONDS = 500e-6
 _STATUSES: tuple[Status, ...] = ("ok", "failed", "crashed", "timeout", "unusable")
 
 _REQUEST = struct.Struct("<BBI")
-_REPLY = struct.Struct("<BBBdI")
+_REPLY = struct.Struct("<4sBBBdI")
+_MARK = b"\xf0fmu"
+_MOST_TEXT = 1 << 20
+# The rest of a message that has begun to arrive is on its way.
+_REST_SECONDS = 2.0
+# Requests fit into the socket's buffer unless a worker has stopped reading.
+_SENDING_SECONDS = 30.0
 _TIMEVAL = struct.Struct("@ll")
 
 
@@ -46,6 +57,17 @@ class Closed(Exception):
     """The other end has closed the connection."""
 
 
+class Garbled(Closed):
+    """The other end has sent something that is not a reply, so the connection cannot be used any more."""
+
+
+def open_channel() -> tuple[socket.socket, socket.socket]:
+    """Return both ends of a new connection: for requests, and for replies."""
+    ours, theirs = socket.socketpair()
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _time_limit(_SENDING_SECONDS))
+    return ours, theirs
+
+
 def send_request(
     sock: socket.socket, kind: int, payload: bytes = b"", descriptors: tuple[int, ...] = ()
 ) -> None:
@@ -70,7 +92,7 @@ def receive_request(sock: socket.socket) -> tuple[int, bytes, list[int]]:
     """
     try:
         kind, count, length = _REQUEST.unpack(_exactly(sock, _REQUEST.size))
-        payload = _exactly(sock, length)
+        payload = _exactly(sock, length) if length else b""
         descriptors = socket.recv_fds(sock, 1, count)[1] if count else []
         return kind, payload, descriptors
     except ConnectionError as error:
@@ -79,29 +101,41 @@ def receive_request(sock: socket.socket) -> tuple[int, bytes, list[int]]:
 
 def send_reply(sock: socket.socket, reply: Reply) -> None:
     """Send one reply; a reader that has closed the connection is ignored."""
-    text = reply.text.encode("utf-8", "replace")
-    header = _REPLY.pack(_STATUSES.index(reply.status), reply.more, reply.leaving, reply.time, len(text))
+    text = reply.text.encode("utf-8", "replace")[:_MOST_TEXT]
+    header = _REPLY.pack(
+        _MARK, _STATUSES.index(reply.status), reply.more, reply.leaving, reply.time, len(text)
+    )
     with contextlib.suppress(ConnectionError):
         sock.sendall(header + text)
 
 
-def receive_reply(sock: socket.socket, limit: float) -> Reply:
-    """Wait for one reply, at most ``limit`` seconds.
+def receive_reply(sock: socket.socket, limit: float, life: int | None = None) -> Reply:
+    """Wait for a reply, at most ``limit`` seconds.
+
+    Args:
+        sock: connection to the process that replies.
+        limit: number of seconds.
+        life: see ``posix.open_life``. What the other process has forked keeps the connection open, so its
+            end alone does not say that the process has ended.
 
     Raises:
         TimeoutError: if there was none.
-        Closed: if the other end has closed the connection.
+        Closed: if the other end has closed the connection, or its process has ended.
+        Garbled: if what arrived is not a reply.
     """
-    # The kernel's timeout: after Python's settimeout, recv would wait in spite of MSG_DONTWAIT, see watch.
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _time_limit(limit))
     try:
-        status, more, leaving, reached, length = _REPLY.unpack(_exactly(sock, _REPLY.size))
-        text = _exactly(sock, length).decode("utf-8", "replace") if length else ""
-        return Reply(_STATUSES[status], text, reached, bool(more), bool(leaving))
-    except BlockingIOError:
-        raise TimeoutError from None
+        header = _exactly(sock, _REPLY.size, limit, life)
+        mark, status, more, leaving, reached, length = _REPLY.unpack(header)
+        if mark != _MARK or status >= len(_STATUSES) or more > 1 or leaving > 1 or length > _MOST_TEXT:
+            raise Garbled
+        try:
+            text = _exactly(sock, length, _REST_SECONDS).decode("utf-8", "replace") if length else ""
+        except TimeoutError:
+            raise Garbled from None
     except ConnectionError as error:
         raise Closed from error
+    reached = reached if math.isfinite(reached) else -1.0
+    return Reply(_STATUSES[status], printable(text), reached, bool(more), bool(leaving))
 
 
 def watch(sock: socket.socket, seconds: float) -> None:
@@ -126,19 +160,55 @@ def close_all(descriptors: list[int]) -> None:
 
 
 def _time_limit(seconds: float) -> bytes:
-    whole, rest = divmod(seconds, 1.0)
+    # Zero would mean that there is no limit.
+    whole, rest = divmod(max(seconds, 1e-6), 1.0)
     return _TIMEVAL.pack(int(whole), int(rest * 1e6))
 
 
-def _exactly(sock: socket.socket, count: int) -> bytes:
-    if not count:
-        return b""
-    data = sock.recv(count)
-    while 0 < len(data) < count:
-        part = sock.recv(count - len(data))
-        if not part:
-            break
-        data += part
-    if len(data) < count:
+def _exactly(sock: socket.socket, count: int, limit: float | None = None, life: int | None = None) -> bytes:
+    """Receive this many bytes.
+
+    Args:
+        sock: where from.
+        count: how many, at least one.
+        limit: maximum number of seconds to wait for the first byte; None: no limit.
+        life: ends the wait for the first byte when it becomes readable.
+
+    Raises:
+        TimeoutError: if nothing arrives in time.
+        Garbled: if something arrives in time, but the rest does not follow.
+        Closed: if the other end closes the connection before.
+    """
+    data = _received(sock, count, limit, life)
+    until = time.perf_counter() + _REST_SECONDS
+    while len(data) < count:
+        left = until - time.perf_counter() if limit is not None else None
+        if left is not None and left <= 0:
+            raise Garbled
+        try:
+            data += _received(sock, count - len(data), left)
+        except TimeoutError:
+            raise Garbled from None
+    return data
+
+
+def _received(sock: socket.socket, count: int, limit: float | None, life: int | None = None) -> bytes:
+    if limit is not None:
+        with contextlib.suppress(BlockingIOError):
+            return _some(sock.recv(count, socket.MSG_DONTWAIT))
+        waiting = select.poll()
+        waiting.register(sock, select.POLLIN)
+        if life is not None:
+            waiting.register(life, select.POLLIN)
+        ready = [descriptor for descriptor, _ in waiting.poll(max(0.0, limit) * 1e3)]
+        if not ready:
+            raise TimeoutError
+        if sock.fileno() not in ready:
+            raise Closed
+    return _some(sock.recv(count))
+
+
+def _some(data: bytes) -> bytes:
+    if not data:
         raise Closed
     return data

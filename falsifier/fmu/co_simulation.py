@@ -40,7 +40,8 @@ class CoSimulation(Stepper):
             status, where = loops.enter_step_mode(functions)
             self._check(status, where, 0.0)
         self._read_first()
-        step = plan.stop_time / plan.steps
+        stop_time, steps = float(plan.stop_time), plan.steps
+        step = stop_time / steps
         pieces, held_pieces = self._pieces(self._other_rows), self._pieces(self._held_rows)
         # The compiled loop stores the current piece (int64) and the last value (float64) of each input here.
         memory = np.zeros(2 * len(plan.inputs))
@@ -53,12 +54,14 @@ class CoSimulation(Stepper):
             memory.ctypes.data + 8 * len(plan.inputs),
         )
         first, chunk = 0, _FIRST_CHUNK
-        while first < plan.steps:
+        while first < steps:
             started = time.perf_counter()
-            last = min(first + chunk, plan.steps)
-            loops.co_simulate(functions, *inputs, *self._record, step, first, last, plan.every, report)
+            last = min(first + chunk, steps)
+            loops.co_simulate(
+                functions, *inputs, *self._record, stop_time, steps, first, last, plan.every, report
+            )
             status, where, done = report.tolist()
-            if done == plan.steps and where in (loops.DONE, loops.TERMINATED):
+            if done == steps and where in (loops.DONE, loops.TERMINATED):
                 return
             self._check(status, where, done * step)
             self._watch_clock(deadline, done * step)

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
-from math import prod
-from pathlib import Path
+from math import isfinite, prod
+from pathlib import Path, PurePosixPath
 from typing import cast
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -16,6 +16,9 @@ from xml.etree.ElementTree import Element
 from falsifier.core.model import Causality, Interface, Kind, ModelInfo, Variable
 from falsifier.errors import ModelError, did_you_mean
 from falsifier.fmu import archive
+from falsifier.fmu.libraries import find_libraries
+from falsifier.fmu.remarks import input_clocks, remarks, with_aliases_marked
+from falsifier.fmu.slot import Slot
 
 # Element name -> (kind, type code). The type code names the FMU's get and set functions for the value.
 _TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
@@ -33,10 +36,16 @@ _TYPES_3: Mapping[str, tuple[Kind, str]] = {
     "Enumeration": ("enumeration", "Int64"),
     "String": ("string", "String"),
 }
+# Simulink writes the largest double for an open limit, Dymola 1e30 or more, OpenModelica 1e60, others INF.
+_NO_LIMIT = 1e30
 _INTERFACE_TAGS: Mapping[str, Interface] = {
     "CoSimulation": "co-simulation",
     "ModelExchange": "model-exchange",
 }
+# Limits of what descriptions may contain; real ones stay far below.
+_MAX_ELEMENTS = 1_000_000
+_LONGEST_NAME = 10_000
+_LARGEST_REFERENCE = 2**32 - 1
 _CAUSALITIES: Mapping[str, Causality] = {
     "input": "input",
     "output": "output",
@@ -48,34 +57,14 @@ _CAUSALITIES: Mapping[str, Causality] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
-    """How to access one scalar in the FMU.
-
-    Attributes:
-        reference: value reference of the variable or, for an element, of its array.
-        type: type code, e.g. ``Real``, ``Float32``, ``Boolean``.
-        offset: position in the array in row-major order, 0 for scalars.
-        size: number of elements of the array, 1 for scalars.
-        negated: whether it is an FMI 1 alias with the opposite sign.
-        refusal: why it cannot be set; empty if it can.
-    """
-
-    reference: int
-    type: str
-    offset: int = 0
-    size: int = 1
-    negated: bool = False
-    refusal: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class Description:
     """Contents of a modelDescription.xml.
 
     Attributes:
         info: what other packages need.
         token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
-        identifiers: file name of the library without suffix, by interface.
+        identifiers: model identifier by interface.
+        libraries: path of this platform's library inside the archive, by interface; missing if there is none.
         slots: how to access each scalar variable, by name.
         arrays: start values of all elements by value reference, for arrays only.
         states: number of continuous states (FMI 1 and 2; FMI 3 reports it at run time).
@@ -89,6 +78,7 @@ class Description:
     token: str
     identifiers: Mapping[Interface, str]
     slots: Mapping[str, Slot]
+    libraries: Mapping[Interface, PurePosixPath] = field(default_factory=dict)
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     states: int = 0
     indicators: int = 0
@@ -143,9 +133,13 @@ def describe(path: Path, sha256: str) -> Description:
     text = archive.read_entry(path, "modelDescription.xml")
     try:
         root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # also an unknown encoding
         raise ModelError(f"{path}: modelDescription.xml is not well-formed XML ({error})") from error
-    return parse(root, name=str(path), platforms=archive.platforms(archive.entry_names(path)))
+    names = archive.entry_names(path)
+    described = parse(root, name=str(path), platforms=archive.platforms(names))
+    info = described.info
+    libraries, said = find_libraries(names, info.fmi_version, described.identifiers)
+    return replace(described, info=replace(info, notes=(*info.notes, *said)), libraries=libraries)
 
 
 def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Description:
@@ -162,6 +156,10 @@ def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Descr
     version = root.get("fmiVersion", "")
     if version[:1] not in ("1", "2", "3"):
         raise ModelError(f"{name}: fmiVersion is {version!r}; export it as FMI 1.0, 2.0 or 3.0")
+    for element in root.iter():
+        text = element.get("description", "")
+        if len(text) > _LONGEST_NAME:
+            element.set("description", f"{text[:_LONGEST_NAME]} ...")
     try:
         return _parse(root, version, platforms)
     except (KeyError, ValueError, IndexError) as error:
@@ -173,27 +171,32 @@ def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Descr
 def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Description:
     major = int(version[0])
     identifiers, needs_tool = _interfaces(root, major)
+    for name in (root.attrib["modelName"], *identifiers.values(), root.get("generationTool", "")):
+        _check_length(name)
     arrays: dict[int, tuple[float, ...]] = {}
     variables: list[Variable] = []
     slots: dict[str, Slot] = {}
     for variable, slot in _variables_3(root, arrays) if major == 3 else _variables_1_2(root, major):
+        _check_variable(variable, slot, slots)
         variables.append(variable)
         slots[variable.name] = slot
+    marked, slots = with_aliases_marked(variables, slots)
     experiment = _child(root, "DefaultExperiment")
     co_simulation = root.find("CoSimulation")
-    clocks = root.findall("ModelVariables/Clock")
+    start_time, tool = _number(experiment.get("startTime")), root.get("generationTool", "")
     info = ModelInfo(
         name=root.attrib["modelName"],
         description=root.get("description", ""),
         fmi_version=version,
         interfaces=tuple(identifiers),
         platforms=platforms,
-        tool=root.get("generationTool", ""),
+        tool=tool,
+        start_time=start_time,
         stop_time=_number(experiment.get("stopTime")),
         step_size=_number(experiment.get("stepSize")),
         tolerance=_number(experiment.get("tolerance")),
-        variables=tuple(variables),
-        clocks=tuple(c.attrib["name"] for c in clocks if c.get("causality") == "input"),
+        variables=marked,
+        notes=remarks(root, marked, start_time=start_time, tool=tool, needs_tool=needs_tool),
     )
     return Description(
         info=info,
@@ -207,6 +210,19 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         needs_tool=needs_tool,
         saves_state=_saving(root),
     )
+
+
+def _check_length(name: str) -> None:
+    if len(name) > _LONGEST_NAME:
+        raise ValueError(f"the name {name[:40]!r}... has more than {_LONGEST_NAME} characters")
+
+
+def _check_variable(variable: Variable, slot: Slot, known: Mapping[str, Slot]) -> None:
+    _check_length(variable.name)
+    if variable.name in known:
+        raise ValueError(f"two variables are named {variable.name!r}")
+    if not 0 <= slot.reference <= _LARGEST_REFERENCE:
+        raise ValueError(f"value reference {slot.reference} of {variable.name!r} does not fit 32 bits")
 
 
 def _number_of_states(root: Element, major: int) -> int:
@@ -246,7 +262,9 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
     elements = root.findall("ModelVariables/ScalarVariable")
     states = _states_2(root, elements)
     for position, element in enumerate(elements, start=1):
-        typed = next(child for child in element if child.tag in _TYPES_1_2)
+        typed = next((child for child in element if child.tag in _TYPES_1_2), None)
+        if typed is None:
+            raise ValueError(f"variable {element.attrib['name']!r} has no type")
         kind, code = _TYPES_1_2[typed.tag]
         declared = types.get(typed.get("declaredType", ""))
         definition = None if declared is None else next(iter(declared), None)
@@ -258,10 +276,10 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
                 kind=kind,
                 causality=causality,
                 variability=variability,
-                unit=attributes.get("unit", ""),
-                display_unit=attributes.get("displayUnit", ""),
-                low=_number(attributes.get("min")),
-                high=_number(attributes.get("max")),
+                unit=_unit(attributes.get("unit")),
+                display_unit=_unit(attributes.get("displayUnit")),
+                low=_limit(attributes.get("min")),
+                high=_limit(attributes.get("max")),
                 nominal=_number(attributes.get("nominal")),
                 start=_start(kind, typed.get("start")),
                 settable=not refusal,
@@ -296,6 +314,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         int(elements[int(d.attrib["valueReference"])].attrib["derivative"])
         for d in root.findall("ModelStructure/ContinuousStateDerivative")
     }
+    ticked = set(input_clocks(root))
     for reference, element in elements.items():
         if element.tag not in _TYPES_3:
             continue
@@ -305,10 +324,13 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         starts = _starts_3(kind, element)
         default = "continuous" if kind == "real" else "discrete"
         causality, variability, refusal = _role(element, 3, default, has_start=bool(starts))
-        if element.get("clocks"):
-            refusal = "it belongs to a clock; clocks are not supported"
+        clocks = set(map(int, element.get("clocks", "").split()))
+        if clocks:
+            refusal = "it belongs to a clock; only the FMU itself may change it"
         shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
         count = prod(shape)
+        if not 0 <= count <= _MAX_ELEMENTS:
+            raise ValueError(f"array {element.get('name')!r} has {count} elements, not 0 to {_MAX_ELEMENTS}")
         starts = starts * count if len(starts) == 1 else starts
         if shape and kind != "string":
             arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
@@ -317,16 +339,17 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
             kind=kind,
             causality=causality,
             variability=variability,
-            unit=attributes.get("unit", ""),
-            display_unit=attributes.get("displayUnit", ""),
-            low=_number(attributes.get("min")),
-            high=_number(attributes.get("max")),
+            unit=_unit(attributes.get("unit")),
+            display_unit=_unit(attributes.get("displayUnit")),
+            low=_limit(attributes.get("min")),
+            high=_limit(attributes.get("max")),
             nominal=_number(attributes.get("nominal")),
             settable=not refusal,
             is_state=reference in states,
             literals=_literals(definition),
             description=element.get("description", ""),
             type=code,
+            is_clocked=bool(clocks) and (clocks <= ticked or causality == "input"),
         )
         names = [(variable.name, variable.description)]
         names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
@@ -340,7 +363,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
                         description=description,
                         start=starts[offset] if starts else None,
                     ),
-                    Slot(reference, code, offset, count, refusal=refusal),
+                    Slot(reference, code, offset, count, refusal=refusal, declared=variable.name),
                 )
 
 
@@ -403,8 +426,20 @@ def _child(root: Element, tag: str) -> Mapping[str, str]:
 
 
 def _number(text: str | None) -> float | None:
-    return None if text is None else float(text)
+    number = None if text is None else float(text)
+    return number if number is not None and isfinite(number) else None  # NaN and infinity limit nothing
+
+
+def _limit(text: str | None) -> float | None:
+    """Return a min or max; None for the huge numbers with which tools write that there is none."""
+    number = _number(text)
+    return None if number is None or not abs(number) < _NO_LIMIT else number
 
 
 def _flag(text: str | None) -> bool:
     return text is not None and text.strip() in ("true", "1")
+
+
+def _unit(text: str | None) -> str:
+    """Return a unit; empty for 1, which FMUs use for dimensionless variables."""
+    return "" if text in (None, "1") else str(text)

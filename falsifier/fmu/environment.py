@@ -2,7 +2,18 @@
 
 from collections.abc import Mapping
 
-from falsifier.core.secrets import scrubbed
+from falsifier.core.secrets import holds_secrets, scrubbed
+from falsifier.fmu import posix
+
+
+def protect_secrets(environment: Mapping[str, str]) -> None:
+    """Keep FMUs from reading this process's secrets where they are not confined to their own processes.
+
+    On Linux, any process could otherwise read the environment of another one of the same user. Without
+    secrets, or if FMUs can be confined, this process stays open to debuggers.
+    """
+    if holds_secrets(environment) and not posix.can_confine():
+        posix.hide_memory()
 
 
 def worker_environment(environment: Mapping[str, str]) -> dict[str, str]:

@@ -1,18 +1,17 @@
 """Simulation in this process, for benchmarks and tests: a crash of the FMU crashes this process too."""
 
 import atexit
-import shutil
-import tempfile
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.printable import printable
 from falsifier.errors import SimulationError
 from falsifier.fmu import archive
 from falsifier.fmu.buffers import Room
+from falsifier.fmu.folders import WorkFolder
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.session import Session
 from falsifier.fmu.worker_order import Order, Reuse
@@ -24,12 +23,15 @@ class LocalFmu:
     def __init__(self, order: Order) -> None:
         self._lock = threading.Lock()
         self._log: list[str] = []
-        self._folder = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
+        self._folder = WorkFolder()
+        folder = self._folder.path
         try:
-            archive.extract(order.path, self._folder)
-            self._session = Session(order.description, self._folder, order.interface, self._log.append)
+            archive.extract(order.path, folder)
+            self._session = Session(
+                order.description, folder, order.interface, self._say, logging=order.logging
+            )
         except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.remove()
             raise
         self._plan: Plan | None = None
         self._reuse: Reuse | None = order.reuse
@@ -62,28 +64,31 @@ class LocalFmu:
     def close(self) -> None:
         """Unload the library and remove the folder."""
         self._session.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.remove()
+
+    def _say(self, line: str) -> None:
+        self._log.append(printable(line))
 
 
-_FMUS: dict[tuple[str, str], LocalFmu] = {}
+_FMUS: dict[tuple[str, str, bool], LocalFmu] = {}
 
 
 def fmu(order: Order) -> LocalFmu:
     """Return the FMU as loaded in this process; load it if necessary."""
-    key = (order.sha256, order.interface)
+    key = (order.sha256, order.interface, order.logging)
     if key not in _FMUS:
         _FMUS[key] = LocalFmu(order)
     return _FMUS[key]
 
 
-def drop(sha256: str, interface: str) -> None:
+def drop(sha256: str, interface: str, *, logging: bool = False) -> None:
     """Unload an FMU, if it is loaded."""
-    found = _FMUS.pop((sha256, interface), None)
+    found = _FMUS.pop((sha256, interface, logging), None)
     if found is not None:
         found.close()
 
 
 @atexit.register
 def _close_all() -> None:
-    for key in list(_FMUS):
-        drop(*key)
+    for sha256, interface, logging in list(_FMUS):
+        drop(sha256, interface, logging=logging)

@@ -7,190 +7,29 @@ a SimulationError.
 
 import atexit
 import contextlib
-import fcntl
-import json
-import logging
-import mmap
 import os
-import pickle
-import shutil
-import signal
-import socket
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import IO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import FailureStatus, ModelError, SimulationError
-from falsifier.fmu import nursery
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
-    QUICK_SECONDS,
     Closed,
+    Garbled,
     Reply,
-    receive_reply,
     send_request,
-    watch,
 )
-from falsifier.fmu.environment import worker_environment
+from falsifier.fmu.failure_text import how_it_ended, last_lines, simulation_error
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.worker import PREPARE, RUN
-from falsifier.fmu.worker_order import Order, Reuse
-
-_LOG = logging.getLogger(__name__)
-
-# The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
-_GRACE_SECONDS = 0.1
-# Loading an FMU may start the runtime of a tool or contact a licence server.
-_LOADING_SECONDS = 120.0
-# The nursery imports numba and may compile the model-exchange solver, slowly on a busy machine.
-_STARTING_SECONDS = 300.0
-_MAX_LOG_BYTES = 64 << 10
-
-_BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
-    "from falsifier.fmu.nursery import main; main(int(sys.argv[2]), Path(sys.argv[3]))"
-)
-
-
-class Nursery:
-    """The process from which this one's workers are forked; started at once, waited for when first needed."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._root = Path(tempfile.mkdtemp(prefix="falsifier-fmu-"))
-        self._sock, theirs = socket.socketpair()
-        paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-I", "-c", _BOOT, paths, str(theirs.fileno()), str(self._root)],
-                env=worker_environment(os.environ),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
-                start_new_session=True,
-            )
-        self._ready = False
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether the process is running."""
-        return self._process.poll() is None
-
-    def start_worker(self, order: Order, connection: int, log: int) -> int:
-        """Fork a worker that serves the connection; return its process id.
-
-        Raises:
-            ModelError: if the FMU cannot be unpacked or the nursery has ended.
-        """
-        return int(self._ask(nursery.START, pickle.dumps(order), (connection, log)))
-
-    def reap(self, pid: int) -> int:
-        """Wait for a worker to end; return its exit code, negative for a signal."""
-        return int(self._ask(nursery.REAP, str(pid).encode(), ()))
-
-    def close(self) -> None:
-        """End the process with all its workers and remove its folder."""
-        self._sock.close()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(5.0)
-        self._process.kill()
-        self._process.wait()
-        shutil.rmtree(self._root, ignore_errors=True)
-
-    def forget(self) -> None:
-        """Close the connection in a forked copy of this process; the nursery belongs to the original."""
-        self._sock.close()
-
-    def _ask(self, kind: int, payload: bytes, descriptors: tuple[int, ...]) -> str:
-        with self._lock:
-            try:
-                if not self._ready:
-                    receive_reply(self._sock, _STARTING_SECONDS)
-                    self._ready = True
-                send_request(self._sock, kind, payload, descriptors)
-                reply = receive_reply(self._sock, _STARTING_SECONDS)
-                while reply.more:
-                    _LOG.warning(reply.text)
-                    reply = receive_reply(self._sock, _STARTING_SECONDS)
-            except (Closed, TimeoutError) as error:
-                raise ModelError(
-                    "the process that starts the FMU workers has ended or hangs; see the messages above"
-                ) from error
-        if reply.status != "ok":
-            raise ModelError(reply.text)
-        return reply.text
-
-
-class _Worker:
-    """One worker process, the memory shared with it, and its messages."""
-
-    def __init__(self, owner: Nursery, order: Order) -> None:
-        self._owner = owner
-        self.log = _anonymous_file()
-        # Append mode, so that output after take_log truncated the file starts at its new end.
-        fcntl.fcntl(self.log, fcntl.F_SETFL, fcntl.fcntl(self.log, fcntl.F_GETFL) | os.O_APPEND)
-        self.sock, theirs = socket.socketpair()
-        with theirs:
-            self.pid = owner.start_worker(order, theirs.fileno(), self.log.fileno())
-        self.plan: Plan | None = None
-        self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
-        self.awaits_test = False
-        self.is_quick = False
-
-    def prepare(self, plan: Plan) -> Reply:
-        """Share memory for a plan with the worker, which then looks up the plan's variables."""
-        size = max(Room.size(plan) * 8, 8)
-        with _anonymous_file() as file:
-            file.truncate(size)
-            self.room = Room.over(plan, _floats(file, size))
-            send_request(self.sock, PREPARE, pickle.dumps(plan), (file.fileno(),))
-        reply = receive_reply(self.sock, _LOADING_SECONDS)
-        self.plan = plan if reply.status == "ok" else None
-        return reply
-
-    def wait(self, limit: float) -> Reply:
-        """Return the outcome of the simulation under way, waiting at most ``limit`` seconds.
-
-        Raises:
-            TimeoutError: if there is none by then.
-            Closed: if the process has died.
-        """
-        started = time.perf_counter()
-        if self.is_quick:
-            watch(self.sock, QUICK_SECONDS)
-        reply = receive_reply(self.sock, limit)
-        self.is_quick = time.perf_counter() - started < QUICK_SECONDS
-        return reply
-
-    def take_log(self) -> tuple[str, ...]:
-        """Return the lines that the FMU has written since the last call; only the end of long output."""
-        size = os.fstat(self.log.fileno()).st_size
-        if not size:
-            return ()
-        text = os.pread(self.log.fileno(), _MAX_LOG_BYTES, max(0, size - _MAX_LOG_BYTES))
-        self.log.truncate(0)
-        return tuple(text.decode("utf-8", "replace").splitlines())
-
-    def kill(self) -> int:
-        """End the process; return its exit code, negative for a signal."""
-        # A process that has already ended keeps its own exit code.
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self.pid, signal.SIGKILL)
-        self.sock.close()
-        self.log.close()
-        try:
-            return self._owner.reap(self.pid)
-        except ModelError:
-            # The nursery has ended, so the exit code is unknown; the next worker comes from a new nursery.
-            return 0
+from falsifier.fmu.processes import GRACE_SECONDS, Nursery, WorkerProcess
+from falsifier.fmu.trust import Trust
+from falsifier.fmu.worker import RUN
+from falsifier.fmu.worker_order import REUSES, Order, Reuse
 
 
 class IsolatedFmu:
@@ -198,14 +37,19 @@ class IsolatedFmu:
 
     def __init__(self, owner: Callable[[], Nursery], order: Order) -> None:
         self._owner, self._order = owner, order
-        self._worker: _Worker | None = None
-        self._reuse: Reuse | None = None
+        self._worker: WorkerProcess | None = None
+        self._has_loaded = False
+        self._trust = Trust()
         self._lock = threading.Lock()
 
     def simulate(
         self, plan: Plan, fill: Callable[[Room], None]
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         """Simulate once.
+
+        A simulation that fails in a process that has simulated before is repeated in a new one before it
+        counts as failed: the reuse may be to blame. If it is, the FMU's instances are not reused any more.
+        The repetition asks the FMU for messages, which most FMUs give only on request.
 
         Args:
             plan: what the simulations have in common.
@@ -220,34 +64,81 @@ class IsolatedFmu:
         """
         with self._lock:
             worker = self._worker_for(plan)
+            is_reused, reuse = worker.simulations > 0, self._trust.reuse
             try:
-                fill(worker.room)
-                worker = self._started(worker, plan, fill)
-                reply = worker.wait(plan.time_limit + _GRACE_SECONDS)
-            except TimeoutError:
-                raise self._end(
-                    f"did not finish within the time limit of {plan.time_limit:g} s and was stopped",
-                    "timeout",
-                ) from None
-            except Closed:
-                raise self._end("", "crashed") from None
-            except BaseException:
-                # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
-                self._drop()
-                raise
-            if reply.status == "unusable":
-                self._drop()
-                raise ModelError(reply.text)
-            if reply.status != "ok":
-                log = worker.take_log()
-                self._drop()
-                raise _error(reply, log)
-            outputs = worker.room.outputs.copy()
+                return self._simulate(worker, plan, fill)
+            except SimulationError as error:
+                if not self._should_repeat(error, is_reused=is_reused):
+                    raise
+                failure = error
+            try:
+                speaking = self._speaking_worker(plan)
+            except (ModelError, SimulationError):
+                raise failure from None
+            repeated = self._simulate(speaking, plan, fill)
+            if is_reused and reuse is not None:
+                self._trust.distrust(reuse)
+            return repeated
+
+    def load(self, plan: Plan) -> None:
+        """Load the library and make an instance, without a simulation.
+
+        Raises:
+            ModelError: if that fails.
+        """
+        with self._lock:
+            self._worker_for(plan)
+
+    def _should_repeat(self, error: SimulationError, *, is_reused: bool) -> bool:
+        if error.status == "timeout" or (self._order.logging and not is_reused):
+            return False
+        return (is_reused and error.status == "crashed") or self._trust.is_worth_repeating()
+
+    def _speaking_worker(self, plan: Plan) -> WorkerProcess:
+        """Return a new worker that asks the FMU for messages; it serves one simulation."""
+        self._drop()
+        order = replace(self._order, logging=True, reuse="process")
+        worker = self._worker = WorkerProcess(self._owner(), order)
+        self._prepare(worker, plan, is_new=True)
+        return worker
+
+    def _simulate(
+        self, worker: WorkerProcess, plan: Plan, fill: Callable[[Room], None]
+    ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        try:
+            fill(worker.room)
+            worker = self._started(worker, plan, fill)
+            reply = worker.wait(plan.time_limit + GRACE_SECONDS)
+        except TimeoutError:
+            raise self._end(
+                f"did not finish within the time limit of {plan.time_limit:g} s and was stopped; "
+                "slow models need a larger time_limit",
+                "timeout",
+            ) from None
+        except Garbled:
+            raise self._end("the FMU disturbed the replies of its process", "crashed") from None
+        except Closed:
+            raise self._end("", "crashed") from None
+        except BaseException:
+            # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
+            self._drop()
+            raise
+        if reply.status == "unusable":
+            self._drop()
+            raise ModelError(reply.text)
+        if reply.status != "ok":
             log = worker.take_log()
-            worker.awaits_test = reply.more
-            if reply.leaving:
-                self._drop()
-            return outputs, log
+            self._drop()
+            raise simulation_error(reply, log)
+        outputs = worker.room.outputs.copy()
+        log = worker.take_log()
+        if not worker.simulations:
+            self._trust.took(time.perf_counter() - worker.started)
+        worker.simulations += 1
+        worker.awaits_test = reply.more
+        if reply.leaving:
+            self._drop()
+        return outputs, log
 
     def close(self) -> None:
         """End the worker."""
@@ -260,7 +151,7 @@ class IsolatedFmu:
             self._worker.sock.close()
             self._worker = None
 
-    def _started(self, worker: _Worker, plan: Plan, fill: Callable[[Room], None]) -> _Worker:
+    def _started(self, worker: WorkerProcess, plan: Plan, fill: Callable[[Room], None]) -> WorkerProcess:
         """Start the simulation, in a new worker if this one has died since its last simulation."""
         try:
             send_request(worker.sock, RUN)
@@ -271,49 +162,78 @@ class IsolatedFmu:
             send_request(worker.sock, RUN)
         return worker
 
-    def _worker_for(self, plan: Plan) -> _Worker:
+    def _worker_for(self, plan: Plan) -> WorkerProcess:
         if self._worker is not None and self._worker.awaits_test:
-            self._await_test(self._worker, plan)
+            self._await_test(self._worker)
         worker = self._worker
+        is_new = worker is None
         if worker is None:
-            order = replace(self._order, reuse=self._reuse)
-            worker = self._worker = _Worker(self._owner(), order)
-        if worker.plan is not plan:
-            self._prepare(worker, plan)
-        return worker
+            trust = self._trust
+            order = replace(self._order, reuse=trust.reuse, untrusted=trust.untrusted)
+            worker = self._worker = WorkerProcess(self._owner(), order)
+        if worker.plan is plan:
+            return worker
+        try:
+            is_prepared = self._prepare(worker, plan, is_new=is_new)
+        except ModelError:
+            if worker.logging or not self._trust.is_worth_repeating():
+                raise
+            # Once more, to hear why.
+            return self._speaking_worker(plan)
+        return worker if is_prepared else self._worker_for(plan)
 
-    def _prepare(self, worker: _Worker, plan: Plan) -> None:
+    def _prepare(self, worker: WorkerProcess, plan: Plan, *, is_new: bool) -> bool:
+        """Prepare a worker; return False if an old one has died since its last simulation."""
         try:
             reply = worker.prepare(plan)
         except (Closed, TimeoutError) as error:
-            how = "hung" if isinstance(error, TimeoutError) else "crashed"
-            log = worker.take_log()
-            code = self._drop()
-            raise ModelError(
-                f"{self._order.path}: the FMU {how} while it was loaded ({_how_it_ended(code)})"
-                + "".join(f"\n  {line}" for line in log[-5:])
-            ) from None
+            if isinstance(error, Closed) and not is_new:
+                self._drop()
+                return False
+            raise self._not_loaded(worker, error, plan.time_limit) from None
         except BaseException:
             self._drop()
             raise
         if reply.status != "ok":
+            log = worker.take_log()
             self._drop()
-            raise ModelError(f"{self._order.path}: {reply.text}")
+            text = f"{self._order.path}: {reply.text}{last_lines(log)}"
+            # What has loaded before is not unusable for that.
+            raise SimulationError(text) if reply.status == "failed" and self._has_loaded else ModelError(text)
+        self._has_loaded = True
+        return True
 
-    def _await_test(self, worker: _Worker, plan: Plan) -> None:
-        """Receive the result of the worker's reuse test; if it crashed or hung, never reuse a process."""
+    def _not_loaded(self, worker: WorkerProcess, error: Exception, time_limit: float) -> Exception:
+        """Error of an FMU that crashed or hung while it was loaded: unusable if it has never been loaded."""
+        log = worker.take_log()
+        code = self._drop()
+        hangs = isinstance(error, TimeoutError)
+        how = f"hung for {time_limit:g} s (time_limit)" if hangs else "crashed"
+        text = (
+            f"{self._order.path}: the FMU {how} while it was loaded ({how_it_ended(code)}){last_lines(log)}"
+        )
+        if not self._has_loaded:
+            return ModelError(text)
+        return SimulationError(text, status="timeout" if hangs else "crashed", log=log)
+
+    def _await_test(self, worker: WorkerProcess) -> None:
+        """Receive the result of the worker's reuse test; what crashed or hung is not tried again."""
         worker.awaits_test = False
+        trust = self._trust
         try:
-            reply = receive_reply(worker.sock, 5 * plan.time_limit + _GRACE_SECONDS)
+            reply = worker.receive(trust.patience)
+            while reply.more:
+                trust.trying = _reuse(reply)
+                reply = worker.receive(trust.patience)
         except (Closed, TimeoutError):
-            self._reuse = "process"
+            trust.distrust(trust.trying)
             self._drop()
             return
         except BaseException:
             self._drop()
             raise
         worker.take_log()
-        self._reuse = cast(Reuse, reply.text)
+        trust.reuse = _reuse(reply)
         if reply.leaving:
             self._drop()
 
@@ -323,42 +243,17 @@ class IsolatedFmu:
         log = worker.take_log()
         code = self._drop()
         name = self._order.description.info.name
-        reason = reason or f"the FMU's process crashed: {_how_it_ended(code)}"
-        return SimulationError(f"{name}: {reason}" + _last_line(log), status=status, log=log)
+        reason = reason or f"the FMU's process crashed: {how_it_ended(code)}"
+        return SimulationError(f"{name}: {reason}" + last_lines(log), status=status, log=log)
 
     def _drop(self) -> int:
         worker, self._worker = self._worker, None
         return 0 if worker is None else worker.kill()
 
 
-def _error(reply: Reply, log: tuple[str, ...]) -> SimulationError:
-    time = None if reply.time < 0 else reply.time
-    status: FailureStatus = "timeout" if reply.status == "timeout" else "failed"
-    return SimulationError(reply.text + _last_line(log), status=status, time=time, log=log)
-
-
-def _last_line(log: tuple[str, ...]) -> str:
-    return f"; its last message: {log[-1]}" if log else ""
-
-
-def _how_it_ended(code: int) -> str:
-    if code >= 0:
-        return f"it exited with code {code}"
-    try:
-        return f"signal {signal.Signals(-code).name}"
-    except ValueError:
-        return f"signal {-code}"
-
-
-def _anonymous_file() -> IO[bytes]:
-    """Open a file without a name, in memory if the system supports that."""
-    if hasattr(os, "memfd_create"):
-        return os.fdopen(os.memfd_create("falsifier-fmu"), "w+b")
-    return tempfile.TemporaryFile()
-
-
-def _floats(file: IO[bytes], size: int) -> NDArray[np.float64]:
-    return np.frombuffer(mmap.mmap(file.fileno(), size), dtype=np.float64)
+def _reuse(reply: Reply) -> Reuse:
+    """Read a kind of reuse from the reply of a process that may send anything."""
+    return reply.text if reply.text in REUSES else "process"
 
 
 class _Registry:
@@ -367,7 +262,7 @@ class _Registry:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._nursery: Nursery | None = None
-        self._fmus: dict[tuple[str, str], IsolatedFmu] = {}
+        self._fmus: dict[tuple[str, str, bool], IsolatedFmu] = {}
         atexit.register(self.close)
         os.register_at_fork(after_in_child=self.forget)
 
@@ -381,16 +276,16 @@ class _Registry:
             return self._nursery
 
     def fmu(self, order: Order) -> IsolatedFmu:
-        key = (order.sha256, order.interface)
+        key = (order.sha256, order.interface, order.logging)
         found = self._fmus.get(key)
         if found is None:
             with self._lock:
                 found = self._fmus.setdefault(key, IsolatedFmu(self.nursery, order))
         return found
 
-    def drop(self, sha256: str, interface: str) -> None:
+    def drop(self, sha256: str, interface: str, *, logging: bool = False) -> None:
         with self._lock:
-            found = self._fmus.pop((sha256, interface), None)
+            found = self._fmus.pop((sha256, interface, logging), None)
         if found is not None:
             found.close()
 

@@ -3,6 +3,7 @@
 import ctypes
 import os
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,9 @@ LogSink = Callable[[str], None]
 
 def status_name(status: int) -> str:
     """Return the name of an FMI status."""
-    return _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {status}"
+    return (
+        _STATUS_NAMES[status] if 0 <= status < len(_STATUS_NAMES) else f"status {ctypes.c_int(status).value}"
+    )
 
 
 def load_binding() -> None:
@@ -39,19 +42,28 @@ class Library:
         folder: folder to which the FMU was extracted.
         interface: interface to instantiate.
         log: called with each of the FMU's messages.
+        logging: whether to ask the FMU for messages.
 
     Raises:
         ModelError: if the library is missing, cannot be loaded or cannot be instantiated.
     """
 
-    def __init__(self, description: Description, folder: Path, interface: Interface, log: LogSink) -> None:
+    def __init__(
+        self,
+        description: Description,
+        folder: Path,
+        interface: Interface,
+        log: LogSink,
+        *,
+        logging: bool = False,
+    ) -> None:
         self.description = description
         self.interface = interface
-        self._log = log
+        self._log, self._logging = log, logging
         self._prefix = f"fmi{description.major}"
-        self._check_binary(folder)
+        binary = self._binary(folder)
         try:
-            self._fmu = self._load(folder)
+            self._fmu = self._load(folder, binary)
         except Exception as error:
             raise ModelError(f"{description.info.name}: the library cannot be loaded: {error}") from error
         self._instantiate()
@@ -81,7 +93,8 @@ class Library:
             raise ModelError(
                 f"{self.description.info.name}: the library does not export {self._symbol(name)}"
             )
-        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *argument_types)
+        # Unsigned, so that negative statuses, which FMI does not define, are larger than all others.
+        prototype = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p, *argument_types)
         return prototype(address)
 
     def getters(self) -> dict[str, int]:
@@ -100,6 +113,8 @@ class Library:
     def close(self) -> None:
         """Free the instance and unload the library."""
         self._free()
+        if self._log in _LISTENERS:
+            _LISTENERS.remove(self._log)
         self._fmu.freeLibrary()
 
     def _symbol(self, name: str) -> str:
@@ -108,24 +123,35 @@ class Library:
             return f"{self.description.identifiers[self.interface]}_fmi{name}"
         return self._prefix + name
 
-    def _check_binary(self, folder: Path) -> None:
+    def _binary(self, folder: Path) -> Path:
+        """Return the path of the library.
+
+        Raises:
+            ModelError: if there is none for this platform, or several with other names than expected.
+        """
         info = self.description.info
-        identifier = self.description.identifiers[self.interface]
-        file = archive.library_file(info.fmi_version, identifier)
-        if (folder / file).is_file():
-            return
-        has_sources = any((folder / "sources").glob("*.c"))
+        found = self.description.libraries.get(self.interface)
+        if found is not None:
+            return folder / found
+        expected = archive.library_file(info.fmi_version, self.description.identifiers[self.interface])
+        others = sorted(p.name for p in (folder / expected.parent).glob(f"*{expected.suffix}"))
+        if others:
+            raise ModelError(
+                f"{info.name}: {expected} is missing; the folder contains {', '.join(others)} instead, and "
+                "the model identifier tells which one to load: export the FMU again"
+            )
+        has_sources = any((folder / "sources").rglob("*.c"))
         cure = (
             "it contains C sources: compile them with `falsifier build`"
             if has_sources
             else "export it again for this platform"
         )
         raise ModelError(
-            f"{info.name}: no binary for {archive.this_platform()} ({file} is missing), "
+            f"{info.name}: no binary for {archive.this_platform()} ({expected} is missing), "
             f"only {', '.join(info.platforms) or 'no binaries at all'}; {cure}"
         )
 
-    def _load(self, folder: Path) -> Any:
+    def _load(self, folder: Path, binary: Path) -> Any:
         from fmpy import fmi1, fmi2, fmi3
 
         classes: dict[tuple[int, Interface], Any] = {
@@ -140,6 +166,7 @@ class Library:
             guid=self.description.token,
             modelIdentifier=self.description.identifiers[self.interface],
             unzipDirectory=str(folder),
+            libraryPath=str(binary),
             instanceName=self.description.info.name,
             requireFunctions=False,
         )
@@ -159,13 +186,15 @@ class Library:
             raise ModelError(f"{self.description.info.name}: instantiating the FMU failed")
 
     def _arguments(self) -> dict[str, Any]:
+        arguments: dict[str, Any] = {"loggingOn": self._logging}
         if self.description.major == 3:
-            arguments: dict[str, Any] = {"logMessage": self._log_3}
+            arguments["logMessage"] = self._log_3
             if self.interface == "co-simulation":
                 events = self.description.event_mode
                 arguments |= {"eventModeUsed": events, "earlyReturnAllowed": events}
             return arguments
-        return {"functions" if self.description.major == 1 else "callbacks": self._callbacks()}
+        arguments["functions" if self.description.major == 1 else "callbacks"] = self._callbacks()
+        return arguments
 
     def _callbacks(self) -> Any:
         """Return the callbacks of FMI 1 and 2; fmpy's proxy expands the printf-style messages."""
@@ -173,7 +202,7 @@ class Library:
 
         version: Any = fmi1 if self.description.major == 1 else fmi2
         callbacks = getattr(version, f"{self._prefix}CallbackFunctions")()
-        callbacks.logger = getattr(version, f"{self._prefix}CallbackLoggerTYPE")(self._log_1_2)
+        callbacks.logger = _logger(getattr(version, f"{self._prefix}CallbackLoggerTYPE"))
         callbacks.allocateMemory = getattr(version, f"{self._prefix}CallbackAllocateMemoryTYPE")(calloc)
         callbacks.freeMemory = getattr(version, f"{self._prefix}CallbackFreeMemoryTYPE")(free)
         try:
@@ -181,12 +210,8 @@ class Library:
         except (ImportError, OSError):
             return callbacks
         addLoggerProxy(ctypes.byref(callbacks))
+        _LISTENERS[:] = [self._log]
         return callbacks
-
-    def _log_1_2(
-        self, _component: object, _name: bytes, status: int, _category: bytes, message: bytes
-    ) -> None:
-        self._log(_line(status, message))
 
     def _log_3(self, _environment: object, status: int, _category: bytes, message: bytes) -> None:
         self._log(_line(status, message))
@@ -200,6 +225,24 @@ class Library:
         }.get((self.description.major, self.interface), "FreeInstance")
         self.function(name)(self.component)
         self._fmu.component = None
+
+
+# What hears the messages of FMI 1 and 2: the FMU that was instantiated last, or nothing once it is closed.
+_LISTENERS: list[Callable[[str], None]] = []
+
+
+@cache
+def _logger(callback_type: Any) -> Any:
+    """Return the logger of FMI 1 or 2.
+
+    It is never freed: fmpy's proxy has one logger per process, which other FMUs call when this one has gone.
+    """
+
+    def log(_component: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+        for listener in _LISTENERS or [print]:
+            listener(_line(status, message))
+
+    return callback_type(log)
 
 
 def _line(status: int, message: bytes | None) -> str:

@@ -21,6 +21,8 @@ _STEPS_PER_CLOCK_CHECK = 2000
 _DEFAULT_TOLERANCE = 1e-6
 # Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7).
 _ABSOLUTE_SHARE = 0.01
+# Maximum number of states, and of event indicators: an FMU may report anything.
+_MOST_VALUES = 100_000
 
 _NAMES = {
     1: (
@@ -137,7 +139,7 @@ class ModelExchange(Stepper):
     def _sizes(self, description: Description) -> tuple[int, int]:
         """Return the number of states and of event indicators; FMI 3 reports them only at run time."""
         if description.major < 3:
-            return description.states, description.indicators
+            return self._checked(description.states, description.indicators)
         sizes = []
         for name in ("GetNumberOfContinuousStates", "GetNumberOfEventIndicators"):
             size = ctypes.c_size_t()
@@ -147,4 +149,10 @@ class ModelExchange(Stepper):
             ):
                 raise ModelError(f"{self._name}: {name} failed")
             sizes.append(size.value)
-        return sizes[0], sizes[1]
+        return self._checked(*sizes)
+
+    def _checked(self, states: int, indicators: int) -> tuple[int, int]:
+        for number, what in ((states, "continuous states"), (indicators, "event indicators")):
+            if not 0 <= number <= _MOST_VALUES:
+                raise ModelError(f"{self._name}: {number} {what}; expected 0 to {_MOST_VALUES}")
+        return states, indicators

@@ -6,22 +6,19 @@ it removes when its parent ends, however that happens.
 """
 
 import contextlib
-import ctypes
 import os
 import pickle
-import resource
-import shutil
 import signal
 import socket
-import sys
 import tempfile
 import traceback
 from pathlib import Path
 from typing import NoReturn
 
 from falsifier.errors import FalsifierError, ModelError
-from falsifier.fmu import archive, worker
+from falsifier.fmu import archive, posix, worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
+from falsifier.fmu.folders import remove_tree, remove_work_folder
 from falsifier.fmu.stepper import warm_up
 from falsifier.fmu.worker_order import Order
 
@@ -30,12 +27,13 @@ START, REAP = 1, 2
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
 _COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
-_LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
 
 
 def main(descriptor: int, root: Path) -> None:
     """Serve the parent on a socket until it closes; FMUs are extracted below ``root``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Workers adopt what their FMUs fork; of a worker that has crashed, this process does.
+    posix.adopt_orphans()
     sock = socket.socket(fileno=descriptor)
     nursery = _Nursery(sock, root)
     try:
@@ -65,11 +63,13 @@ class _Nursery:
 
     def close(self) -> None:
         for pid in self._scratch:
+            posix.end_group(pid)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
             with contextlib.suppress(ChildProcessError):
                 os.waitpid(pid, 0)
-        shutil.rmtree(self._root, ignore_errors=True)
+        posix.end_descendants()
+        remove_work_folder(self._root)
 
     def _start(self, order: Order, descriptors: list[int]) -> Reply:
         connection, log = descriptors
@@ -78,11 +78,11 @@ class _Nursery:
             if order.interface == "model-exchange":
                 self._load_solver()
             scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
+            me = os.getpid()
             pid = os.fork()
             if not pid:
                 self._sock.close()
-                os.chdir(scratch)
-                _become_worker(connection, log, order, folder)
+                _become_worker(me, connection, log, order, folder, scratch)
         except (FalsifierError, OSError) as error:
             return Reply("unusable", str(error))
         finally:
@@ -103,8 +103,11 @@ class _Nursery:
         self._has_solver = True
 
     def _reap(self, pid: int) -> Reply:
+        posix.end_group(pid)
         _, status = os.waitpid(pid, 0)
-        shutil.rmtree(self._scratch.pop(pid), ignore_errors=True)
+        scratch = self._scratch.pop(pid)
+        posix.end_descendants(keep=self._scratch)
+        remove_tree(scratch)
         return Reply(text=str(os.waitstatus_to_exitcode(status)))
 
     def _extracted(self, order: Order) -> Path:
@@ -120,37 +123,28 @@ class _Nursery:
         return folder
 
 
-def _become_worker(connection: int, log: int, order: Order, folder: Path) -> NoReturn:
+def _become_worker(
+    parent: int, connection: int, log: int, order: Order, folder: Path, scratch: Path
+) -> NoReturn:
     """Run this newly forked process as a worker and exit."""
     code = 1
     try:
+        posix.end_with_parent(parent)
+        posix.adopt_orphans()
+        os.setpgid(0, 0)
+        os.chdir(scratch)
         for stream in (1, 2):
             os.dup2(log, stream)
-        _limit_resources()
-        _flush_lines()
+        os.close(log)
+        posix.limit_resources(_MEMORY_SHARE)
+        posix.flush_lines()
+        posix.confine()
         with socket.socket(fileno=os.dup(connection)) as sock:
             os.close(connection)
-            worker.serve(sock, order.description, folder, order.interface, order.reuse)
+            worker.serve(sock, order, folder)
         code = 0
     except BaseException:
         traceback.print_exc()
     finally:
         # Skip the nursery's own clean-up: this copy of it must not remove the folder or end other workers.
         os._exit(code)
-
-
-def _limit_resources() -> None:
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if sys.platform == "linux":
-        # RLIMIT_DATA counts what a model allocates, not the address space that runtimes merely reserve.
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-        limit = int(memory * _MEMORY_SHARE)
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
-
-
-def _flush_lines() -> None:
-    """Make C's stdout line-buffered, so that what the FMU printed before a crash is not lost."""
-    libc = ctypes.CDLL(None)
-    with contextlib.suppress(AttributeError, ValueError):
-        stdout = ctypes.c_void_p.in_dll(libc, "stdout")
-        libc.setvbuf(stdout, None, _LINE_BUFFERED, 0)

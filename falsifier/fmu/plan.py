@@ -3,12 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from falsifier.core.model import Experiment
-from falsifier.errors import ModelError, SpecError
+from falsifier.core.model import GRID_ROUNDING, Experiment
+from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description import Description
-
-# Maximum relative distance of a ratio of two steps from an integer at which it counts as that integer.
-_RATIO_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +23,7 @@ class Plan:
         max_step: maximum step of the solver in s (model exchange).
         tolerance: relative tolerance; None for the model's default.
         time_limit: maximum wall-clock time of one simulation in s.
+        strings: names and values of string parameters.
     """
 
     inputs: tuple[str, ...]
@@ -38,6 +36,7 @@ class Plan:
     max_step: float
     tolerance: float | None
     time_limit: float
+    strings: tuple[tuple[str, str], ...] = ()
 
     @property
     def steps(self) -> int:
@@ -70,6 +69,7 @@ def make_plan(
         max_step=experiment.step_size or experiment.output_interval,
         tolerance=experiment.tolerance,
         time_limit=experiment.time_limit,
+        strings=experiment.strings,
     )
     model = description.info.name
     kinds = {v.name: v for v in description.info.variables}
@@ -87,29 +87,29 @@ def make_plan(
             raise ModelError(f"{model}: {name!r} cannot be set: {slot.refusal}")
     for name in plan.outputs:
         description.slot(name)
+    for name, _ in plan.strings:
+        _check_string(description, name)
     return plan
 
 
+def _check_string(description: Description, name: str) -> None:
+    model, slot = description.info.name, description.slots.get(name)
+    if slot is None:
+        raise ModelError(f"{model}: no variable {name!r}; {did_you_mean(name, description.slots)}")
+    if slot.refusal or slot.type != "String" or slot.size != 1:
+        reason = slot.refusal or "it is not a single string"
+        raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
+
+
 def _steps_per_output(experiment: Experiment) -> int:
-    interval, stop = experiment.output_interval, experiment.stop_time
-    if not 0 < interval <= stop * (1 + _RATIO_ROUNDING):
-        raise SpecError(
-            f"expected 0 < output_interval <= stop_time, got {interval:g} s and {stop:g} s",
-            key="output_interval",
-        )
-    _whole("stop_time", stop, "output_interval", interval)
-    if experiment.step_size is None:
+    interval, step = experiment.output_interval, experiment.step_size
+    if step is None:
         return 1
-    return _whole("output_interval", interval, "step_size", experiment.step_size)
-
-
-def _whole(what: str, total: float, key: str, part: float) -> int:
-    ratio = total / part if part > 0 else 0.0
-    count = round(ratio)
-    if count < 1 or abs(ratio - count) > _RATIO_ROUNDING * count:
+    count = max(round(interval / step), 1)
+    if abs(interval / step - count) > GRID_ROUNDING * count:
         raise SpecError(
-            f"{what} = {total:g} s is not an integer multiple of {key} = {part:g} s; "
-            f"try {key} = {total / max(count, 1):g}",
-            key=key,
+            f"output_interval = {interval:g} s is not an integer multiple of step_size = {step:g} s; "
+            f"try step_size = {interval / count:g}",
+            key="step_size",
         )
     return count

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import ModelError
-from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.description import Description
+from falsifier.fmu.slot import Slot
 
 Table = NDArray[np.int64]
 # What the compiled loops receive of Ports: integers, because compiled code counts references to arrays.

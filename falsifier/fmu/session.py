@@ -1,13 +1,15 @@
 """An FMU that is simulated repeatedly: when to reset, restore or replace its instance."""
 
 import time
+from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from falsifier.core.model import Interface
-from falsifier.errors import FalsifierError
+from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.co_simulation import CoSimulation
 from falsifier.fmu.description import Description
@@ -16,9 +18,7 @@ from falsifier.fmu.lifecycle import make_lifecycle
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import Stepper
-from falsifier.fmu.worker_order import Reuse
-
-_CHEAPEST_FIRST: tuple[Reuse, ...] = ("reset", "state", "instance")
+from falsifier.fmu.worker_order import REUSES, Reuse
 
 
 class Session:
@@ -29,18 +29,31 @@ class Session:
         folder: folder to which it was extracted.
         interface: interface to simulate with.
         log: called with each of the FMU's messages.
+        logging: whether to ask the FMU for messages.
 
     Raises:
         ModelError: if the FMU cannot be loaded.
     """
 
-    def __init__(self, description: Description, folder: Path, interface: Interface, log: LogSink) -> None:
+    def __init__(
+        self,
+        description: Description,
+        folder: Path,
+        interface: Interface,
+        log: LogSink,
+        *,
+        logging: bool = False,
+    ) -> None:
         self._description = description
-        self._library = Library(description, folder, interface, log)
+        self._make_library = partial(Library, description, folder, interface, log, logging=logging)
+        self._load()
+        self.reuse: Reuse = "instance"
+
+    def _load(self) -> None:
+        self._library = self._make_library()
         self._lifecycle = make_lifecycle(self._library)
         self._saved = SavedState(self._library)
         self._state: Literal["new", "broken", "finished"] = "new"
-        self.reuse: Reuse = "instance"
 
     def prepare(self, plan: Plan, room: Room) -> None:
         """Prepare for the simulations of a plan.
@@ -59,9 +72,7 @@ class Session:
         """
         deadline = time.perf_counter() + self._plan.time_limit
         if self._state != "new" and not self._is_brought_back():
-            self._saved.forget()
-            self._library.renew()
-            self._state = "new"
+            self._renew()
         if self._state == "new" and self.reuse == "state" and not self._saved.take():
             self.reuse = "instance"
         # Stays so if anything below raises an exception: such an instance cannot be reset reliably.
@@ -71,11 +82,17 @@ class Session:
         self._lifecycle.terminate()
         self._state = "finished"
 
-    def find_reuse(self) -> Reuse:
+    def find_reuse(
+        self, untrusted: Collection[Reuse] = (), announce: Callable[[Reuse], None] = lambda _: None
+    ) -> Reuse:
         """Find the cheapest way to start again that reproduces the outputs of the first simulation.
 
-        These are in the room, which is not changed. If even a new instance gives other outputs, the library
-        keeps state between simulations, and each simulation needs a new process.
+        These are in the room, which is not changed. If even a library that was loaded again gives other
+        outputs, each simulation needs a new process.
+
+        Args:
+            untrusted: ways not to try.
+            announce: called before each trial, which may crash or hang.
         """
         plan, room = self._plan, self._room
         expected = room.outputs.copy()
@@ -83,6 +100,9 @@ class Session:
         self.prepare(plan, trial)
         found: Reuse = "process"
         for reuse in self._possible():
+            if reuse in untrusted:
+                continue
+            announce(reuse)
             self.reuse = reuse
             try:
                 if reuse == "state":
@@ -105,6 +125,23 @@ class Session:
         self._saved.forget()
         self._library.close()
 
+    def _renew(self) -> None:
+        """Replace the instance; load the library again if its static data must not survive.
+
+        That this fails says nothing about simulations with other inputs.
+        """
+        self._saved.forget()
+        try:
+            if self.reuse == "library":
+                self._library.close()
+                self._load()
+                self._stepper = self._make_stepper(self._plan, self._room)
+            else:
+                self._library.renew()
+        except ModelError as error:
+            raise SimulationError(str(error)) from error
+        self._state = "new"
+
     def _is_brought_back(self) -> bool:
         """Reset the instance after a finished simulation or restore its state; return whether that worked."""
         if self._state != "finished":
@@ -120,7 +157,7 @@ class Session:
     def _possible(self) -> tuple[Reuse, ...]:
         """Return the ways to start again that the FMU declares, the cheapest first."""
         saves = self._library.interface in self._description.saves_state
-        return tuple(reuse for reuse in _CHEAPEST_FIRST if saves or reuse != "state")
+        return tuple(reuse for reuse in REUSES[:-1] if saves or reuse != "state")
 
     def _make_stepper(self, plan: Plan, room: Room) -> Stepper:
         if self._library.interface == "co-simulation":

@@ -1,7 +1,7 @@
 """FMUs as models: the implementation of the Model protocol."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import get_args
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from falsifier.core.model import Experiment, Interface, ModelInfo, check_finite
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import ModelError
+from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import archive, in_process
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description, describe
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.fmu.plan import Plan, make_plan
+from falsifier.fmu.remarks import needed_tool_text
 from falsifier.fmu.worker_order import Order
 
 
@@ -29,6 +30,7 @@ class FmuModel:
         path: path of the .fmu file.
         interface: ``co-simulation`` (the FMU contains its own solver) or ``model-exchange``.
         isolate: whether to simulate in a worker process; if not, a crash of the FMU crashes this process.
+        logging: whether to ask the FMU for messages in every simulation; otherwise only after a failure.
         sha256: hash of the file; models with different files are not equal.
 
     Raises:
@@ -38,6 +40,7 @@ class FmuModel:
     path: Path
     interface: Interface = "co-simulation"
     isolate: bool = field(default=True, kw_only=True)
+    logging: bool = field(default=False, kw_only=True)
     sha256: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
@@ -72,18 +75,46 @@ class FmuModel:
                 row[: table.size] = table.ravel()
                 row[table.size :] = np.inf
 
-        outputs, log = _runner(self).simulate(task.plan, fill)
+        try:
+            outputs, log = _runner(self).simulate(task.plan, fill)
+        except (ModelError, SimulationError) as error:
+            raise self._with_hint(error) from None
         columns = dict(zip(task.plan.outputs, outputs, strict=True))
         if not np.isfinite(outputs).all():
             check_finite(self.info.name, task.times, columns)
         return Trajectory(task.times, columns, task.units, log)
 
+    def place(self, name: str) -> tuple[str, int]:
+        """Return where a scalar stands: the name that the FMU declares, and the position in that array."""
+        slot = self._description.slot(name)
+        return slot.declared or name, slot.offset
+
+    def elements(self, declared: str) -> tuple[str, ...]:
+        """Return the names of the elements of an array in order; of a scalar, its own."""
+        slots = self._description.slots
+        # Reversed, so that the first names win: aliases come after the variable that they stand for.
+        names = {s.offset: n for n, s in reversed(list(slots.items())) if (s.declared or n) == declared}
+        return tuple(names[offset] for offset in sorted(names))
+
+    def load(self) -> None:
+        """Load the library and make an instance in a worker process, without simulating.
+
+        Raises:
+            ModelError: if that fails.
+        """
+        order = replace(_order(self), logging=True)
+        fmu = IsolatedFmu(REGISTRY.nursery, order)
+        try:
+            fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
+        finally:
+            fmu.close()
+
     def close(self) -> None:
         """End the worker process or unload the library; the next simulation starts again."""
         if self.isolate:
-            REGISTRY.drop(self.sha256, self.interface)
+            REGISTRY.drop(self.sha256, self.interface, logging=self.logging)
         else:
-            in_process.drop(self.sha256, self.interface)
+            in_process.drop(self.sha256, self.interface, logging=self.logging)
 
     def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
         """Return the inputs as piecewise cubics; for a solver, discrete ones change on the output grid."""
@@ -98,6 +129,16 @@ class FmuModel:
             else:
                 tables.append(signal.pieces(experiment.stop_time))
         return tables
+
+    def _with_hint(self, error: ModelError | SimulationError) -> ModelError | SimulationError:
+        """Return the error; if the FMU runs only where its exporting tool is installed, it says so."""
+        needs_tool = self._description.needs_tool
+        if self.interface not in needs_tool:
+            return error
+        text = f"{error}; {needed_tool_text(self.info.tool, (self.interface,))}"
+        if isinstance(error, ModelError):
+            return ModelError(text)
+        return SimulationError(text, status=error.status, time=error.time, log=error.log)
 
     @property
     def _description(self) -> Description:
@@ -140,18 +181,18 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
 
 
 def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
-    order = Order(model.path, model.sha256, describe(model.path, model.sha256), model.interface, None)
+    order = _order(model)
     return REGISTRY.fmu(order) if model.isolate else in_process.fmu(order)
+
+
+def _order(model: FmuModel) -> Order:
+    description = describe(model.path, model.sha256)
+    return Order(model.path, model.sha256, description, model.interface, None, logging=model.logging)
 
 
 def _check_interface(model: FmuModel) -> None:
     description = describe(model.path, model.sha256)
     info = description.info
-    if info.clocks:
-        raise ModelError(
-            f"{model.path}: the importing tool would have to tick its clocks "
-            f"{', '.join(map(repr, info.clocks))}, which is not supported; export it without input clocks"
-        )
     if model.interface in info.interfaces:
         return
     if model.interface not in get_args(Interface):

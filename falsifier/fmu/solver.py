@@ -36,6 +36,7 @@ from falsifier.fmu.stepping import (
     STEPPING,
     STUCK,
     TERMINATED,
+    TOO_SMALL,
     compiled,
     read_row,
     rounding,
@@ -182,7 +183,7 @@ def _accepted_step(m, s, h, target):  # type: ignore[no-untyped-def]
             return status, DONE, h
         # Give up once the step is too small to change the time in floating point.
         if h < 4.0 * np.spacing(max(abs(s.clock[TIME]), 1e-3 * m.stop_time)):
-            return status, STEPPING, h
+            return 0, TOO_SMALL, h
 
 
 @compiled

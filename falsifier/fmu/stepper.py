@@ -15,6 +15,7 @@ from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library, load_binding, status_name
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.strings import set_strings
 
 
 class Stepper(ABC):
@@ -44,6 +45,7 @@ class Stepper(ABC):
 
     def set_parameters(self) -> None:
         """Set the plan's parameters and start values."""
+        set_strings(self._library, self._plan.strings)
         values = self._room.parameters
         if self._parameters.is_limited:
             check_range(self._name, self._plan.parameters, self._parameters, values[:, np.newaxis])
@@ -107,6 +109,10 @@ class Stepper(ABC):
             what = "the FMU terminated the simulation"
         elif where == loops.STUCK:
             what = "the FMU makes no progress: its events never end"
+        elif where == loops.TOO_SMALL:
+            what = (
+                "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast"
+            )
         else:
             doing = {
                 loops.SETTING: "setting the inputs",
@@ -123,7 +129,8 @@ class Stepper(ABC):
         if time.perf_counter() > deadline:
             limit = self._plan.time_limit
             raise SimulationError(
-                f"{self._name}: stopped at t = {reached:g} s after the time limit of {limit:g} s",
+                f"{self._name}: stopped at t = {reached:g} s after the time limit of {limit:g} s; "
+                "slow models need a larger time_limit",
                 status="timeout",
                 time=reached,
             )
@@ -158,4 +165,4 @@ def warm_up() -> None:
     table, report = (0, 0, 0, 0), np.zeros(3, dtype=np.int64)
     compiled.write_row(0, 2, table, 0)
     compiled.read_row(0, 2, table, 0, 0, 0)
-    compiled.co_simulate((0,) * 7, table, (0, 0), table, (0, 0), 0, 0, table, 0, 0, 1.0, 0, 0, 1, report)
+    compiled.co_simulate((0,) * 7, table, (0, 0), table, (0, 0), 0, 0, table, 0, 0, 1.0, 1, 0, 0, 1, report)

@@ -17,10 +17,10 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from falsifier.stl.compiled import compiled as keep_compiled
+from falsifier.stl.numba_compilation import compiled as keep_compiled
 
 # Where a loop stopped, in `report[WHERE]`; DONE: nowhere before its end.
-DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
+DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL = range(8)
 STATUS, WHERE, STEP = range(3)
 
 # Rows of the table of function addresses of a co-simulation FMU.
@@ -41,7 +41,10 @@ _NUMBA = {"p": types.intp, "n": types.intp, "d": types.float64, "i": types.int32
 
 
 def call_signature(arguments: str) -> Any:
-    """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char."""
+    """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char.
+
+    The status is unsigned: a negative one, which FMI does not define, is larger than all others.
+    """
 
     def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_LLVM[a] for a in arguments])
@@ -52,7 +55,7 @@ def call_signature(arguments: str) -> Any:
         ]
         return builder.call(function, passed)
 
-    return types.int32(types.intp, *(_NUMBA[a] for a in arguments)), emit
+    return types.uint32(types.intp, *(_NUMBA[a] for a in arguments)), emit
 
 
 def _load(kind: Any, stored: ir.Type) -> Any:
@@ -341,9 +344,12 @@ def _advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
 @compiled
 def co_simulate(  # type: ignore[no-untyped-def]
     functions, ports, pieces, held_ports, held_pieces, current, values, getters, outputs, width,
-    step, first, last, every, report,
+    stop_time, steps, first, last, every, report,
 ):  # fmt: skip
     """Do the communication steps first..last-1.
+
+    The step sizes are differences of the communication points. The FMU adds them to its time again, which is
+    exact for these; with k * step + step, it would pass the stop time by a rounding error, and some refuse.
 
     Args:
         functions: instance, function addresses, FMI version and whether event mode is used; see INSTANCE.
@@ -357,7 +363,8 @@ def co_simulate(  # type: ignore[no-untyped-def]
         getters: recorded variables (Ports.table).
         outputs: address of one row of float64 per recorded variable; the caller writes column 0.
         width: length of such a row.
-        step: communication step in s.
+        stop_time: stop time in s.
+        steps: number of steps to the stop time.
         first: first step to do.
         last: step before which to stop.
         every: steps per column of the outputs.
@@ -366,20 +373,22 @@ def co_simulate(  # type: ignore[no-untyped-def]
     instance, version = functions[INSTANCE], functions[FMI_VERSION]
     memory = np.zeros(16, dtype=np.uint8)
     scratch = memory.ctypes.data
-    status, where, k = 0, DONE, first
+    status, where, k, step = 0, DONE, first, stop_time / steps
     while k < last and where == DONE:
+        start = k * step
+        end = stop_time if k + 1 == steps else min((k + 1) * step, stop_time)
         status, where = _set_inputs(
-            functions, ports, pieces, held_ports, held_pieces, current, values, k * step, k > 0, scratch
+            functions, ports, pieces, held_ports, held_pieces, current, values, start, k > 0, scratch
         )
         if where != DONE:
             break
         ends = False
         if version == 3:
-            status, where, ends = _advance_3(functions, k * step, (k + 1) * step, scratch)
+            status, where, ends = _advance_3(functions, start, end, scratch)
         elif version == 2:
-            status = _do_step_2(functions[DO_STEP], instance, k * step, step, np.int32(1))
+            status = _do_step_2(functions[DO_STEP], instance, start, end - start, np.int32(1))
         else:
-            status = _do_step_1(functions[DO_STEP], instance, k * step, step, np.uint8(1))
+            status = _do_step_1(functions[DO_STEP], instance, start, end - start, np.uint8(1))
         if status > 1 and where == DONE:
             where = STEPPING
         if where != DONE:

@@ -11,12 +11,12 @@ import resource
 import socket
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from falsifier.core.model import Interface
-from falsifier.errors import FalsifierError, SimulationError
+from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
     QUICK_SECONDS,
@@ -27,10 +27,9 @@ from falsifier.fmu.channel import (
     send_reply,
     watch,
 )
-from falsifier.fmu.description import Description
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.session import Session
-from falsifier.fmu.worker_order import Reuse
+from falsifier.fmu.worker_order import Order, Reuse
 
 PREPARE, RUN = 1, 2
 
@@ -38,23 +37,20 @@ PREPARE, RUN = 1, 2
 _MAX_TEST_SECONDS = 1.0
 # Some tools' runtimes run out of thread keys after about 1000 instances in one process.
 _MAX_INSTANCES = 400
+_NO_MEMORY = "not enough memory for the FMU and what surrounds it"
 # Growth in memory after which a worker that leaks is replaced.
 _MAX_GROWTH_KIB = 256 << 10
 
 
-def serve(
-    sock: socket.socket, description: Description, folder: Path, interface: Interface, reuse: Reuse | None
-) -> None:
+def serve(sock: socket.socket, order: Order, folder: Path) -> None:
     """Reply to requests until the connection is closed or the process should be replaced.
 
     Args:
         sock: connection to the process that requests simulations.
-        description: description of the FMU.
-        folder: folder to which it was extracted.
-        interface: interface to simulate with.
-        reuse: how the next simulation starts; None: test this after the first simulation.
+        order: what to simulate; if it does not say how simulations start, this is tested after the first.
+        folder: folder to which the FMU was extracted.
     """
-    worker = _Worker(description, folder, interface, reuse)
+    worker = _Worker(order, folder)
     while True:
         try:
             kind, payload, descriptors = receive_request(sock)
@@ -69,7 +65,7 @@ def serve(
         is_quick = time.perf_counter() - started < QUICK_SECONDS
         send_reply(sock, reply)
         if reply.more:
-            reply = worker.find_reuse()
+            reply = worker.find_reuse(lambda reuse: send_reply(sock, Reply(text=reuse, more=True)))
             send_reply(sock, reply)
         if reply.leaving:
             return
@@ -78,11 +74,9 @@ def serve(
 
 
 class _Worker:
-    def __init__(
-        self, description: Description, folder: Path, interface: Interface, reuse: Reuse | None
-    ) -> None:
-        self._description, self._folder, self._interface = description, folder, interface
-        self._reuse = reuse
+    def __init__(self, order: Order, folder: Path) -> None:
+        self._order, self._folder = order, folder
+        self._reuse = order.reuse
         self._session: Session | None = None
         self._instances = 0
         self._first_size = 0
@@ -91,17 +85,31 @@ class _Worker:
         try:
             memory = mmap.mmap(descriptor, 0)
             self._plan, self._room = plan, Room.over(plan, np.frombuffer(memory, dtype=np.float64))
-            if self._session is None:
-                self._session = Session(self._description, self._folder, self._interface, _log)
-            self._session.prepare(self._plan, self._room)
+            session = self._session or self._load()
+            session.prepare(self._plan, self._room)
+        except SimulationError as error:
+            return Reply("failed", str(error))
         except FalsifierError as error:
             return Reply("unusable", str(error))
+        except MemoryError:
+            return Reply("unusable", _NO_MEMORY)
         return Reply()
+
+    def _load(self) -> Session:
+        """Load the library and make an instance, which may succeed at another time."""
+        order = self._order
+        try:
+            self._session = Session(
+                order.description, self._folder, order.interface, _log, logging=order.logging
+            )
+        except ModelError as error:
+            raise SimulationError(str(error)) from error
+        return self._session
 
     def run(self) -> Reply:
         assert self._session is not None, "prepare must be called before run"
         self._session.reuse = self._reuse or "instance"
-        self._instances += self._session.reuse == "instance" or not self._instances
+        self._instances += self._session.reuse in ("instance", "library") or not self._instances
         started = time.perf_counter()
         try:
             self._session.run()
@@ -110,14 +118,16 @@ class _Worker:
             return Reply("timeout" if error.status == "timeout" else "failed", str(error), at)
         except FalsifierError as error:
             return Reply("unusable", str(error))
+        except MemoryError:
+            return Reply("failed", _NO_MEMORY)
         if self._reuse is None and time.perf_counter() - started > _MAX_TEST_SECONDS:
-            self._reuse = "instance"
+            self._reuse = "process" if "instance" in self._order.untrusted else "instance"
         return Reply(more=self._reuse is None, leaving=self._reuse is not None and self._is_spent())
 
-    def find_reuse(self) -> Reply:
+    def find_reuse(self, announce: Callable[[Reuse], None]) -> Reply:
         """Repeat the simulation with each kind of reuse; the first with the same outputs is chosen."""
         assert self._session is not None, "run must be called before find_reuse"
-        self._reuse = self._session.find_reuse()
+        self._reuse = self._session.find_reuse(self._order.untrusted, announce)
         return Reply(text=self._reuse, leaving=self._is_spent())
 
     def _is_spent(self) -> bool:

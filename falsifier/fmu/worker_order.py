@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from falsifier.core.model import Interface
 from falsifier.fmu.description import Description
 
-# How the next simulation starts: with the same instance after a reset or from its saved state, with a new
-# instance, or in a new process.
-Reuse = Literal["reset", "state", "instance", "process"]
+# How the next simulation starts, the cheapest first: with the same instance after a reset or from its saved
+# state, with a new instance, with the library loaded again, or in a new process.
+Reuse = Literal["reset", "state", "instance", "library", "process"]
+REUSES: tuple[Reuse, ...] = get_args(Reuse)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +23,8 @@ class Order:
         description: description of the FMU.
         interface: interface to simulate with.
         reuse: how the next simulation starts; None if not yet known.
+        untrusted: ways to start that made the FMU crash or hang; they are not tried again.
+        logging: whether to ask the FMU for messages.
     """
 
     path: Path
@@ -29,3 +32,5 @@ class Order:
     description: Description
     interface: Interface
     reuse: Reuse | None
+    untrusted: tuple[Reuse, ...] = ()
+    logging: bool = False

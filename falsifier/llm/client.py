@@ -7,9 +7,11 @@ from typing import Any
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.llm.failures import classify
+from falsifier.llm.incoming import cleaned
 from falsifier.llm.litellm_import import dropped_parameters, load_litellm
 from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode
 from falsifier.llm.providers import find_key, known
+from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, usage_of
 from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, storable
 
@@ -26,7 +28,7 @@ class LiteLLMChat:
         effort: reasoning effort, ``low``, ``medium`` or ``high``; None: the LLM's default.
         api_base: address of the server; None: the provider's own.
         options: further parameters of litellm's ``completion``, passed unchanged.
-        timeout: seconds to wait for a reply.
+        timeout: seconds to wait for a complete reply.
         price: price stated by the user; None: litellm's table.
         mode: how to ask for a reply that follows a schema.
     """
@@ -55,10 +57,14 @@ class LiteLLMChat:
             ChatError: for any other failure; it names the LLM and the key's variable.
         """
         key = find_key(self.llm, api_base=self.api_base)
+        secrets = (key or "", *secrets_in(self.options))
         litellm = load_litellm()
         arguments = self._arguments(request)
+        left = request.seconds_left
+        seconds = self.timeout if left is None else min(self.timeout, left)
         started = perf_counter()
-        try:
+
+        def ask() -> ChatReply:
             response = litellm.completion(
                 model=self.llm,
                 messages=[sent_message(m) for m in request.messages],
@@ -68,13 +74,16 @@ class LiteLLMChat:
                 **{"api_key": key, **arguments},
             )
             return self._reply(request, response, arguments, perf_counter() - started)
+
+        try:
+            return cleaned(within(seconds, ask), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             raise classify(
                 error,
                 llm=self.llm,
                 api_base=self.api_base,
                 key_variables=known(self.llm).keys,
-                secrets=(key or "", *secrets_in(self.options)),
+                secrets=secrets,
                 offers_tools=bool(request.tools),
             ) from None
 

@@ -3,8 +3,10 @@
 from collections.abc import Callable
 from typing import TypeVar
 
+from falsifier.core.printable import printable
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError
+from falsifier.llm.incoming import LONGEST_REPLY, cleaned
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Message, ToolCall
 
 T = TypeVar("T")
@@ -14,10 +16,16 @@ Respond = Callable[[ToolCall], str]
 MAX_REASKS = 2
 # Characters of a rejected reply that are quoted back to the LLM; runaway replies are cut.
 _LONGEST_QUOTE = 4000
+# Characters of a defect that are told; what is wrong stands at the beginning.
+_LONGEST_PROBLEM = 600
 
 
 class RejectedReplyError(FalsifierError):
     """A reply cannot be used; the message is sent to the LLM."""
+
+    def __init__(self, message: str) -> None:
+        shown = printable(message[: 2 * _LONGEST_PROBLEM])
+        super().__init__(shown if len(shown) <= _LONGEST_PROBLEM else f"{shown[:_LONGEST_PROBLEM]} ...")
 
 
 class NoValidReplyError(ChatError):
@@ -51,26 +59,23 @@ def converse(
     """
     problems: list[str] = []
     while len(problems) <= reasks:
-        reply = chat.complete(request)
+        reply = cleaned(chat.complete(request))
         values: list[T] = []
         problem = None
-        if respond is not None and reply.tool_calls:
-            following, problem = _called(request, reply, respond)
-        else:
-            try:
-                values.append(read(_usable_text(reply)))
-            except RejectedReplyError as rejection:
-                problem = _explained(reply, str(rejection))
-            following = _asked_again(request, reply, problem or "")
-        on_exchange(
-            Exchange(
-                llm=chat.llm,
-                messages=request.messages,
-                parameters=reply.parameters or dict(chat.parameters),
-                reply=reply,
-                problem=problem,
-            )
-        )
+        try:
+            if respond is not None and reply.tool_calls:
+                following, problem = _called(request, reply, respond)
+            else:
+                try:
+                    values.append(read(_usable_text(reply)))
+                except RejectedReplyError as rejection:
+                    problem = _explained(reply, str(rejection))
+                following = _asked_again(request, reply, problem or "")
+        except Exception as error:
+            # A defect, but the reply has been paid for: it is recorded first.
+            on_exchange(_exchange(chat, request, reply, f"{type(error).__name__}: {error}"))
+            raise
+        on_exchange(_exchange(chat, request, reply, problem))
         if problem is None:
             chat.accepted(request, reply)
             if values:
@@ -81,6 +86,16 @@ def converse(
     raise NoValidReplyError(
         f"{chat.llm} gave no valid reply in {counted(reasks + 1, 'attempt')}; rejected because: "
         f"{' | '.join(problems)}"
+    )
+
+
+def _exchange(chat: Chat, request: ChatRequest, reply: ChatReply, problem: str | None) -> Exchange:
+    return Exchange(
+        llm=chat.llm,
+        messages=request.messages,
+        parameters=reply.parameters or dict(chat.parameters),
+        reply=reply,
+        problem=problem,
     )
 
 
@@ -115,6 +130,8 @@ def _usable_text(reply: ChatReply) -> str:
         raise RejectedReplyError(f"the reply refuses the task: {reply.text[:200]}")
     if not reply.text.strip():
         raise RejectedReplyError("the reply was empty")
+    if len(reply.text) >= LONGEST_REPLY:
+        raise RejectedReplyError(f"the reply is too long, {LONGEST_REPLY} characters or more")
     return reply.text
 
 

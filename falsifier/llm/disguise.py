@@ -2,8 +2,8 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo
@@ -12,7 +12,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.view import View
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict
-from falsifier.stl.expression import Name
+from falsifier.stl.renaming import renamed
 
 T = TypeVar("T")
 
@@ -118,21 +118,6 @@ class Disguise:
     def _predicate(self, text: str) -> str:
         found = (p for p in self.real.requirement.formula.predicates if str(p) == text)
         return str(renamed(next(found, ""), self.names))
-
-
-def renamed(node: T, names: Mapping[str, str]) -> T:
-    """Return the same formula or expression with other names."""
-    return _renamed(node, names)  # type: ignore[no-any-return]
-
-
-def _renamed(node: Any, names: Mapping[str, str]) -> Any:
-    if isinstance(node, Name):
-        return Name(names[node.name])
-    if isinstance(node, tuple):
-        return tuple(_renamed(part, names) for part in node)
-    if is_dataclass(node) and not isinstance(node, type):
-        return type(node)(*(_renamed(getattr(node, f.name), names) for f in fields(node)))
-    return node
 
 
 def _neutral(items: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:

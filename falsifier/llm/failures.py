@@ -1,11 +1,17 @@
 """Failures of requests to a language model, classified by what can be done about them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from math import isfinite
+from typing import Any
 from urllib.parse import urlsplit
 
+from falsifier.core.printable import printable
 from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.providers import known, server_address
+from falsifier.llm.transport import RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
@@ -76,8 +82,11 @@ def classify(
         secrets: texts to remove from the message.
         offers_tools: whether the request offered tools.
     """
+    if isinstance(error, RefusedReplyError):
+        at = f" at {redact(api_base, secrets)}" if api_base else ""
+        return ChatError(f"{llm}{at}: {redact(printable(str(error)), secrets)}")
     status = _status(error)
-    detail = _first_lines(redact(f"{type(error).__name__}: {error}", secrets))
+    detail = _first_lines(redact(printable(f"{type(error).__name__}: {error}"), secrets))
     lowered = detail.lower()
     where = f" at {redact(api_base, secrets)}" if api_base else ""
     keys = " or ".join(key_variables) or "the API key"
@@ -157,10 +166,25 @@ def _is_this_machine(address: str) -> bool:
 
 
 def _retry_after(error: Exception) -> float | None:
+    """Seconds that the server asked to wait, given as a number or as a date; None if it did not say."""
     for holder in (getattr(error, "response", None), error):
         headers = getattr(holder, "headers", None) or getattr(holder, "litellm_response_headers", None) or {}
-        try:
-            return max(0.0, float(headers["retry-after"]))
-        except (KeyError, TypeError, ValueError):
-            continue
+        # Headers of urllib are no Mapping, but have its ``get``.
+        stated = headers.get("retry-after") if hasattr(headers, "get") else None
+        if stated is not None and (seconds := _seconds_until(str(stated), headers)) is not None:
+            return max(0.0, seconds)
     return None
+
+
+def _seconds_until(stated: str, headers: Mapping[str, Any]) -> float | None:
+    try:
+        seconds = float(stated)
+    except ValueError:
+        try:
+            until = parsedate_to_datetime(stated)
+            # By the server's own clock, which may differ from this machine's.
+            now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
+            seconds = (until - now).total_seconds()
+        except (TypeError, ValueError, OverflowError):
+            return None
+    return seconds if isfinite(seconds) else None

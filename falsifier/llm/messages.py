@@ -1,6 +1,7 @@
 """What is sent to and received from a language model: frozen values, written to the journal unchanged."""
 
 from collections.abc import Mapping
+from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
@@ -103,6 +104,16 @@ class ChatRequest(_MayUseTools):
         default=0, description="Distinguishes runs that ask the same question and want different replies."
     )
     room: int = Field(default=1, description="Factor on the token limit after a reply that was cut off.")
+    deadline: float | None = Field(
+        default=None,
+        exclude=True,
+        description="Value of time.monotonic() at which to give up; it does not influence the reply.",
+    )
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds until the deadline, at least 0; None without a deadline."""
+        return None if self.deadline is None else max(0.0, self.deadline - monotonic())
 
 
 class ChatReply(_MayUseTools):

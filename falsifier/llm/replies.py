@@ -10,20 +10,37 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    FailFast,
+    Field,
+    ValidationError,
+)
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.printable import printable
 from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
 from falsifier.core.space import SearchSpace
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
 
-_POINT = re.compile(r"<point>(.*?)</point>", re.DOTALL | re.IGNORECASE)
-_THOUGHT = re.compile(r"<think>.*?</think>", re.DOTALL | re.IGNORECASE)
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*")
+_POINT_TAG = re.compile(r"<(/?)point>", re.IGNORECASE)
+_THOUGHT_TAG = re.compile(r"<(/?)think>", re.IGNORECASE)
+_OBJECT_START = re.compile(r'\{(?=\s*["}])')
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+_RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*", re.ASCII)
+# Numbers and runs are written with fewer characters; for longer texts the expressions above would take a time
+# that grows with the square of the length.
+_LONGEST_NUMBER = 64
 _LONGEST_RUN = 100_000
 _LONGEST_RATIONALE = 2000
+# More candidates than any question asks for; those beyond are not read.
+_MOST_CANDIDATES = 1000
+# How often the text of a reply may be read again in search of JSON, counted in its length.
+_READINGS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +108,7 @@ class ReplyForm:
         Raises:
             RejectedReplyError: if the reply contains no candidate, valid or not.
         """
-        text = _THOUGHT.sub("", text)
+        text = _without_thoughts(text)
         found = _candidate_objects(text) or [{"point": numbers} for numbers in _points(text)]
         if not found:
             raise RejectedReplyError(
@@ -111,7 +128,7 @@ class ReplyForm:
         signals = {}
         for signal in reply.signals:
             if signal.name in signals:
-                raise RejectedReplyError(f"input {signal.name!r} is given twice")
+                raise RejectedReplyError(f"input {_shown(signal.name)} is given twice")
             signals[signal.name] = self._signal(signal)
         parameters = {p.name: p.value for p in reply.parameters}
         return self._admitted(Candidate(signals, parameters, origin, reply.rationale))
@@ -125,13 +142,14 @@ class ReplyForm:
     def _signal(self, reply: "SignalReply") -> Signal:
         ranges = {r.name: r for r in self.space.inputs}
         if reply.name not in ranges:
-            raise RejectedReplyError(f"unknown input {reply.name!r}; {did_you_mean(reply.name, ranges)}")
+            near = did_you_mean(reply.name[:_LONGEST_NUMBER], ranges)
+            raise RejectedReplyError(f"unknown input {_shown(reply.name)}; {near}")
         chosen = ranges[reply.name]
         values = _unrolled(reply.values)
         times = reply.times or ()
         interpolation = reply.interpolation or chosen.interpolation
         if not values:
-            raise RejectedReplyError(f"input {reply.name!r} has no values")
+            raise RejectedReplyError(f"input {_shown(reply.name)} has no values")
         try:
             if times:
                 return Signal(tuple(times), tuple(values), interpolation, chosen.hold)
@@ -139,7 +157,7 @@ class ReplyForm:
                 values, stop_time=self.space.stop_time, interpolation=interpolation, hold=chosen.hold
             )
         except ValueError as error:
-            raise RejectedReplyError(f"input {reply.name!r}: {error}") from None
+            raise RejectedReplyError(f"input {_shown(reply.name)}: {error}") from None
 
     def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:
         try:
@@ -176,8 +194,8 @@ class SignalReply(_Reply):
     """One signal, as an LLM writes it."""
 
     name: str
-    values: list[float | str]
-    times: list[float] | None = None
+    values: Annotated[list[float | str], FailFast()]
+    times: Annotated[list[float] | None, FailFast()] = None
     interpolation: Interpolation | None = None
 
 
@@ -212,8 +230,8 @@ def _parameters_by_name(found: Any) -> Any:
 
 
 def _storable(text: str) -> str:
-    """The text up to a maximum length, without unpaired surrogates, which UTF-8 cannot encode."""
-    return text.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_RATIONALE]
+    """The text up to a maximum length, as files can hold and terminals can show it."""
+    return printable(text[: 2 * _LONGEST_RATIONALE])[:_LONGEST_RATIONALE]
 
 
 class CandidateReply(BaseModel):
@@ -222,18 +240,20 @@ class CandidateReply(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     rationale: Annotated[str, AfterValidator(_storable)] = ""
-    signals: Annotated[list[SignalReply], BeforeValidator(_signals_by_name)] = Field(default_factory=list)
-    parameters: Annotated[list[ParameterReply], BeforeValidator(_parameters_by_name)] = Field(
+    signals: Annotated[list[SignalReply], FailFast(), BeforeValidator(_signals_by_name)] = Field(
         default_factory=list
     )
-    point: list[float | str] | None = None
+    parameters: Annotated[list[ParameterReply], FailFast(), BeforeValidator(_parameters_by_name)] = Field(
+        default_factory=list
+    )
+    point: Annotated[list[float | str] | None, FailFast()] = None
 
 
 def _validated(found: dict[str, Any]) -> CandidateReply:
     try:
         return CandidateReply.model_validate(found)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise RejectedReplyError(f"{where}: {first['msg']}") from None
 
@@ -243,33 +263,65 @@ def _candidate_objects(text: str) -> list[dict[str, Any]]:
     for found in reversed(list(_json_objects(text))):
         several = found.get("candidates")
         if isinstance(several, list) and several and all(isinstance(c, dict) for c in several):
-            return several
+            return several[:_MOST_CANDIDATES]
         if {"signals", "parameters", "point"} & found.keys():
             return [found]
     return []
 
 
 def _json_objects(text: str) -> Iterator[dict[str, Any]]:
-    decoder = json.JSONDecoder()
-    start = text.find("{")
-    while start >= 0:
+    """JSON objects that are not inside of others, in order; the time is proportional to the length."""
+    # Python refuses to read integers of thousands of digits; as floats they are inf, which is rejected later.
+    decoder = json.JSONDecoder(parse_int=float)
+    allowance = _READINGS * len(text)
+    start = _OBJECT_START.search(text)
+    while start is not None and allowance > 0:
+        position = start.start()
         try:
-            found, end = decoder.raw_decode(text, start)
-        except (json.JSONDecodeError, RecursionError):
-            end = start + 1
+            found, end = decoder.raw_decode(text, position)
+        except json.JSONDecodeError as error:
+            end = position + 1
+            # The error counts the lines before it, which is fast but not free.
+            allowance -= error.pos - position + len(text) // 1000 + 1
+        except RecursionError:
+            end = position + 1
+            allowance -= len(text)
         else:
             if isinstance(found, dict):
                 yield found
-        start = text.find("{", end)
+        start = _OBJECT_START.search(text, end)
+
+
+def _without_thoughts(text: str) -> str:
+    """The text outside of ``<think> ... </think>``; a thought that does not end stays."""
+    kept, start, begun = [], 0, -1
+    for tag in _THOUGHT_TAG.finditer(text):
+        if not tag[1]:
+            begun = tag.start() if begun < 0 else begun
+        elif begun >= 0:
+            kept.append(text[start:begun])
+            start, begun = tag.end(), -1
+    return "".join((*kept, text[start:]))
 
 
 def _points(text: str) -> Iterator[list[float]]:
-    for match in _POINT.finditer(text):
-        words = [w for w in re.split(r"[\s,;()\[\]]+", match[1]) if w]
-        wrong = [w for w in words if not _NUMBER.fullmatch(w)]
-        if wrong:
-            raise RejectedReplyError(f"expected only numbers between <point> and </point>, got {wrong[0]!r}")
-        yield [float(w) for w in words]
+    begun = -1
+    for tag in _POINT_TAG.finditer(text):
+        if not tag[1]:
+            begun = tag.end()
+        elif begun >= 0:
+            yield _numbers(text[begun : tag.start()])
+            begun = -1
+
+
+def _numbers(text: str) -> list[float]:
+    words = [w for w in re.split(r"[\s,;()\[\]]+", text) if w]
+    for word in words:
+        if len(word) > _LONGEST_NUMBER or not _NUMBER.fullmatch(word):
+            raise RejectedReplyError(
+                f"expected only numbers between <point> and </point>, got {_shown(word)}"
+            )
+    return [float(w) for w in words]
 
 
 def _unrolled(values: list[float | str]) -> list[float]:
@@ -278,12 +330,20 @@ def _unrolled(values: list[float | str]) -> list[float]:
     for value in values:
         if not isinstance(value, str):
             numbers.append(float(value))
+        elif len(value) > _LONGEST_NUMBER:
+            raise RejectedReplyError(f"{_shown(value)} is neither a number nor a run such as '0 x 187'")
         elif run := _RUN.fullmatch(value):
-            if len(numbers) + int(run[2]) > _LONGEST_RUN:
+            count = float(run[2])
+            if len(numbers) + count > _LONGEST_RUN:
                 raise RejectedReplyError(f"{value!r} makes the signal longer than {_LONGEST_RUN} values")
-            numbers.extend([float(run[1])] * int(run[2]))
+            numbers.extend([float(run[1])] * int(count))
         elif _NUMBER.fullmatch(value.strip()):
             numbers.append(float(value))
         else:
             raise RejectedReplyError(f"{value!r} is neither a number nor a run such as '0 x 187'")
     return numbers
+
+
+def _shown(value: str) -> str:
+    """A rejected value as a message quotes it."""
+    return repr(value) if len(value) <= _LONGEST_NUMBER else f"{value[:_LONGEST_NUMBER]!r} ..."

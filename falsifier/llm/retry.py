@@ -33,12 +33,26 @@ class Gate:
         self._sleep = sleep
 
     @contextmanager
-    def passage(self) -> Iterator[None]:
-        """Wait for a slot and for the end of a pause."""
-        with self._slots:
+    def passage(self, limit: float | None = None) -> Iterator[None]:
+        """Wait for a slot and for the end of a pause, at most ``limit`` seconds.
+
+        Raises:
+            ChatError: if that is too short.
+        """
+        limit = None if limit is None else min(limit, threading.TIMEOUT_MAX)
+        until = None if limit is None else time.monotonic() + limit
+        if not self._slots.acquire(timeout=limit):
+            raise ChatError("no time is left: other requests to this language model are still waiting")
+        try:
             while (wait := self.remaining()) > 0:
+                if until is not None and time.monotonic() + wait > until:
+                    raise ChatError(
+                        f"no time is left: requests to this language model pause for another {wait:.0f} s"
+                    )
                 self._sleep(wait)
             yield
+        finally:
+            self._slots.release()
 
     def pause(self, seconds: float) -> None:
         """Hold back all requests for this many seconds from now."""
@@ -86,11 +100,12 @@ class RetryingChat:
         """Ask, and ask again after temporary failures.
 
         Raises:
-            ChatError: if the last attempt failed, or for a failure that waiting does not cure.
+            ChatError: if the last attempt failed, there is no time for another one, or for a failure that
+                waiting does not cure.
         """
         for attempt in range(1, self.attempts + 1):
             try:
-                with self.gate.passage():
+                with self.gate.passage(request.seconds_left):
                     reply = self.inner.complete(request)
                 return reply.model_copy(update={"attempts": attempt})
             except TransientChatError as error:
@@ -104,6 +119,9 @@ class RetryingChat:
                     raise ChatError(f"gave up after {counted(attempt, 'attempt')}. {error}") from None
                 own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
                 delay = min(own, self.longest_delay) if asked is None else asked
+                left = request.seconds_left
+                if left is not None and delay >= left:
+                    raise ChatError(f"no time is left to ask again. {error}") from None
                 _LOG.warning("%s. Retrying in %.0f s (attempt %d of %d).", error, delay, attempt + 1, limit)
                 (self.gate.pause if error.for_all else self.gate.wait)(delay)
         raise AssertionError("attempts is at least 1")

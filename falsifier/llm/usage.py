@@ -2,12 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
+from falsifier.errors import SpecError
 from falsifier.llm.messages import ChatRequest, Usage
 
 # Rule of thumb for English text; for prompt limits, and for providers that send no counts.
 _CHARACTERS_PER_TOKEN = 4
+# More than any request can have; a larger count is as wrong as a negative one.
+_MOST_TOKENS = 10**9
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,10 +21,21 @@ class Price:
     Attributes:
         prompt: US dollars per 1000 tokens sent.
         completion: US dollars per 1000 tokens received.
+
+    Raises:
+        SpecError: if a price is negative, infinite or not a number: a limit on the cost would not hold.
     """
 
     prompt: float
     completion: float
+
+    def __post_init__(self) -> None:
+        for price in (self.prompt, self.completion):
+            if not (isfinite(price) and price >= 0):
+                raise SpecError(
+                    "the price of a language model must be two finite, non-negative numbers, US dollars "
+                    f"per 1000 tokens sent and received; got {self.prompt:g} and {self.completion:g}"
+                )
 
     def cost(self, prompt_tokens: int, completion_tokens: int) -> float:
         """US dollars of one request."""
@@ -40,6 +55,9 @@ def usage_of(
 ) -> Usage:
     """Usage of one answered request.
 
+    What a server reports may be wrong. A count that cannot be true (negative, not an integer) is estimated,
+    and a cost that cannot be true is unknown: otherwise the limits of a run would not hold.
+
     Args:
         response_usage: as the provider sent it, with OpenAI's field names; None or zeros: no counts, and
             tokens are estimated.
@@ -48,22 +66,42 @@ def usage_of(
         price: price stated by the user; overrides any reported cost.
         reported_cost: US dollars as computed by the client library; None if the price is unknown.
     """
-    prompt = int(getattr(response_usage, "prompt_tokens", None) or 0)
-    completion = int(getattr(response_usage, "completion_tokens", None) or 0)
+    prompt = _count(getattr(response_usage, "prompt_tokens", None))
+    completion = _count(getattr(response_usage, "completion_tokens", None))
     details = getattr(response_usage, "completion_tokens_details", None)
-    reasoning = int(getattr(details, "reasoning_tokens", None) or 0)
-    estimated = prompt == 0 and completion == 0
-    if estimated:
-        prompt = sum(estimate_tokens(part) for part in _sent(request))
-        completion = estimate_tokens(text)
-    cost = price.cost(prompt, completion) if price is not None else None if estimated else reported_cost
+    reasoning = _count(getattr(details, "reasoning_tokens", None)) or 0
+    estimated = not prompt and not completion
+    if prompt is None or estimated:
+        prompt, estimated = sum(estimate_tokens(part) for part in _sent(request)), True
+    if completion is None or estimated:
+        completion, estimated = estimate_tokens(text), True
+    if price is not None:
+        cost: float | None = price.cost(prompt, completion)
+    else:
+        cost = None if estimated else _believable(reported_cost)
     return Usage(
         prompt_tokens=prompt,
         completion_tokens=completion,
-        reasoning_tokens=reasoning,
+        reasoning_tokens=min(reasoning, completion),
         cost=cost,
         estimated=estimated,
     )
+
+
+def _count(reported: Any) -> int | None:
+    """A reported number of tokens; 0 if none was reported, None if it cannot be true."""
+    if reported is None:
+        return 0
+    is_number = isinstance(reported, int | float) and not isinstance(reported, bool)
+    if not is_number or not 0 <= reported <= _MOST_TOKENS or reported != int(reported):
+        return None
+    return int(reported)
+
+
+def _believable(cost: Any) -> float | None:
+    if not isinstance(cost, int | float) or not isfinite(cost) or cost < 0:
+        return None
+    return float(cost)
 
 
 def _sent(request: ChatRequest) -> Iterator[str]:

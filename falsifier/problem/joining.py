@@ -1,22 +1,23 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
+from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu import FmuModel, read_info
-from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
-from falsifier.problem.ranges import fixed_value, input_range, parameter_range
+from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface
+from falsifier.problem.grid import Grid, choose_grid, formula_times
+from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
-# Tolerance, as a share of the output interval, for the stop time to be a multiple of it: with an interval of
-# 1/30 s, rounding prevents an exact multiple.
-_GRID_ROUNDING = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0
+# Maximum number of states or locals that are recorded if the FMU declares no outputs.
+_MAX_RECORDED = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,7 @@ class Joined:
     space: SearchSpace
     experiment: Experiment
     parameters: Mapping[str, float]
+    notes: tuple[str, ...]
 
 
 def join(
@@ -37,6 +39,7 @@ def join(
     path: Path,
     profile: str | None = None,
     stl: str | None = None,
+    stl_name: str = STL_NAME,
     changes: ModelChanges | None = None,
 ) -> Joined:
     """Join a validated spec with its FMU.
@@ -47,6 +50,7 @@ def join(
         path: path of the spec file, for relative paths and error messages.
         profile: name of a profile of the spec.
         stl: a formula to use instead of the spec's.
+        stl_name: name of the requirement that this formula makes.
         changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
 
     Raises:
@@ -66,10 +70,19 @@ def join(
             f"no such FMU: {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
         )
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-    model = FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), file))
-    experiment = _experiment(spec, layers, model.info, file)
+    logging = [layer.logging for layer in layers if layer.logging is not None]
+    model = FmuModel(
+        fmu,
+        interface=_interface(spec, layers, read_info(fmu), file),
+        logging=logging[-1] if logging else spec.model.logging,
+    )
+    formulas = [r.formula for r in spec.requirements.values()] if stl is None else [stl]
+    experiment, grid = _experiment(spec, layers, model.info, formulas, file)
     inputs, parameters = _merged(spec, layers)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    check_sizes(experiment, space, file)
+    strings = _strings(parameters, model.info, path.parent)
+    known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
     is_option = stl is not None or path.suffix == ".fmu"
     key = "--stl" if is_option else f"requirements.{requirement}.formula"
@@ -78,15 +91,22 @@ def join(
     )
     return Joined(
         model,
-        Requirement(requirement if stl is None else "stl", formula, "" if stl else section.description),
+        Requirement(requirement if stl is None else stl_name, formula, "" if stl else section.description),
         space,
-        _recording(experiment, model.info, [*spec.model.record, *formula.signals], file),
+        _recording(
+            replace(experiment, strings=strings),
+            model.info,
+            [*spec.model.record, *formula.signals],
+            known,
+            file,
+        ),
         fixed,
+        (*model.info.notes, *_notes(grid, model.info, known)),
     )
 
 
-def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
-    """Join an FMU and a formula, without a spec.
+def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME) -> Joined:
+    """Join an FMU and a formula, without a spec; the requirement gets the given name.
 
     If no input or parameter is to be searched, all real inputs with a min and a max are searched.
 
@@ -109,19 +129,25 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges) -> Joined:
                 "fmu": str(fmu.resolve()),
                 "interface": changes.interface or default_interface(info),
                 "stop_time": stop_time,
-                "output_interval": default_interval(info, stop_time),
             },
             "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
-            "requirements": {"stl": {"formula": stl}},
+            "requirements": {name: {"formula": stl}},
         },
         file=str(fmu),
     )
     if not searched and not spec.inputs:
-        known = [v.name for v in info.inputs]
+        inputs = [v.name for v in info.inputs]
+        why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
-            f"{fmu}: nothing to search; add --input NAME=LOW:HIGH:POINTS. {did_you_mean('', known)}"
+            f"{fmu}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
+            f"{did_you_mean('', inputs)}"
         )
-    return join(spec, "stl", path=fmu, changes=changes)
+    joined = join(spec, name, path=fmu, changes=changes)
+    unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
+    if searched or not unbounded:
+        return joined
+    note = f"not searched, because the FMU specifies no min and max: {', '.join(unbounded)}"
+    return replace(joined, notes=(*joined.notes, note))
 
 
 def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
@@ -140,7 +166,11 @@ def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file
     return stated
 
 
-def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, file: str) -> Experiment:
+def _experiment(
+    spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, formulas: Iterable[str], file: str
+) -> tuple[Experiment, Grid | None]:
+    """Return the experiment without outputs, and its grid if nobody stated the interval."""
+
     def stated(key: str) -> float | None:
         value: float | None = getattr(spec.model, key)
         for layer in layers:
@@ -151,38 +181,64 @@ def _experiment(spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, fil
     stop_time = stated("stop_time") or info.stop_time
     if stop_time is None:
         raise SpecError("the FMU has no default stop time; add this key", file=file, key="model.stop_time")
-    output_interval = stated("output_interval") or info.step_size
+    output_interval, step_size = stated("output_interval"), stated("step_size")
+    grid = None
     if output_interval is None:
-        raise SpecError("the FMU has no default step; add this key", file=file, key="model.output_interval")
+        # All formulas of a spec, so that its requirements can share a search.
+        grid = _grid(stop_time, formula_times(formulas), info, step_size, file)
+        output_interval = grid.interval
+    check_steps(stop_time, output_interval, file=file, key="model.output_interval")
     intervals = stop_time / output_interval
-    if round(intervals) < 1 or abs(intervals - round(intervals)) > _GRID_ROUNDING:
+    if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
+        fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None, file)
         raise SpecError(
             f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "
-            f"try {stop_time / max(round(intervals), 1):.6g}",
+            f"try {fits.interval:.12g}",
             file=file,
             key="model.output_interval",
         )
-    return Experiment(
+    experiment = Experiment(
         stop_time=stop_time,
         output_interval=stop_time / round(intervals),
         outputs=(),
-        step_size=stated("step_size"),
+        step_size=step_size,
         tolerance=stated("tolerance"),
-        time_limit=spec.model.time_limit or _DEFAULT_TIME_LIMIT,
+        time_limit=stated("time_limit") or _DEFAULT_TIME_LIMIT,
     )
+    return experiment, grid
 
 
-def _recording(experiment: Experiment, info: ModelInfo, extra: Iterable[str], file: str) -> Experiment:
-    """Return the experiment that records all outputs and those extra variables that are not inputs."""
-    inputs = {v.name for v in info.inputs}
+def _grid(
+    stop_time: float, times: Iterable[float], info: ModelInfo, step_size: float | None, file: str
+) -> Grid:
+    try:
+        return choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
+    except SpecError as error:
+        raise SpecError(str(error), file=file) from None
+
+
+def _notes(grid: Grid | None, info: ModelInfo, known: Collection[str]) -> Iterator[str]:
+    if grid is not None:
+        yield f"time grid of {grid.interval:g} s: {grid.reason}"
+    unset = [v.name for v in info.inputs if v.name not in known]
+    if unset:
+        yield f"inputs without a start value, left to the FMU: {', '.join(unset)}"
+
+
+def _recording(
+    experiment: Experiment, info: ModelInfo, extra: Iterable[str], known: Collection[str], file: str
+) -> Experiment:
+    """Return the experiment that records all outputs and those extra variables whose values are unknown."""
     outputs = [v.name for v in info.outputs if v.kind != "string"]
+    if not outputs and len(info.observables) <= _MAX_RECORDED:
+        outputs = [v.name for v in info.observables if v.kind != "string"]
     for name in extra:
         if name not in info:
-            known = [v.name for v in info.variables]
+            names = [v.name for v in info.variables]
             raise SpecError(
-                f"unknown variable {name!r}; {did_you_mean(name, known)}", file=file, key="model.record"
+                f"unknown variable {name!r}; {did_you_mean(name, names)}", file=file, key="model.record"
             )
-        if name not in outputs and name not in inputs:
+        if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
     return replace(experiment, outputs=tuple(outputs))
 
@@ -210,6 +266,11 @@ def _space(
     fixed: dict[str, float] = {}
     for name, section in inputs.items():
         key = f"inputs.{name}"
+        if name in info and info[name].alias_of:
+            other = info[name].alias_of
+            raise SpecError(
+                f"the FMU has one input with two names: use {other!r} instead", file=file, key=key
+            )
         variable = _variable(name, info.inputs, "input", file, key)
         if section.value is not None:
             fixed[name] = fixed_value(variable, section.value, file=file, key=f"{key}.value")
@@ -218,18 +279,24 @@ def _space(
     ranges: list[ParameterRange] = []
     for name, parameter in parameters.items():
         key = f"parameters.{name}"
+        if name in info and info[name].causality == "input":
+            raise SpecError(f"{name} is an input; {_as_input(name, parameter, file)}", file=file, key=key)
         settable = [v for v in info.variables if v.settable and v.causality != "input"]
         if name in info and not info[name].settable:
             v = info[name]
-            raise SpecError(
-                f"cannot be set: it is a {v.variability} {v.causality} of the FMU", file=file, key=key
-            )
+            reason = f"it is a {v.variability} {v.causality} of the FMU"
+            reason = f"it is another name of {v.alias_of!r}; use that one" if v.alias_of else reason
+            raise SpecError(f"cannot be set: {reason}", file=file, key=key)
         variable = _variable(name, settable, "parameter or start value", file, key)
+        if variable.kind == "string" and parameter.value is not None:
+            continue
         if parameter.range is not None:
             ranges.append(parameter_range(variable, parameter.range, file=file, key=f"{key}.range"))
         elif parameter.value is not None:
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
     if not searched and not ranges:
+        if file.endswith(".fmu"):  # there is no spec file
+            raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
         raise SpecError(
             "nothing to search; add [inputs.NAME] with range and control_points, "
             "or [parameters.NAME] with range",
@@ -239,11 +306,41 @@ def _space(
     return SearchSpace(tuple(searched), tuple(ranges), experiment.stop_time), fixed
 
 
+def _strings(
+    parameters: Mapping[str, ParameterSection], info: ModelInfo, folder: Path
+) -> tuple[tuple[str, str], ...]:
+    """Return the values of string parameters; files are named relative to the spec's folder."""
+    return tuple(
+        (name, fixed_text(section.value, folder))
+        for name, section in parameters.items()
+        if section.value is not None and info[name].kind == "string"
+    )
+
+
 def _variable(name: str, variables: Iterable[Variable], kind: str, file: str, key: str) -> Variable:
     known = {v.name: v for v in variables}
     if name not in known:
         raise SpecError(f"the FMU has no such {kind}; {did_you_mean(name, known)}", file=file, key=key)
     return known[name]
+
+
+def _as_input(name: str, section: ParameterSection, file: str) -> str:
+    """Say how to write as an input what was written as a parameter."""
+    text = "LOW:HIGH" if section.value is None else str(section.value)
+    if section.range is not None:
+        text = ":".join(f"{value:g}" for value in section.range)
+    option = f"--input {name}={text}"
+    return f"write {option}" if file.endswith(".fmu") else f"write {option}, or [inputs.{name}] in the spec"
+
+
+def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:
+    """Say which option makes one of the inputs, which all have fixed values, a searched one."""
+    if not inputs:
+        return "add --input NAME=LOW:HIGH or --param NAME=LOW:HIGH"
+    name = next(iter(inputs))
+    low, high = info[name].low, info[name].high
+    limits = "LOW:HIGH" if low is None or high is None else f"{low:g}:{high:g}"
+    return f"all inputs have fixed values; give one of them a range, for example --input {name}={limits}"
 
 
 def _bounded_inputs(info: ModelInfo) -> dict[str, object]:

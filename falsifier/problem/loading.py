@@ -14,9 +14,9 @@ from falsifier.core.files import bundled
 from falsifier.core.model import Interface
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.joining import Joined, join, join_fmu
-from falsifier.problem.options import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
+from falsifier.problem.source import Parameterization, ProblemSource, Target
 from falsifier.problem.spec import read_spec
 
 
@@ -29,10 +29,10 @@ def find_spec(target: str) -> tuple[Path, str | None]:
     Raises:
         SpecError: if there is neither; lists the known names.
     """
-    path_part, _, requirement = target.rpartition(":") if ".toml:" in target else (target, "", "")
-    if path_part.endswith(".toml"):
-        return Path(path_part), requirement or None
-    name, _, requirement = target.partition(":")
+    parts = Target.parse(target)
+    if parts.kind == "spec":
+        return Path(parts.file), parts.requirement or None
+    name, requirement = target.partition(":")[0], parts.requirement
     names: list[str] = []
     for path in sorted(bundled("specs").glob("*.toml")):
         if path.stem == "published":
@@ -63,6 +63,7 @@ def load_problem(
     parameters: Mapping[str, ParameterChoice] | None = None,
     stop_time: float | None = None,
     output_interval: float | None = None,
+    time_limit: float | None = None,
     interface: Interface | None = None,
 ) -> Problem:
     """Load one problem.
@@ -77,6 +78,7 @@ def load_problem(
         parameters: overrides for the spec's parameters; see ParameterChoice.
         stop_time: end of each simulation in s.
         output_interval: step of the monitored time grid in s.
+        time_limit: maximum wall-clock time of one simulation in s.
         interface: interface with which the FMU is simulated.
 
     Raises:
@@ -88,6 +90,7 @@ def load_problem(
         parameters=parameters or {},
         stop_time=stop_time,
         output_interval=output_interval,
+        time_limit=time_limit,
         interface=interface,
     )
     return load_source(
@@ -108,7 +111,7 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
     Raises:
         SpecError: if the target is neither a spec file nor a bundled name.
     """
-    if source.target.endswith(".fmu") or source.target.startswith("python:"):
+    if source.parts.kind in ("fmu", "python"):
         return [source]
     path, requirement = find_spec(source.target)
     if requirement is not None:
@@ -119,7 +122,7 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
 
 def spec_file(source: ProblemSource) -> Path | None:
     """Return the spec file of a source; None for an FMU or a problem made in Python."""
-    if source.target.endswith(".fmu") or source.target.startswith("python:"):
+    if source.parts.kind in ("fmu", "python"):
         return None
     return find_spec(source.target)[0]
 
@@ -131,16 +134,20 @@ def load_source(source: ProblemSource) -> Problem:
         SpecError: naming what is wrong and the remedy.
         ModelError: if the FMU cannot be used.
     """
-    if source.target.startswith("python:"):
+    kind = source.parts.kind
+    if kind == "python":
         if source.model_copy(update={"parameterization": "free"}) != ProblemSource(target=source.target):
             raise SpecError(
                 f"{source.target}: a problem made in Python takes no options; change it where it is made"
             )
         problem = replace(_python_problem(source.target), source=source)
-    elif source.target.endswith(".fmu"):
-        if source.stl is None:
+    elif kind == "fmu":
+        if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
-        problem = _made(join_fmu(Path(source.target), source.stl, changes=source.changes), source)
+        problem = _made(
+            join_fmu(Path(source.target), source.stl or "", changes=source.changes, name=source.stl_name),
+            source,
+        )
     else:
         problem = _of_spec(source)
     if source.parameterization == "fixed":
@@ -169,19 +176,32 @@ def _of_spec(source: ProblemSource) -> Problem:
         if len(spec.requirements) > 1:
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{path}:{next(iter(spec.requirements))}. Known: {', '.join(spec.requirements)}",
+                f"{source.target}:{next(iter(spec.requirements))}, or falsify all of them with --all. "
+                f"Known: {', '.join(spec.requirements)}",
                 file=str(path),
             )
         requirement = next(iter(spec.requirements))
     joined = join(
-        spec, requirement, path=path, profile=source.profile, stl=source.stl, changes=source.changes
+        spec,
+        requirement,
+        path=path,
+        profile=source.profile,
+        stl=source.stl,
+        stl_name=source.stl_name,
+        changes=source.changes,
     )
     return _made(joined, source)
 
 
 def _made(joined: Joined, source: ProblemSource) -> Problem:
     return Problem(
-        joined.model, joined.requirement, joined.space, joined.experiment, joined.parameters, source
+        joined.model,
+        joined.requirement,
+        joined.space,
+        joined.experiment,
+        joined.parameters,
+        source,
+        joined.notes,
     )
 
 

@@ -8,8 +8,10 @@ from typing import Self
 
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.space import SearchSpace
-from falsifier.problem.options import InputChoice, ParameterChoice, changes_from
+from falsifier.errors import SpecError, did_you_mean
+from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import ProblemSource
 
 
@@ -24,6 +26,11 @@ class Problem:
         experiment: how each simulation is run.
         parameters: fixed values of parameters, start values and constant inputs, by name.
         source: how it was loaded; None if it was made in Python, or changed after it was loaded.
+        notes: what was chosen or ignored when it was loaded and the user should know, in words.
+
+    Raises:
+        SpecError: if the parts do not fit: the model has no such variable, the formula names a signal that is
+            not recorded, or the search space has another stop time than the experiment.
     """
 
     model: Model
@@ -32,6 +39,16 @@ class Problem:
     experiment: Experiment
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: ProblemSource | None = None
+    notes: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        if self.space.stop_time != self.experiment.stop_time:
+            raise SpecError(
+                f"{self.name}: stop_time is {self.space.stop_time:g} s in the search space, but "
+                f"{self.experiment.stop_time:g} s in the experiment"
+            )
+        if self.info.variables:
+            _check_variables(self)
 
     @classmethod
     def from_fmu(
@@ -39,12 +56,14 @@ class Problem:
         fmu: str | Path,
         formula: str,
         *,
+        name: str = STL_NAME,
         inputs: Mapping[str, InputChoice] | None = None,
         parameters: Mapping[str, ParameterChoice] | None = None,
         stop_time: float | None = None,
         output_interval: float | None = None,
         step_size: float | None = None,
         tolerance: float | None = None,
+        time_limit: float | None = None,
         interface: Interface | None = None,
     ) -> Self:
         """Return the problem for an FMU and a formula.
@@ -52,14 +71,16 @@ class Problem:
         Args:
             fmu: path of the FMU.
             formula: the requirement, in Signal Temporal Logic.
+            name: the requirement's name, in results and records.
             inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
                 all real inputs with a min and a max are.
             parameters: values of parameters and start values, or ranges to search, by name.
             stop_time: end of each simulation in s; default: the FMU's.
-            output_interval: step of the monitored time grid in s; default: the FMU's step if it divides the
-                stop time, else a thousandth of the stop time.
+            output_interval: step of the monitored time grid in s; default: the FMU's step, or the next
+                smaller one that fits the stop time and the formula's times.
             step_size: communication step or maximum solver step in s; default: the output interval.
             tolerance: relative tolerance of the solver; default: the FMU's.
+            time_limit: maximum wall-clock time of one simulation in s; default: 60.
             interface: interface of the FMU; default: co-simulation if the FMU offers it.
 
         Raises:
@@ -77,12 +98,19 @@ class Problem:
             output_interval=output_interval,
             step_size=step_size,
             tolerance=tolerance,
+            time_limit=time_limit,
             interface=interface,
         )
-        joined = join_fmu(Path(fmu), formula, changes=changes)
-        source = ProblemSource(target=str(fmu), stl=formula, changes=changes)
+        joined = join_fmu(Path(fmu), formula, changes=changes, name=name)
+        source = ProblemSource(target=str(fmu), stl=formula, stl_name=name, changes=changes)
         return cls(
-            joined.model, joined.requirement, joined.space, joined.experiment, joined.parameters, source
+            joined.model,
+            joined.requirement,
+            joined.space,
+            joined.experiment,
+            joined.parameters,
+            source,
+            joined.notes,
         )
 
     @property
@@ -108,6 +136,41 @@ class Problem:
             sorted(self.parameters.items()),
         )
         return sha256(repr(content).encode()).hexdigest()
+
+
+def _check_variables(problem: Problem) -> None:
+    """Check that the model has all variables that are named, and that the formula's signals will be known."""
+    info, experiment = problem.info, problem.experiment
+    inputs = [v.name for v in info.inputs]
+    for name in (r.name for r in problem.space.inputs):
+        if name not in inputs:
+            raise SpecError(f"{problem.name}: the model has no input {name!r}; {did_you_mean(name, inputs)}")
+    for name in (*(p.name for p in problem.space.parameters), *problem.parameters, *experiment.outputs):
+        if name not in info:
+            near = did_you_mean(name, (v.name for v in info.variables))
+            raise SpecError(f"{problem.name}: the model has no variable {name!r}; {near}")
+    for name in problem.requirement.formula.signals:
+        if name not in (*experiment.outputs, *inputs):
+            raise SpecError(
+                f"{problem.name}: the formula names {name!r}, which is neither an input nor recorded: add it "
+                "to the experiment's outputs"
+            )
+
+
+def check_names(problems: Iterable[Problem]) -> None:
+    """Check that no two problems have the same name: results and records go by the name.
+
+    Raises:
+        SpecError: naming the name that occurs twice.
+    """
+    seen: set[str] = set()
+    for problem in problems:
+        if problem.name in seen:
+            raise SpecError(
+                f"two of the problems are named {problem.name!r}, and results and records go by the name: "
+                "name each differently, with Problem.from_fmu(..., name=...) or Requirement(name, ...)"
+            )
+        seen.add(problem.name)
 
 
 def alike(problems: Iterable[Problem]) -> list[list[Problem]]:

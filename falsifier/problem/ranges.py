@@ -1,10 +1,12 @@
 """Ranges and values of a spec, checked against the FMU's variables and completed from them."""
 
 from math import ceil, floor
+from pathlib import Path
 
 from falsifier.core.model import Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, ValueKind
 from falsifier.errors import SpecError
+from falsifier.problem.shorthand import named_file
 from falsifier.problem.spec import InputSection
 
 
@@ -77,13 +79,26 @@ def parameter_range(
     )
 
 
-def fixed_value(variable: Variable, value: float, *, file: str | None, key: str) -> float:
+def fixed_text(value: float | str, folder: Path) -> str:
+    """Return the value of a string; a file that it names relative to a folder gets its full path."""
+    return named_file(value, folder) if isinstance(value, str) else f"{value:.17g}"
+
+
+def fixed_value(variable: Variable, value: float | str, *, file: str | None, key: str) -> float:
     """Return a fixed value after checking it.
 
     Raises:
-        SpecError: if the variable's type does not allow it.
+        SpecError: if the variable's type or the FMU's min and max do not allow it.
     """
+    if isinstance(value, str):
+        raise SpecError(
+            f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
+            f"{variable.kind}",
+            file=file,
+            key=key,
+        )
     _check_type(variable, f"{value:g}", (value, value), file, key)
+    _check_limits(variable, f"{value:g}", (value, value), file, key)
     if variable.kind != "real" and not _contains_a_number(variable, value, value):
         expected = "one of " + _items(variable) if variable.literals else "an integer"
         raise SpecError(f"{value:g}: expected {expected} for {variable.name!r}", file=file, key=key)
@@ -95,15 +110,7 @@ def _within(
 ) -> tuple[float, float]:
     low, high = limits
     _check_type(variable, f"[{low:g}, {high:g}]", limits, file, key)
-    if (variable.low is not None and low < variable.low) or (
-        variable.high is not None and high > variable.high
-    ):
-        raise SpecError(
-            f"[{low:g}, {high:g}] exceeds the FMU's limits for {variable.name!r}, "
-            f"[{_limit(variable.low)}, {_limit(variable.high)}]",
-            file=file,
-            key=key,
-        )
+    _check_limits(variable, f"[{low:g}, {high:g}]", limits, file, key)
     if variable.kind != "real" and not _contains_a_number(variable, low, high):
         what = "item of the enumeration" if variable.literals else "integer"
         raise SpecError(f"[{low:g}, {high:g}] contains no {what}; widen the range", file=file, key=key)
@@ -126,6 +133,21 @@ def _check_type(
     if numbers and not min(numbers) <= limits[0] <= limits[1] <= max(numbers):
         raise SpecError(
             f"{shown} exceeds the items of the enumeration {variable.name!r}: {_items(variable)}",
+            file=file,
+            key=key,
+        )
+
+
+def _check_limits(
+    variable: Variable, shown: str, limits: tuple[float, float], file: str | None, key: str
+) -> None:
+    """Reject limits outside the FMU's min and max."""
+    if (variable.low is not None and limits[0] < variable.low) or (
+        variable.high is not None and limits[1] > variable.high
+    ):
+        raise SpecError(
+            f"{shown} exceeds the FMU's limits for {variable.name!r}, "
+            f"[{_limit(variable.low)}, {_limit(variable.high)}]",
             file=file,
             key=key,
         )

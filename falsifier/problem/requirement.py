@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean
+from falsifier.problem.grid import fitting_interval
 from falsifier.stl import Formula, Monitor, parse
+from falsifier.stl.renaming import renamed
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,11 +17,20 @@ class Requirement:
         name: its name in the spec, e.g. ``AT1``.
         formula: the parsed formula; ``str(formula)`` is its text.
         description: its meaning in words.
+
+    Raises:
+        SpecError: if the name is no text, or the formula is not parsed.
     """
 
     name: str
     formula: Formula
     description: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise SpecError(f"requirement: expected a name, got {self.name!r}")
+        if not isinstance(self.formula, Formula):
+            raise SpecError(f"requirement {self.name!r}: expected a formula; use parse({self.formula!r})")
 
 
 def parse_requirement(
@@ -35,9 +46,30 @@ def parse_requirement(
         formula = parse(text)
         for name in formula.signals:
             if name not in info:
-                known = [v.name for v in (*info.outputs, *info.inputs)]
-                raise FormulaError(f"unknown signal {name!r}; {did_you_mean(name, known)}")
-        Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
+                raise FormulaError(f"unknown signal {name!r}; {_similar(name, info)}")
+        # One input has one name, whose values are known at every sample without asking the model.
+        formula = renamed(formula, _input_names(info, formula))
     except FormulaError as error:
         raise SpecError(str(error), file=file, key=key) from None
+    try:
+        Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
+    except FormulaError as error:
+        fits = fitting_interval(formula, experiment.stop_time, experiment.output_interval)
+        advice = "" if fits is None else f"; output_interval = {fits:.12g} fits all times"
+        raise SpecError(f"{error}{advice}", file=file, key=key) from None
     return formula
+
+
+def _similar(name: str, info: ModelInfo) -> str:
+    """Return the end of the message: the most similar variable, and what requirements usually name."""
+    usual = [v.name for v in (*info.observables, *info.inputs)]
+    listing = did_you_mean(name, usual)
+    near = did_you_mean(name, (v.name for v in info.variables))
+    if listing.startswith("Known") and not near.startswith("Known"):
+        return f"{near.split('?')[0]}? {listing}"
+    return listing
+
+
+def _input_names(info: ModelInfo, formula: Formula) -> dict[str, str]:
+    variables = [info[name] for name in formula.signals]
+    return {v.name: v.alias_of for v in variables if v.alias_of and v.causality == "input"}

@@ -1,12 +1,46 @@
 """Sources of problems: what is needed to load a problem again, in another process or from a journal."""
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
+from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.spec import ModelChanges
 
 Parameterization = Literal["free", "fixed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What a target means; requirement names may contain anything, colons and file endings too.
+
+    Attributes:
+        kind: ``spec`` file, ``fmu``, ``python`` for a problem made in Python, or ``bundled``.
+        file: path of the spec file or the FMU; empty for the other kinds.
+        requirement: name of the requirement, or of the problem made in Python; empty if there is none.
+    """
+
+    kind: Literal["spec", "fmu", "python", "bundled"]
+    file: str = ""
+    requirement: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> "Target":
+        """Return the parts of a target.
+
+        >>> Target.parse("specs/AT.toml:AT1").requirement, Target.parse("AT:AT1").requirement
+        ('AT1', 'AT1')
+        """
+        if text.startswith("python:"):
+            return cls("python", requirement=text.rpartition(":")[2])
+        path, colon, requirement = text.partition(".toml:")
+        if colon or text.endswith(".toml"):
+            return cls("spec", f"{path.removesuffix('.toml')}.toml", requirement)
+        if text.endswith(".fmu"):
+            return cls("fmu", text)
+        return cls("bundled", requirement=text.partition(":")[2])
 
 
 class ProblemSource(BaseModel):
@@ -16,6 +50,7 @@ class ProblemSource(BaseModel):
         target: ``file.toml:REQ``, ``file.fmu``, a bundled name such as ``AT1``, or ``python:MODULE:NAME``: a
             Problem made in Python, or a function that returns one.
         stl: formula to use instead of the spec's requirement.
+        stl_name: name of the requirement that this formula makes.
         profile: name of a profile of the spec.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
             only the control points of the spec are allowed.
@@ -26,6 +61,7 @@ class ProblemSource(BaseModel):
 
     target: str
     stl: str | None = None
+    stl_name: str = STL_NAME
     profile: str | None = None
     parameterization: Parameterization = "free"
     changes: ModelChanges = Field(default_factory=ModelChanges)
@@ -39,10 +75,16 @@ class ProblemSource(BaseModel):
         return hash(self.model_dump_json())
 
     @property
-    def name(self) -> str:
-        """The last part of the target: the requirement's name, if the target contains one.
+    def parts(self) -> Target:
+        """The parts of the target."""
+        return Target.parse(self.target)
 
-        >>> ProblemSource(target="specs/AT.toml:AT1").name, ProblemSource(target="AT1").name
-        ('AT1', 'AT1')
+    @property
+    def name(self) -> str:
+        """The requirement's name; the name of the file or of the bundled spec if the target states none.
+
+        >>> ProblemSource(target="specs/AT.toml:AT1").name, ProblemSource(target="my/AT.toml").name
+        ('AT1', 'AT')
         """
-        return self.target.rpartition(":")[2]
+        parts = self.parts
+        return parts.requirement or Path(parts.file).stem or self.target

@@ -21,6 +21,11 @@ from falsifier.errors import SpecError, did_you_mean, rejected
 Section = TypeVar("Section", bound=BaseModel)
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Maximum number of control points of one input.
+MAX_CONTROL_POINTS = 10_000
+# Limits of a spec file: the time to read nested keys grows with the square of their depth.
+_MAX_LENGTH = 1_000_000
+_MAX_KEY_PARTS = 500
 
 
 class _Strict(BaseModel):
@@ -30,7 +35,9 @@ class _Strict(BaseModel):
 class FreeSection(_Strict):
     """Limits of a free parameterization."""
 
-    max_control_points: int = Field(ge=1, description="Maximum number of control points.")
+    max_control_points: int = Field(
+        ge=1, le=MAX_CONTROL_POINTS, description="Maximum number of control points."
+    )
     min_interval: Seconds = Field(description="Minimum time between two control points in s.")
 
 
@@ -46,7 +53,9 @@ class InputSection(_Strict):
     range: tuple[Number, Number] | None = Field(
         None, description="[low, high]; default: the FMU's min and max."
     )
-    control_points: int | None = Field(None, ge=1, description="Number of evenly spaced control points.")
+    control_points: int | None = Field(
+        None, ge=1, le=MAX_CONTROL_POINTS, description="Number of evenly spaced control points."
+    )
     interpolation: Interpolation | None = Field(
         None,
         description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
@@ -66,27 +75,31 @@ class InputSection(_Strict):
         return self
 
 
-def _bare_number_is_a_value(section: object) -> object:
-    return {"value": section} if isinstance(section, int | float | bool) else section
+def _bare_value(section: object) -> object:
+    return {"value": section} if isinstance(section, int | float | bool | str) else section
 
 
 class ParameterSection(_Strict):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
     range: tuple[Number, Number] | None = Field(None, description="[low, high] to search within.")
-    value: Number | None = Field(None, description="Fixed value.")
+    value: Number | str | None = Field(
+        None, description="Fixed value; text for a string. A file is named relative to the spec file."
+    )
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "ParameterSection":
         if self.range is not None:
             _check_order(self.range)
         if (self.range is None) == (self.value is None):
-            raise ValueError("expected either range = [low, high] (searched) or value = number (fixed)")
+            raise ValueError(
+                "expected either range = [low, high] (searched) or value = number or text (fixed)"
+            )
         return self
 
 
 Inputs = dict[str, InputSection]
-Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_number_is_a_value)]]
+Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_value)]]
 
 
 class ModelSection(_Strict):
@@ -101,6 +114,7 @@ class ModelSection(_Strict):
     time_limit: Seconds | None = Field(
         None, description="Maximum wall-clock time of one simulation in s; default: 60."
     )
+    logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
 
 
@@ -112,6 +126,8 @@ class ModelChanges(_Strict):
     output_interval: Seconds | None = None
     step_size: Seconds | None = None
     tolerance: Seconds | None = None
+    time_limit: Seconds | None = None
+    logging: bool | None = None
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
 
@@ -156,15 +172,25 @@ def read_spec(path: Path) -> Spec:
         SpecError: naming the file, the key and what was expected.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin files with a byte order mark
     except FileNotFoundError:
         raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one", file=str(path)) from None
     except (OSError, UnicodeDecodeError) as error:
         raise SpecError(f"cannot be read: {error}", file=str(path)) from None
+    if len(text) > _MAX_LENGTH:
+        raise SpecError(f"has {len(text):,} characters, more than {_MAX_LENGTH:,}", file=str(path))
+    if any(line.partition("=")[0].count(".") > _MAX_KEY_PARTS for line in text.splitlines()):
+        raise SpecError(f"has a key of more than {_MAX_KEY_PARTS} parts", file=str(path))
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
         raise SpecError(f"not valid TOML: {error}", file=str(path)) from None
+    if not data:
+        raise SpecError(
+            "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "
+            "`falsifier init MODEL.fmu` write a spec to begin with",
+            file=str(path),
+        )
     return parse_spec(data, file=str(path))
 
 

@@ -1,108 +1,158 @@
 """Starter specs: valid spec files for an FMU, with comments on what to fill in."""
 
-from collections.abc import Iterable
-from itertools import islice
+from collections.abc import Iterable, Sequence
 from math import ceil, floor
 from pathlib import Path
+from typing import Any
 
+import tomlkit
+from tomlkit.items import Item, Table
+
+from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
-from falsifier.problem.defaults import DEFAULT_POINTS, default_interface, default_interval
+from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
 from falsifier.stl.names import name_text
 
 # Stop time in s if the FMU specifies none.
-_DEFAULT_STOP_TIME = 10.0
+DEFAULT_STOP_TIME = 10.0
 # Bound of the placeholder requirement if the FMU specifies no max; no real output reaches it.
 _UNREACHED = 1e9
-# Maximum number of parameters that are listed.
+# Maximum number of parameters, and of variables to write requirements about, that are listed.
 _SHOWN_PARAMETERS = 10
+_SHOWN_VARIABLES = 20
 
 
 def starter_spec(fmu: Path, info: ModelInfo) -> str:
     """Return the text of a spec file for an FMU: it is valid as it is; comments say what to fill in."""
     inputs = [v for v in info.inputs if v.kind != "string"]
-    tunable = sorted(
-        (v for v in info.parameters if v.settable and v.kind != "string"), key=lambda v: v.kind != "real"
-    )
-    sections = [_model_section(fmu, info), *(_input_section(v) for v in inputs)]
-    if tunable and not inputs:
-        sections.append(_searched_parameter(tunable[0]))
+    tunable = _tunable(info)
+    if not inputs and not tunable:
+        raise SpecError(
+            f"{info.name}: nothing to search: the FMU has no input, parameter or start value to set"
+        )
+    document = tomlkit.document()
+    document.add(_comment(f"{info.name}: {info.description}" if info.description else info.name))
+    document.add(tomlkit.nl())
+    document.add("model", _model_table(fmu, info))
+    if inputs:
+        sections = tomlkit.table(is_super_table=True)
+        for v in inputs:
+            sections.add(v.name, _input_table(v))
+        document.add("inputs", sections)
     if tunable:
-        sections.append(_parameter_hints(tunable))
-    sections.append(_requirement_section(info))
-    return "\n\n".join(sections) + "\n"
+        document.add("parameters", _parameters_table(tunable, searched=() if inputs else tunable[:1]))
+    requirements = tomlkit.table(is_super_table=True)
+    requirements.add("R1", _requirement_table(info))
+    document.add("requirements", requirements)
+    return tomlkit.dumps(document)
 
 
-def _model_section(fmu: Path, info: ModelInfo) -> str:
-    stop_time = info.stop_time or _DEFAULT_STOP_TIME
-    doubt = "" if info.stop_time else "  # the FMU specifies none: check this"
-    about = f"# {info.name}: {info.description}\n\n" if info.description else f"# {info.name}\n\n"
-    return (
-        f'{about}[model]\nfmu = "{fmu.as_posix()}"\ninterface = "{default_interface(info)}"\n'
-        f"stop_time = {stop_time!r}{doubt}\noutput_interval = {default_interval(info, stop_time)!r}"
+def _tunable(info: ModelInfo) -> list[Variable]:
+    """Return the parameters that can be set, or else the start values; real ones first."""
+    settable = [v for v in info.variables if v.settable and v.kind != "string" and v.causality != "input"]
+    parameters = [v for v in settable if v.causality == "parameter"]
+    return sorted(parameters or settable, key=lambda v: v.kind != "real")
+
+
+def _model_table(fmu: Path, info: ModelInfo) -> Table:
+    table = tomlkit.table()
+    table.add("fmu", fmu.as_posix())
+    table.add("interface", default_interface(info) or "co-simulation")
+    doubt = "" if info.stop_time else "the FMU specifies none: check this"
+    table.add("stop_time", _noted(info.stop_time or DEFAULT_STOP_TIME, doubt))
+    table.add(
+        _comment("output_interval = SECONDS  # default: fits the FMU's step, the formulas and the stop time")
     )
+    table.add(tomlkit.nl())
+    return table
 
 
-def _input_section(v: Variable) -> str:
+def _input_table(v: Variable) -> Table:
+    table = tomlkit.table()
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
-    comment = f"# {meaning}\n" if meaning else ""
-    comment += f"# {_items(v)}\n" if v.literals else ""
-    least, most = v.limits
-    low, high = (0.0, 1.0) if least is None or most is None else (least, most)
+    for line in (meaning, _items(v) if v.literals else ""):
+        if line:
+            table.add(_comment(line))
+    low, high = _guessed(v)
     if low == high:
-        return f"{comment}[inputs.{_toml_key(v.name)}]\nvalue = {low!r}"
-    unknown = least is None or most is None
-    doubt = "  # the FMU specifies no min and max: replace with the real range" if unknown else ""
-    interpolation = "pchip" if v.kind == "real" else "constant"
-    return (
-        f"{comment}[inputs.{_toml_key(v.name)}]\nrange = {_range(v, low, high)}{doubt}\n"
-        f'control_points = {DEFAULT_POINTS}\ninterpolation = "{interpolation}"'
-    )
+        table.add("value", low)
+    else:
+        doubt = (
+            "" if v.is_bounded else "unbounded: the FMU specifies no min and max; replace with the real range"
+        )
+        table.add("range", _noted(_range(v, low, high), doubt))
+        table.add("control_points", DEFAULT_POINTS)
+        table.add("interpolation", "pchip" if v.kind == "real" else "constant")
+    table.add(tomlkit.nl())
+    return table
 
 
-def _searched_parameter(v: Variable) -> str:
-    start = v.start if isinstance(v.start, int | float) else 0.0
-    reach = max(abs(start), 1.0) / 2
+def _guessed(v: Variable) -> tuple[float, float]:
+    """Return the range of an input; what the FMU leaves open is one unit away from what it states."""
     least, most = v.limits
-    low = start - reach if least is None else least
-    high = start + reach if most is None else most
-    return f"[parameters.{_toml_key(v.name)}]  # replace with the real range\nrange = {_range(v, low, high)}"
+    if least is None:
+        least = 0.0 if most is None else most - 1.0
+    return least, least + 1.0 if most is None else most
 
 
-def _range(v: Variable, low: float, high: float) -> str:
-    """Return a range in TOML; with integer bounds if the variable has only integer values."""
-    if v.kind == "real":
-        return f"[{float(low)!r}, {float(high)!r}]"
-    return f"[{floor(low)}, {ceil(high)}]"
+def _parameters_table(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> Table:
+    table = tomlkit.table()
+    for v in searched:
+        start = v.start if isinstance(v.start, int | float) else 0.0
+        reach = max(abs(start), 1.0) / 2
+        least, most = v.limits
+        limits = _range(v, start - reach if least is None else least, start + reach if most is None else most)
+        table.append(tomlkit.key([v.name, "range"]), _noted(limits, "replace with the real range"))
+    table.add(_comment("Each may be searched, or fixed with NAME = NUMBER:"))
+    for v in tunable[:_SHOWN_PARAMETERS]:
+        low, high = v.limits
+        shown = "[LOW, HIGH]" if low is None or high is None else str(_range(v, low, high))
+        default = f"{v.start} {v.unit}".rstrip()
+        table.add(_comment(f"{tomlkit.key(v.name).as_string()}.range = {shown}  # default: {default}"))
+    table.add(tomlkit.nl())
+    return table
+
+
+def _range(v: Variable, low: float, high: float) -> list[float]:
+    """Return a range; with integer bounds if the variable has only integer values."""
+    return [float(low), float(high)] if v.kind == "real" else [floor(low), ceil(high)]
 
 
 def _items(v: Variable) -> str:
     return ", ".join(f"{number} = {name}" for name, number in v.literals.items())
 
 
-def _parameter_hints(parameters: Iterable[Variable]) -> str:
-    hints = ["# Parameters may be searched, or fixed with value = NUMBER:"]
-    for v in islice(parameters, _SHOWN_PARAMETERS):
-        low, high = v.limits
-        limits = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
-        hints.append(
-            f"# parameters.{_toml_key(v.name)}.range = {limits}  # default: {v.start} {v.unit}".rstrip()
-        )
-    return "\n".join(hints)
+def _requirement_table(info: ModelInfo) -> Table:
+    candidates = [v for v in info.observables if v.kind != "string"]
+    if not candidates:
+        raise SpecError(f"{info.name}: the FMU computes no variable that a requirement could be about")
+    table = tomlkit.table()
+    if not info.outputs:
+        shown = ", ".join(name_text(v.name) for v in candidates[:_SHOWN_VARIABLES])
+        more = ", ..." if len(candidates) > _SHOWN_VARIABLES else ""
+        table.add(_comment(f"The FMU declares no outputs. Requirements may name any variable: {shown}{more}"))
+    first = candidates[0]
+    bound = _UNREACHED if first.high is None else first.high
+    stop_time = info.stop_time or DEFAULT_STOP_TIME
+    formula = f"G[0,{stop_time:.10g}] ({name_text(first.name)} <= {bound:.10g})"
+    table.add("formula", _noted(_formula_item(formula), "replace with the real requirement"))
+    table.add("description", "")
+    return table
 
 
-def _requirement_section(info: ModelInfo) -> str:
-    output = next((v for v in info.outputs if v.kind != "string"), None)
-    if output is None:
-        raise SpecError(f"{info.name}: the FMU has no numeric output to write a requirement about")
-    bound = _UNREACHED if output.high is None else output.high
-    stop_time = info.stop_time or _DEFAULT_STOP_TIME
-    return (
-        "[requirements.R1]\n"
-        f"formula = 'G[0,{stop_time:.10g}] ({name_text(output.name)} <= {bound:.10g})'"
-        '  # replace with the real requirement\ndescription = ""'
-    )
+def _formula_item(formula: str) -> Item:
+    """Return a literal string, in which quotes need no escapes, if TOML allows that."""
+    return tomlkit.string(formula, literal=formula.isprintable() and "'" not in formula)
 
 
-def _toml_key(name: str) -> str:
-    return name if name.replace("_", "").replace("-", "").isalnum() else f'"{name}"'
+def _noted(value: object, comment: str) -> Item:
+    item: Item = tomlkit.item(value)
+    if comment:
+        item.comment(one_line(comment))
+        item.trivia.comment_ws = "  "
+    return item
+
+
+def _comment(text: str) -> Any:
+    return tomlkit.comment(one_line(text))

@@ -2,8 +2,16 @@
 
 from dataclasses import dataclass, replace
 
+from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
-from falsifier.errors import SpecError
+from falsifier.errors import FalsifierError, SpecError
+
+# Maximum number of simulations of a run if nothing else is said.
+DEFAULT_SIMULATIONS = 100
+
+
+class LimitReached(FalsifierError):
+    """A limit of the run is reached in the middle of an engine's turn; the message says which."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,6 +20,7 @@ class Spent:
 
     Attributes:
         simulations: number of simulated candidates, including failed simulations.
+        failures: number of simulations among them that failed, crashed or timed out.
         seconds: wall-clock time of the run.
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
@@ -31,6 +40,18 @@ class Spent:
     completion_tokens: int = 0
     reasoning_tokens: int = 0
     cost: float | None = 0.0
+    failures: int = 0
+
+    @property
+    def has_mostly_failed(self) -> bool:
+        """Whether more than half of the simulations failed, so that little was searched."""
+        return 2 * self.failures > self.simulations
+
+    @property
+    def simulations_text(self) -> str:
+        """Number of simulations in words, with those that failed."""
+        failed = f", {self.failures} of them failed" if self.failures else ""
+        return counted(self.simulations, "simulation") + failed
 
     @property
     def tokens(self) -> int:
@@ -66,10 +87,12 @@ class Budget:
     cost: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("simulations", "seconds", "tokens", "cost"):
-            limit = getattr(self, name)
-            if limit is not None and not limit > 0:
-                raise SpecError(f"budget: {name} must be positive, got {limit}")
+        for name in ("simulations", "tokens"):
+            if (number := getattr(self, name)) is not None:
+                object.__setattr__(self, name, whole(f"budget: {name}", number, least=1))
+        for name in ("seconds", "cost"):
+            if (limit := getattr(self, name)) is not None:
+                positive(f"budget: {name}", limit)
         if all(getattr(self, name) is None for name in ("simulations", "seconds", "tokens", "cost")):
             raise SpecError("budget: give at least one limit: simulations, seconds, tokens or cost")
 
@@ -94,6 +117,10 @@ class Budget:
             if spent.cost >= self.cost:
                 return f"the budget of {self.cost:g} US dollars is used up"
         return None
+
+    def seconds_left(self, spent: Spent) -> float | None:
+        """Seconds that the budget still allows; None without a limit."""
+        return None if self.seconds is None else max(0.0, self.seconds - spent.seconds)
 
     def remaining(self, spent: Spent, wanted: int) -> int:
         """Number of the wanted simulations that the budget still allows."""

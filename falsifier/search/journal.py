@@ -2,38 +2,41 @@
 
 ::
 
-    manifest.json        what was requested, with which versions; written once
-    journal.jsonl        what happened, one JSON object per line, append-only
-    trajectories/N.npz   outputs and inputs of evaluation N; Keep decides which ones are kept
-    lock                 held while a process writes here
+    manifest.json            what was requested, with which versions; written once
+    journal.jsonl            what happened, one JSON object per line, append-only
+    trajectories/N-SUM.npz   outputs and inputs of evaluation N; Keep decides which ones are kept
+    lock                     held while a process writes here
 
 Lines are written before and after every simulation and after every reply of a language model. A last line
-that a crash left incomplete is dropped when the journal is opened again. No other module reads or writes
-these files.
+that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
+a checksum, lines are numbered, and SUM in the name of a trajectory is that file's checksum: what was damaged
+is noticed. Only search/repair.py, which drops what is damaged, touches these files beside this module.
 """
 
 import json
 import os
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from time import monotonic
 from typing import Any, Literal
 
 from filelock import FileLock, Timeout
-from pydantic import ValidationError
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
+from falsifier.core.literals import one_line
+from falsifier.core.sealing import check_seal, checksum, seal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import Exchange
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.records import (
-    RECORDS,
     AskedRecord,
     ConfirmedRecord,
     EndedRecord,
@@ -41,6 +44,8 @@ from falsifier.search.records import (
     ExchangeRecord,
     Record,
     VerdictRecord,
+    line_of,
+    parse_line,
 )
 
 MANIFEST = "manifest.json"
@@ -55,8 +60,9 @@ _SYNC_PERIOD = 1.0
 # best: only the best one, for campaigns of very many runs.
 Keep = Literal["history", "best"]
 _KEPT_TRAJECTORIES = 200
-# Lines with candidates are long; readers that only count skip them by this prefix, without parsing.
-_ASKED = b'{"kind":"asked"'
+# Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
+_ASKED = b'"kind":"asked"'
+_KIND_WITHIN = 40
 
 
 class Journal:
@@ -84,11 +90,16 @@ class Journal:
                 f"{directory}: another process is writing to this run; wait until it ends"
             ) from None
         path = directory / JOURNAL
-        _drop_torn_line(path)
-        self.records = read_journal(directory)
-        # A resumed run repeats the events that are recorded already; this many of each kind are not written.
-        self._recorded = Counter(type(record) for record in self.records)
-        self._file = path.open("a", encoding="utf-8")
+        try:
+            _drop_torn_line(path)
+            self.records = read_journal(directory)
+            self._file = path.open("ab", buffering=0)
+        except BaseException:
+            self._lock.release()
+            raise
+        # A resumed run repeats the events that are recorded already; they are not written again.
+        self._recorded = Counter(map(_key, self.records))
+        self._lines = len(self.records)
         self._synced = monotonic()
 
     def __call__(self, event: Event) -> None:
@@ -119,38 +130,50 @@ class Journal:
                 pass
 
     def write(self, record: Record, *, at_once: bool = False) -> None:
-        """Append a record; at_once forces it to disk before returning."""
-        self._file.write(record.model_dump_json() + "\n")
-        self._file.flush()
-        if at_once or monotonic() - self._synced > _SYNC_PERIOD:
-            os.fsync(self._file.fileno())
-            self._synced = monotonic()
+        """Append a record; at_once forces it to disk before returning.
+
+        Raises:
+            OSError: if it cannot be written; then nothing of it remains in the file.
+        """
+        size = self._file.seek(0, os.SEEK_END)
+        rest = memoryview(line_of(record, self._lines + 1))
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+            if at_once or monotonic() - self._synced > _SYNC_PERIOD:
+                os.fsync(self._file.fileno())
+                self._synced = monotonic()
+        except BaseException:
+            with suppress(OSError):
+                self._file.truncate(size)
+            raise
+        self._lines += 1
 
     def close(self) -> None:
         """Force everything to disk and let others write here."""
-        with suppress(ValueError):
-            self._file.flush()
+        with suppress(OSError):  # the last line of a run was forced to disk when it was written
             os.fsync(self._file.fileno())
         self._file.close()
         self._lock.release()
 
     def _add(self, record: Record, *, at_once: bool = False) -> None:
         """Append a record, unless the journal contains it already."""
-        if self._recorded[type(record)]:
-            self._recorded[type(record)] -= 1
-        else:
+        if not self._is_recorded(_key(record)):
             self.write(record, at_once=at_once)
+
+    def _is_recorded(self, key: "_Key") -> bool:
+        found = self._recorded[key] > 0
+        self._recorded[key] -= found
+        return found
 
     def _evaluated(self, event: Evaluated) -> None:
         """Append an evaluation, and save its trajectory if it is one to keep."""
-        if self._recorded[EvaluatedRecord]:
-            self._recorded[EvaluatedRecord] -= 1
+        if self._is_recorded(("evaluated", event.index)):
             return
         evaluation, file = event.evaluation, None
         every = self._keep == "history" and event.index < _KEPT_TRAJECTORIES
         if evaluation.trajectory is not None and (event.improved or every):
-            file = f"{TRAJECTORIES}/{event.index}.npz"
-            evaluation.trajectory.save(self.directory / file)
+            file = save_trajectory(self.directory, event.index, evaluation.trajectory)
         self.write(
             EvaluatedRecord(
                 index=event.index,
@@ -184,24 +207,37 @@ def holds_run(directory: Path) -> bool:
     return (directory / MANIFEST).exists()
 
 
+def holds_lines(directory: Path) -> bool:
+    """Whether a directory contains a journal with at least one line."""
+    path = directory / JOURNAL
+    return path.exists() and path.stat().st_size > 0
+
+
 def read_manifest(directory: Path) -> dict[str, Any]:
     """Read a run directory's manifest as plain JSON.
 
     Raises:
-        JournalError: if there is none, or it is not valid JSON.
+        JournalError: if there is none, or it is damaged.
     """
+    path = directory / MANIFEST
     try:
-        manifest: dict[str, Any] = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
+        content = path.read_bytes()
+        check_seal(content)
+        manifest: dict[str, Any] = json.loads(content)
+        del manifest["sum"]
     except FileNotFoundError:
         raise JournalError(f"{directory}: not a run directory: it contains no {MANIFEST}") from None
-    except json.JSONDecodeError as error:
-        raise JournalError(f"{directory}/{MANIFEST}: not valid JSON: {error}") from None
+    except (ValueError, OSError, RecursionError) as error:
+        raise JournalError(
+            f"{path} is damaged: {one_line(str(error))}; this run cannot be continued: start a new one"
+        ) from None
     return manifest
 
 
 def write_manifest(directory: Path, manifest: dict[str, Any]) -> None:
     """Write the manifest of a run directory."""
-    write_whole(directory / MANIFEST, json.dumps(manifest, indent=2) + "\n")
+    content = {key: value for key, value in manifest.items() if key != "sum"}
+    write_whole(directory / MANIFEST, seal(json.dumps(content, indent=2)))
 
 
 def read_journal(directory: Path, *, with_candidates: bool = True) -> list[Record]:
@@ -255,17 +291,24 @@ class JournalReader:
             for line in file:
                 if not line.endswith(b"\n"):  # cut off by a crash, or still being written
                     return
-                self.offset += len(line)
                 self.line += 1
-                if self._with_candidates or not line.startswith(_ASKED):
-                    yield self._parsed(line)
+                record = self._checked(line)
+                self.offset += len(line)
+                if record is not None:
+                    yield record
 
-    def _parsed(self, line: bytes) -> Record:
+    def _checked(self, line: bytes) -> Record | None:
+        """Check a line; return its record, or None if it is of a kind to skip."""
         try:
-            return RECORDS.validate_json(line)
-        except ValidationError as error:
-            message = error.errors()[0]["msg"]
-            raise JournalError(f"{self.path}: line {self.line} is damaged: {message}") from None
+            check_seal(line)
+            if not self._with_candidates and _ASKED in line[:_KIND_WITHIN]:
+                return None
+            return parse_line(line, self.line)
+        except ValueError as error:
+            raise JournalError(
+                f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
+                f"falsifier repair {shlex.quote(str(self.path.parent))}"
+            ) from None
 
 
 def recorded_exchanges(records: Iterable[Record]) -> list[Exchange]:
@@ -285,8 +328,8 @@ def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
 
 def recorded_evaluations(
     directory: Path, records: Sequence[Record], requirement: str | None = None
-) -> list[Evaluation]:
-    """Recorded evaluations in order, each with its trajectory if that was kept.
+) -> dict[int, Evaluation]:
+    """Recorded evaluations by their index, in its order, each with its trajectory if that was kept.
 
     Args:
         directory: run directory.
@@ -296,7 +339,7 @@ def recorded_evaluations(
     """
     candidates = recorded_candidates(records)
     turn: dict[int, str] = {}
-    evaluations = []
+    evaluations = {}
     for record in records:
         if isinstance(record, AskedRecord):
             turn |= dict.fromkeys(
@@ -304,24 +347,57 @@ def recorded_evaluations(
             )
         elif isinstance(record, EvaluatedRecord):
             verdict = record.verdicts.get(requirement or turn[record.index])
-            evaluations.append(
-                Evaluation(
-                    candidates[record.index],
-                    record.status,
-                    verdict.verdict if verdict else None,
-                    record.reason,
-                    recorded_trajectory(directory, record.trajectory),
-                    record.seconds,
-                    tuple(record.log),
-                )
+            evaluations[record.index] = Evaluation(
+                candidates[record.index],
+                record.status,
+                verdict.verdict if verdict else None,
+                record.reason,
+                recorded_trajectory(directory, record.trajectory),
+                record.seconds,
+                tuple(record.log),
             )
-    return evaluations
+    return dict(sorted(evaluations.items()))
+
+
+def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
+    """Write a trajectory to a run directory and force it to disk; return its name for the record."""
+    buffer = BytesIO()
+    trajectory.save(buffer)
+    content = buffer.getvalue()
+    name = f"{TRAJECTORIES}/{index}-{checksum(content)}.npz"
+    write_whole(directory / name, content)
+    return name
 
 
 def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
-    """Load the trajectory of a record; None if it was not kept."""
+    """Load the trajectory of a record; None if it was not kept, or is damaged."""
     path = directory / (name or "-")
-    return Trajectory.load(path) if path.is_file() else None
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    return Trajectory.load(BytesIO(content)) if is_intact(path, content) else None
+
+
+def is_intact(path: Path, content: bytes) -> bool:
+    """Whether the content of a trajectory's file matches the checksum in its name."""
+    return path.stem.rpartition("-")[2] == checksum(content)
+
+
+_Key = tuple[str | int, ...]
+
+
+def _key(record: Record) -> _Key:
+    """What a record is about: a resumed run does not write a record about the same again."""
+    match record:
+        case AskedRecord():
+            return record.kind, record.first
+        case EvaluatedRecord():
+            return record.kind, record.index
+        case ConfirmedRecord():
+            return record.kind, record.index, record.requirement
+        case _:
+            return (record.kind,)
 
 
 def _drop_torn_line(path: Path) -> None:

@@ -15,8 +15,9 @@ from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.evaluation.workers import evaluate_all
 from falsifier.llm.messages import Chat, Exchange
-from falsifier.problem.problem import Problem
-from falsifier.search.budget import Budget, Spent
+from falsifier.problem.problem import Problem, check_names
+from falsifier.search.bounded import BoundedChat
+from falsifier.search.budget import Budget, LimitReached, Spent
 from falsifier.search.events import (
     Asked,
     Confirmed,
@@ -27,6 +28,7 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
+from falsifier.search.proposals import proposals
 from falsifier.search.result import Result, ResultStatus
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
@@ -46,8 +48,8 @@ class Steps(Protocol):
         """Wall-clock seconds of the recorded part of the run."""
         ...
 
-    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Return an engine's candidates, the number asked for, and the time that took in s."""
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
         ...
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
@@ -75,10 +77,10 @@ class Live:
     replayed: int = 0
     seconds: float = 0.0
 
-    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Ask the engine, and measure the time."""
         started = perf_counter()
-        candidates = engine.ask(wanted)
+        candidates = proposals(engine, problem.space, wanted)
         return candidates, wanted, perf_counter() - started
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
@@ -123,8 +125,11 @@ def search(
         One result per problem, in their order.
 
     Raises:
-        SpecError: if the problems differ in more than their requirement.
+        SpecError: if the problems differ in more than their requirement or share a name, or an engine
+            returns no candidate or too many.
+        CandidateError: if an engine returns a candidate outside the search space.
     """
+    check_names(problems)
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     loop = _Loop(budget, steps or Live(), directory, tuple(listeners))
@@ -133,7 +138,9 @@ def search(
     try:
         loop.attach()
         reason = loop.run(batch)
-        status = "failed" if loop.all_failed() else "not falsified"
+        status = "not falsified"
+        if loop.spent.has_mostly_failed:
+            status, reason = "failed", loop.failure_text()
     except KeyboardInterrupt:
         status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
@@ -178,14 +185,20 @@ class _Loop:
         self.directory = directory
         self.listeners = listeners
         self.count = 0
+        self.last_error = ""
         self.started = perf_counter() - steps.seconds
         self.spent = Spent()
+        self.unrecorded = ""
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
+
+        def wrap(chat: Chat) -> Chat:
+            return self.steps.chat(BoundedChat(chat, self.budget, self.clock))
+
         for target in self.targets:
             if isinstance(target.engine, AsksLLM):
-                target.engine.attach(self.exchanged, self.steps.chat)
+                target.engine.attach(self.exchanged, wrap)
 
     def run(self, batch: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
@@ -200,16 +213,19 @@ class _Loop:
         turns = 0
         while standing := [t for t in self.targets if t.counterexample is None]:
             limit = self.budget.exceeded(self.clock())
-            if limit is not None or self.count >= _MAX_INITIAL_FAILURES:
-                if self.all_failed():
-                    return self.failure_text()
-                if limit is not None:
-                    return limit
+            if limit is not None:
+                return limit
+            if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
+                return self.failure_text()
             turn = standing[turns % len(standing)]
             turns += 1
             told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
+            try:
+                candidates = self.ask(turn, batch)
+            except LimitReached as reached:
+                return self.failure_text() if self.all_failed() else str(reached)
             # One by one, as they finish: what an interruption leaves of a batch is counted and recorded.
-            for evaluation in self.steps.evaluate(turn.problem, self.ask(turn, batch)):
+            for evaluation in self.steps.evaluate(turn.problem, candidates):
                 judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
                 self.note(turn, evaluation, judged)
                 for target, seen in judged:
@@ -224,17 +240,18 @@ class _Loop:
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
-        return self.count > 0 and all(t.best is None for t in self.targets)
+        return 0 < self.count == self.spent.failures
 
     def failure_text(self) -> str:
-        """The reason of a run in which every simulation failed."""
-        last = self.targets[0].evaluations[-1]
-        failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
-        return f"{failed} failed; the last error: {last.reason}"
+        """The reason of a run in which most simulations failed."""
+        failed = f"{self.spent.failures} of {self.count} simulations"
+        if self.all_failed():
+            failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
+        return f"{failed} failed; the last error: {self.last_error}"
 
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
-        candidates, wanted, seconds = self.steps.ask(target.engine, wanted)
+        candidates, wanted, seconds = self.steps.ask(target.problem, target.engine, wanted)
         self.think(seconds)
         self.emit(
             Asked(
@@ -256,10 +273,13 @@ class _Loop:
     ) -> None:
         """Count and announce one simulation, judged against each requirement not yet falsified."""
         improved = [target.note(seen) for target, seen in judged]
+        failed = all(seen.status != "ok" for _, seen in judged)
+        self.last_error = evaluation.reason if failed else self.last_error
         self.spent = replace(
             self.clock(),
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
+            failures=self.spent.failures + failed,
         )
         self.emit(
             Evaluated(
@@ -285,14 +305,14 @@ class _Loop:
             target.counterexample, target.spent = confirmation, spent
         else:
             target.doubtful.append(confirmation)
-        self.emit(Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent))
+        event = Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
+        if all(t.counterexample is not None for t in self.targets):
+            self.emit_last(event)
+        else:
+            self.emit(event)
 
     def exchanged(self, exchange: Exchange) -> None:
-        """Count and announce an exchange with a language model.
-
-        Raises:
-            ChatError: if the budget is used up in the middle of the LLM's turn.
-        """
+        """Count and announce an exchange with a language model."""
         usage = exchange.usage
         self.spent = self.spent.plus_call(
             prompt=usage.prompt_tokens,
@@ -301,11 +321,6 @@ class _Loop:
             cost=usage.cost,
         )
         self.emit(Exchanged(exchange=exchange, spent=self.clock()))
-        # run() checks the budget between turns; a turn with tool calls takes several paid requests.
-        continues = exchange.reply is not None and bool(exchange.reply.tool_calls)
-        is_new = exchange.reply is not None and exchange.reply.source != "recording"
-        if continues and is_new and (limit := self.budget.exceeded(self.clock())):
-            raise ChatError(f"the language model's turn was cut short: {limit}")
 
     def clock(self) -> Spent:
         """Update and return what has been spent."""
@@ -316,13 +331,20 @@ class _Loop:
         for listener in self.listeners:
             listener(event)
 
+    def emit_last(self, event: Event) -> None:
+        """Announce what ends the search: it counts even if the machine can no longer record it."""
+        try:
+            self.emit(event)
+        except OSError as error:
+            self.unrecorded = self.unrecorded or str(error)
+
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
         results = [self.result(target, status, reason) for target in self.targets]
         overall = "falsified" if all(r.falsified for r in results) else status
         stated = results[0].reason if len(results) == 1 else reason
-        self.emit(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
-        return results
+        self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
+        return [replace(result, unrecorded=self.unrecorded) for result in results]
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample

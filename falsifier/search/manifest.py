@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.space import InputRange, ParameterRange
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, rejected
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
@@ -75,6 +75,7 @@ class Manifest(_Strict):
     parameters: tuple[InputRecord, ...]
     stop_time: float = Field(description="End of each simulation in s.")
     hashes: dict[str, str] = Field(description="SHA-256 of the FMU and the spec, by path.")
+    sum: str = Field("", description="Checksum of the file up to here.")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -120,7 +121,8 @@ def read(directory: Path) -> Manifest:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
-        raise JournalError(f"{directory}/{MANIFEST}: {key}: {first['msg']}") from None
+        message = rejected(first["msg"], first["input"])
+        raise JournalError(f"{directory}/{MANIFEST}: {key}: {message}") from None
 
 
 def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> Manifest:

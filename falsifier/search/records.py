@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from falsifier.core.sealing import check_seal, seal
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Status
 from falsifier.search.budget import Spent
@@ -14,6 +15,9 @@ from falsifier.stl.verdict import Verdict
 
 class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    line: int = Field(0, description="Number of the line, from 1; 0 before it is written.")
+    sum: str = Field("", description="Checksum of the line up to here.")
 
 
 class AskedRecord(_Record):
@@ -114,6 +118,32 @@ class EndedRecord(_Record):
 
 Record = AskedRecord | EvaluatedRecord | ExchangeRecord | ConfirmedRecord | EndedRecord
 RECORDS: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator="kind")])
+
+
+def line_of(record: Record, number: int) -> bytes:
+    """Return the line of a journal with this number, from 1, with its checksum."""
+    numbered = record.model_copy(update={"line": number})
+    return seal(numbered.model_dump_json(exclude={"sum"})).encode()
+
+
+def parse_line(line: bytes, number: int | None = None) -> Record:
+    """Return the record of a line.
+
+    Args:
+        line: the line.
+        number: number that it must have; None: any.
+
+    Raises:
+        ValueError: if it is damaged; the message says how.
+    """
+    check_seal(line)
+    try:
+        record = RECORDS.validate_json(line)
+    except ValidationError as error:
+        raise ValueError(error.errors()[0]["msg"]) from None
+    if number is not None and record.line != number:
+        raise ValueError(f"expected line {number}, found line {record.line}: lines are missing or doubled")
+    return record
 
 
 def spent_of(recorded: Mapping[str, float | None]) -> Spent:

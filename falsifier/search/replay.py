@@ -6,6 +6,7 @@ confirmations and replies of a language model come from the journal and cost not
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 
 from falsifier.core.candidate import Candidate
@@ -18,6 +19,7 @@ from falsifier.llm.replay import RecordedChat, Recording
 from falsifier.problem.problem import Problem
 from falsifier.search.journal import recorded_evaluations, recorded_exchanges
 from falsifier.search.loop import Steps
+from falsifier.search.proposals import proposals
 from falsifier.search.records import AskedRecord, ConfirmedRecord, EndedRecord, Record
 
 
@@ -27,16 +29,16 @@ class Replayed:
 
     Attributes:
         live: carries out the rest.
-        asked: what engines suggested, in order.
-        evaluations: recorded evaluations in order.
+        asked: what engines suggested, in order, by the index of the first candidate's evaluation.
+        evaluations: recorded evaluations by index; those that a repair dropped are carried out.
         confirmed: recorded confirmations by evaluation index and requirement.
         recording: recorded replies of a language model.
         seconds: wall-clock seconds of the recorded part.
     """
 
     live: Steps
-    asked: list[AskedRecord]
-    evaluations: list[Evaluation]
+    asked: dict[int, list[AskedRecord]]
+    evaluations: dict[int, Evaluation]
     confirmed: dict[tuple[int, str], ConfirmedRecord]
     recording: Recording
     seconds: float
@@ -46,17 +48,17 @@ class Replayed:
     def __post_init__(self) -> None:
         self.replayed = len(self.evaluations)
 
-    def ask(self, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Let the engine repeat its recorded suggestions.
 
         Raises:
             JournalError: if it suggests something else.
         """
-        if not self.asked:
-            return self.live.ask(engine, wanted)
-        record = self.asked.pop(0)
+        if not self.asked.get(self._next):
+            return self.live.ask(problem, engine, wanted)
+        record = self.asked[self._next].pop(0)
         # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
-        candidates = engine.ask(record.n)
+        candidates = proposals(engine, problem.space, record.n)
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
             raise JournalError(
                 f"cannot resume: candidate {record.first} of the engine {engine.name!r} differs from the "
@@ -65,13 +67,14 @@ class Replayed:
         return candidates, record.n, record.seconds
 
     def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Yield recorded evaluations, then live ones."""
-        known = self.evaluations[self._next : self._next + len(candidates)]
-        self._next += len(known)
-        for evaluation in known:
-            yield _with_trajectory(problem, evaluation)
-        if len(known) < len(candidates):
-            yield from self.live.evaluate(problem, candidates[len(known) :])
+        """Yield recorded evaluations, and live ones of candidates without."""
+        numbered = list(enumerate(candidates, self._next))
+        self._next += len(candidates)
+        for is_recorded, group in groupby(numbered, lambda pair: pair[0] in self.evaluations):
+            if is_recorded:
+                yield from (_with_trajectory(problem, self.evaluations[index]) for index, _ in group)
+            else:
+                yield from self.live.evaluate(problem, [candidate for _, candidate in group])
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
         """Return the recorded confirmation of a violation; without one, confirm it."""
@@ -97,10 +100,14 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     """Return steps that replay a journal; with an empty journal, the live ones."""
     if not records:
         return live
+    asked: dict[int, list[AskedRecord]] = {}
+    for record in records:
+        if isinstance(record, AskedRecord):
+            asked.setdefault(record.first, []).append(record)
     ended = [r.spent["seconds"] or 0.0 for r in records if isinstance(r, ConfirmedRecord | EndedRecord)]
     return Replayed(
         live,
-        [r for r in records if isinstance(r, AskedRecord)],
+        asked,
         recorded_evaluations(directory, records),
         {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
         Recording(recorded_exchanges(records)),

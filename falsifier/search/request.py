@@ -1,6 +1,6 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
@@ -10,6 +10,8 @@ from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
 
 Effort = Literal["low", "medium", "high"]
+# A negative price, or one that is not a number, would switch off the limit on the cost.
+_Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class _Strict(BaseModel):
@@ -27,7 +29,7 @@ class LLMSettings(_Strict):
     api_base: str | None = None
     variant: str | None = Field(default=None, description="Prompt variant; default: the best one.")
     options: dict[str, str | float] = Field(default_factory=dict, description="Passed to litellm unchanged.")
-    price: tuple[float, float] | None = Field(
+    price: tuple[_Price, _Price] | None = Field(
         default=None,
         description="US dollars per 1000 tokens sent, and per 1000 received; default: litellm's table.",
     )

@@ -12,14 +12,14 @@ from falsifier.search.budget import Spent
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Result:
     """The result of a run for one requirement.
 
     Attributes:
         problem: what was searched.
         status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
-            ``interrupted`` or ``failed`` (the simulator or the language model).
+            ``interrupted`` or ``failed`` (the language model, or more than half of the simulations).
         reason: why the run ended, in words.
         counterexample: the confirmed violation, or None.
         best: evaluation with the smallest robustness, or None if every simulation failed.
@@ -28,6 +28,7 @@ class Result:
         fragile: violations that disappear at half the communication step.
         spent: what the run has spent; if falsified, until the counterexample was confirmed.
         directory: the run directory, or None.
+        unrecorded: why the end of the run could not be recorded, such as a full disk; empty if it was.
     """
 
     problem: Problem
@@ -40,6 +41,12 @@ class Result:
     fragile: tuple[Confirmation, ...] = ()
     spent: Spent = field(default_factory=Spent)
     directory: Path | None = None
+    unrecorded: str = ""
+
+    def __repr__(self) -> str:
+        # All trajectories and variables would fill pages of a terminal.
+        least = "" if self.robustness is None else f", robustness {self.robustness:+.6g}"
+        return f"Result({self.problem.name}: {self.status}{least}, {self.spent.simulations_text})"
 
     @property
     def falsified(self) -> bool:

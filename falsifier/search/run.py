@@ -5,18 +5,20 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import overload
 
+from falsifier.core.arguments import whole
+from falsifier.core.files import file_name
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, load_sources, reloadable
-from falsifier.problem.problem import Problem, alike
+from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
-from falsifier.search.budget import Budget
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.events import Listener
-from falsifier.search.journal import holds_run, open_journal, write_manifest
+from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.search.leaders import make_engines
 from falsifier.search.loop import Live, Steps, search
 from falsifier.search.manifest import Manifest
@@ -44,7 +46,22 @@ def falsify(
 
 @overload
 def falsify(
-    problem: list[Problem] | list[ProblemSource] | list[str] | tuple[Falsifiable, ...],
+    problem: list[Falsifiable] | tuple[Falsifiable, ...],
+    engine: str | None = ...,
+    *,
+    llm: LLM | None = ...,
+    budget: Budget | int = ...,
+    seed: int = ...,
+    directory: Path | str | None = ...,
+    jobs: int = ...,
+    listeners: Iterable[Listener] = ...,
+) -> list[Result]: ...
+
+
+# Sequence[Falsifiable] would include str, which is one target; and list is invariant.
+@overload
+def falsify(
+    problem: Sequence[Problem | ProblemSource] | list[str],
     engine: str | None = ...,
     *,
     llm: LLM | None = ...,
@@ -57,11 +74,11 @@ def falsify(
 
 
 def falsify(
-    problem: Falsifiable | list[Problem] | list[ProblemSource] | list[str] | tuple[Falsifiable, ...],
+    problem: Falsifiable | Sequence[Falsifiable],
     engine: str | Engine | None = None,
     *,
     llm: LLM | None = None,
-    budget: Budget | int = 100,
+    budget: Budget | int = DEFAULT_SIMULATIONS,
     seed: int = 0,
     directory: Path | str | None = None,
     jobs: int = 1,
@@ -88,7 +105,9 @@ def falsify(
         One result, or for a list of problems a list of results in the same order.
 
     Raises:
-        SpecError: if a problem, an engine or a language model is not valid.
+        SpecError: if a problem, an engine, a language model or a number is not valid, or two problems have
+            the same name.
+        CandidateError: if an engine made in Python returns a candidate outside the search space.
         ModelError: if the FMU cannot be used.
         ChatError: if the language model cannot be asked; raised before the first simulation.
         JournalError: if the directory already contains a run.
@@ -96,8 +115,10 @@ def falsify(
     >>> falsify("AT1", budget=20).status  # doctest: +SKIP
     'falsified'
     """
-    several = isinstance(problem, list | tuple)
-    problems = [_problem(each) for each in (problem if isinstance(problem, list | tuple) else [problem])]
+    several = not isinstance(problem, Falsifiable)
+    problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
+    check_names(problems)
+    seed, jobs, limits = whole("seed", seed, least=0), whole("jobs", jobs, least=1), _budget(budget)
     groups = alike(problems)
     chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
     results: dict[str, Result] = {}
@@ -107,12 +128,12 @@ def falsify(
             engine=engine if isinstance(engine, str) or engine is None else engine.name,
             llm=_settings(llm),
             seed=seed,
-            budget=_budget(budget),
+            budget=limits,
             jobs=jobs,
         )
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
-            place = place / group[0].name
+            place = place / file_name(group[0].name)
         found = carry_out(
             request,
             group,
@@ -207,8 +228,13 @@ def carry_out(
         begun = directory is not None and holds_run(directory)
         if begun and not resume:
             raise JournalError(
-                f"{directory} already contains a run: choose another --out, or to continue it: "
-                f"falsifier resume {directory}"
+                f"{directory} already contains a run: choose another directory, or to continue it: "
+                + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
+            )
+        if directory is not None and not begun and holds_lines(directory):
+            raise JournalError(
+                f"{directory} contains a journal without its manifest, so nobody knows what it belongs to: "
+                "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         engines = [engine] if engine is not None else make_engines(request, problems, chat)
@@ -250,7 +276,7 @@ def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
 
 
 def _budget(given: Budget | int) -> Budget:
-    return Budget(simulations=given) if isinstance(given, int) else given
+    return given if isinstance(given, Budget) else Budget(whole("budget", given, least=1))
 
 
 def _settings(llm: LLM | None) -> LLMSettings | None:

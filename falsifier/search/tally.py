@@ -54,14 +54,20 @@ class Tally:
         self._requirement = requirement
         self._spent = Spent()
         self._simulation_seconds = 0.0
+        self._failures = 0
         self._robustness: list[float] = []
+        self._missing: set[int] = set()
+        self._has_ended = False
         self._latest: VerdictRecord | None = None
 
     @property
     def spent(self) -> Spent:
         """What the run has spent; wall-clock seconds are known only after it has ended."""
         return replace(
-            self._spent, simulations=len(self._robustness), simulation_seconds=self._simulation_seconds
+            self._spent,
+            simulations=len(self._robustness),
+            simulation_seconds=self._simulation_seconds,
+            failures=self._failures,
         )
 
     @property
@@ -74,6 +80,11 @@ class Tally:
         """Smallest robustness so far."""
         return None if self.best is None else self._robustness[self.best]
 
+    @property
+    def is_incomplete(self) -> bool:
+        """Whether a repair has dropped evaluations that are still to be carried out again."""
+        return bool(self._missing) and not self._has_ended
+
     def begin(self) -> None:
         """Set the status to running even if the first record was skipped by the reader."""
         if self.status == "waiting":
@@ -81,9 +92,11 @@ class Tally:
 
     def add(self, record: Record) -> None:
         """Update the numbers with one record."""
-        if self.counterexample is not None:
+        self._has_ended = isinstance(record, EndedRecord)
+        if self.counterexample is not None and not self._is_missing(record):
             return
-        self.status = "running"
+        if self.counterexample is None:
+            self.status = "running"
         match record:
             case EvaluatedRecord():
                 self._evaluated(record)
@@ -111,6 +124,10 @@ class Tally:
             case AskedRecord():
                 pass
 
+    def _is_missing(self, record: Record) -> bool:
+        """Whether this is an evaluation that a repair dropped and that was carried out again."""
+        return isinstance(record, EvaluatedRecord) and record.index in self._missing
+
     def _evaluated(self, record: EvaluatedRecord) -> None:
         judged = record.verdicts
         verdict = (
@@ -118,13 +135,19 @@ class Tally:
         )
         value = verdict.robustness if verdict else float("nan")
         smallest = self.best_robustness
-        self._latest = verdict
-        if verdict is not None and (smallest is None or value < smallest):
-            self.best, self.verdict = record.index, verdict
+        if record.index >= len(self._robustness):
+            self._latest = verdict
+        if verdict is not None and (smallest is None or (value, record.index) < (smallest, self.best)):
+            self.best = record.index
+            self.verdict = verdict if self.counterexample is None else self.verdict
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory
-        self._robustness.append(value)
+        gap = range(len(self._robustness), record.index + 1)
+        self._robustness += [float("nan") for _ in gap]
+        self._missing = (self._missing | set(gap)) - {record.index}
+        self._robustness[record.index] = value
         self._simulation_seconds += record.seconds
+        self._failures += all(v is None for v in judged.values())
 
 
 def read_tally(directory: Path, requirement: str | None = None) -> Tally:

@@ -98,9 +98,11 @@ class _Compiler:
         if isinstance(node, Always | Eventually | Until) and node.window is None:
             reach = (first, self.samples - 1)
         elif isinstance(node, Always | Eventually | Until) and node.window:
+            # First, so that no bound after the end of the trajectory is suggested as the nearest multiple.
+            beyond = last + round(node.window.end / self.step)
+            if beyond >= self.samples:
+                self._fail_past_end(node, beyond)
             start, end = window_samples(node.window, self.step)
-            if last + end >= self.samples:
-                self._fail_past_end(node, last + end)
             reach = (first if isinstance(node, Until) else first + start, last + end)
         elif isinstance(node, Next):
             reach = (first + 1, last + 1)

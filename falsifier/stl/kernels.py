@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.stl import opcodes as op
-from falsifier.stl.compiled import compiled
+from falsifier.stl.numba_compilation import compiled
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

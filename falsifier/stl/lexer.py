@@ -24,6 +24,10 @@ _HINTS = {
 }  # fmt: skip
 
 
+# Maximum number of characters of a line that errors show.
+_SHOWN_LINE = 160
+
+
 @dataclass(frozen=True, slots=True)
 class Token:
     """One token of a formula's text.
@@ -47,7 +51,7 @@ class Token:
     @property
     def shown(self) -> str:
         """How error messages refer to it."""
-        return "the end" if self.kind == "end" else repr(self.written)
+        return "the end" if self.kind == "end" else repr(self.written[:_SHOWN_LINE])
 
 
 def tokenize(text: str) -> list[Token]:
@@ -67,8 +71,13 @@ def tokenize(text: str) -> list[Token]:
 def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaError:
     """Return an error that shows the line, a caret under the position (counted from 0) and a hint."""
     start = text.rfind("\n", 0, position) + 1
-    line = text[start:].split("\n", 1)[0].rstrip()
-    caret = " " * (position - start) + "^"
+    end = text.find("\n", position)
+    line = text[start : len(text) if end < 0 else end].rstrip()
+    column = position - start
+    if len(line) > _SHOWN_LINE:
+        first = max(0, column - _SHOWN_LINE // 2)
+        line, column = line[first : first + _SHOWN_LINE], column - first
+    caret = " " * column + "^"
     return FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
 
 

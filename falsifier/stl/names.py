@@ -18,7 +18,7 @@ _WORD_PATTERN = re.compile(rf"({_IDENTIFIER})(?!\.)")
 _PATH_PATTERN = re.compile(_PATH)
 _DERIVATIVE = re.compile(r"der\(\s*")
 _DERIVATIVE_END = re.compile(r"\s*(,\s*\d+)?\s*\)")
-_QUOTED_PATTERN = re.compile(r'"((?:[^"\\\n]|\\.)+)"')
+_QUOTED_PATTERN = re.compile(r'"((?:[^"\\]|\\.)+)"', re.DOTALL)
 
 
 def scan_name(text: str, start: int) -> tuple[str, int] | None:
@@ -27,7 +27,7 @@ def scan_name(text: str, start: int) -> tuple[str, int] | None:
     Reserved words are names only in quotes or as part of a longer name (``G.x``).
     """
     if quoted := _QUOTED_PATTERN.match(text, start):
-        return re.sub(r"\\(.)", r"\1", quoted[1]), quoted.end()
+        return re.sub(r"\\(.)", r"\1", quoted[1], flags=re.DOTALL), quoted.end()
     if derivative := _DERIVATIVE.match(text, start):
         inner = scan_name(text, derivative.end())
         end = _DERIVATIVE_END.match(text, inner[1]) if inner else None

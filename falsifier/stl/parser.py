@@ -13,7 +13,7 @@ Operators, lowest precedence first::
     *  /                            left associative
     -x
     ^                               right associative, so -x^2 is -(x^2)
-    numbers, names, abs sqrt exp log sin cos min max, parentheses
+    numbers, names, true, false, abs sqrt exp log sin cos min max, parentheses
 
 So ``G[0,5] x <= 3 -> y <= 1`` means ``(G[0,5] (x <= 3)) -> (y <= 1)``. Windows are closed intervals, in
 seconds unless each bound has a unit (``us ms s min h``); an operator without a window extends to the stop
@@ -24,7 +24,8 @@ import math
 from collections.abc import Callable
 from typing import NoReturn, cast
 
-from falsifier.errors import did_you_mean
+from falsifier.errors import FormulaError, did_you_mean
+from falsifier.stl.constants import Constant, without_constants
 from falsifier.stl.expression import (
     POWER,
     PRODUCT,
@@ -67,6 +68,8 @@ from falsifier.stl.names import FUNCTIONS, RESERVED
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100
+# Maximum number of characters of a formula.
+MAX_LENGTH = 20_000
 UNITS = {"us": (1, 1_000_000), "ms": (1, 1000), "s": (1, 1), "min": (60, 1), "h": (3600, 1)}  # seconds
 
 _LEVELS = {
@@ -81,9 +84,13 @@ _CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
 _CLOSED = "only closed windows in seconds are supported: [a,b]"
 _HINTS = {
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
+    "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
+    "u": "operators are capital letters: write U",
     "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
     "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
+
+_BOXES = {"[]": "[] is written G or always", "<>": "<> is written F or eventually"}
 
 Node = Formula | Expression
 
@@ -101,6 +108,11 @@ class _Parser:
     """Precedence climbing with one grammar for formulas and expressions; operators check their operands."""
 
     def __init__(self, text: str) -> None:
+        if len(text) > MAX_LENGTH:
+            raise FormulaError(
+                f"the formula has {len(text):,} characters, more than {MAX_LENGTH:,}; split it into several "
+                "requirements"
+            )
         self.text = text
         self.tokens = tokenize(text)
         self.index = 0
@@ -132,6 +144,9 @@ class _Parser:
             self._fail_after(rest)
         if _depth(formula) > MAX_DEPTH:
             self._fail_depth(0)
+        formula = without_constants(formula)
+        if isinstance(formula, Constant):
+            self._fail(f"the formula is always {formula}", 0, "compare a signal, for example speed <= 120")
         return formula
 
     def _climb(self, level: int) -> Node:
@@ -195,6 +210,8 @@ class _Parser:
         if token.text == "-":
             operand = self._expression_at(SIGN)
             return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
+        if token.text in ("true", "false"):
+            return Constant(token.text == "true")
         if token.text in FUNCTIONS:
             return self._call(token)
         if token.text in ("not", "G", "F", "X"):
@@ -219,13 +236,14 @@ class _Parser:
     def _named(self, token: Token) -> Name:
         if self._next.kind == "symbol" and self._next.position == token.end:
             if self._next.text == "(":
-                hint = _HINTS.get(token.text) or did_you_mean(token.text, FUNCTIONS)
+                hint = _hint_for(token) or did_you_mean(token.text, FUNCTIONS)
                 self._fail(f"unknown function {token.text!r}", token.position, hint)
             if self._next.text == "[":
                 self._fail(
                     f"the index of {token.text!r} cannot be read",
                     self._next.position,
-                    "indices are integers, as in x[1,2]; put any other name in double quotes",
+                    _hint_for(token)
+                    or "indices are integers, as in x[1,2]; put any other name in double quotes",
                 )
         return Name(token.text)
 
@@ -322,11 +340,10 @@ class _Parser:
     def _as_expression(self, node: Node, start: int) -> Expression:
         if isinstance(node, Expression):
             return node
-        self._fail(
-            "expected a number or a signal, got a formula",
-            start,
-            "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->",
-        )
+        hint = "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->"
+        if isinstance(node, Constant):
+            hint = "write a Boolean signal b as b or not b"
+        self._fail("expected a number or a signal, got a formula", start, hint)
 
     def _fail_operand(self, token: Token) -> NoReturn:
         problem = f"expected a formula, a signal or a number, not {token.shown}"
@@ -334,10 +351,10 @@ class _Parser:
             problem = "the formula ends too early"
         hint = "something is missing before it"
         previous = self.tokens[self.index - 2] if self.index > 1 else None
-        if token.text in ("true", "false"):
-            problem, hint = f"{token.text} has no margin", "write a Boolean signal b as b or not b"
-        elif token.text == "U":
+        if token.text == "U":
             hint = f'it belongs between two formulas; write a signal of that name as "{token.written}"'
+        elif (box := "".join(t.text for t in self.tokens[self.index - 1 : self.index + 1])) in _BOXES:
+            hint = _BOXES[box]
         elif token.text in ("[", "]"):
             hint = "write windows directly after G, F or U"
         elif token.text == ")":
@@ -352,10 +369,8 @@ class _Parser:
     def _fail_after(self, token: Token) -> NoReturn:
         previous = self.tokens[self.index - 1]
         hint = "join two formulas with and, or, ->; numbers and signals with + - * /"
-        if token.text in _HINTS or previous.text in _HINTS:
-            hint = _HINTS.get(token.text) or _HINTS[previous.text]
-        elif token.text.lower() in RESERVED and token.kind == "name":
-            hint = f"write operators in lower case: {token.text.lower()}"
+        if known := _hint_for(token) or _hint_for(previous):
+            hint = known
         elif token.text in UNITS and previous.kind == "number":
             hint = "only the bounds of windows have units; convert the number to the signal's own unit"
         elif token.text == ")":
@@ -371,6 +386,14 @@ class _Parser:
 
     def _fail(self, problem: str, position: int, hint: str) -> NoReturn:
         raise syntax_error(self.text, problem, position, hint)
+
+
+def _hint_for(token: Token) -> str:
+    """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
+    word = token.text.partition("[")[0].lower()
+    if token.kind != "name":
+        return ""
+    return _HINTS.get(word) or (f"write operators in lower case: {word}" if word in RESERVED else "")
 
 
 def _seconds(bound: float, unit: str) -> float:

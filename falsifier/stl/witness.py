@@ -2,7 +2,7 @@
 
 At each operator the path continues with the operand whose value became the operator's value. Ties go to the
 earliest sample and the left operand; ``or`` and ``->`` are treated as negated conjunctions, so their ties go
-to the left operand too. For until, the path goes to the left operand only if its value is strictly smaller.
+to the left operand too. For until, too, the path goes to the left operand if both are equal.
 """
 
 from typing import NamedTuple
@@ -85,6 +85,6 @@ def _decider_of_until(part: Part, buffer: Floats, sample: int, window: tuple[int
     lowest = np.minimum.accumulate(lefts)[first - sample :]
     rights = right.over(buffer, first, last)
     best = int(np.minimum(lowest, rights).argmax())
-    if lowest[best] < rights[best]:
+    if lowest[best] <= rights[best]:
         return left, sample + int(lefts[: first - sample + best + 1].argmin())
     return right, first + best

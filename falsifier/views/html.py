@@ -2,6 +2,8 @@
 
 from html import escape
 
+from falsifier.core.literals import plain
+
 _VOID = frozenset({"br", "hr", "link", "meta"})
 _SELF_CLOSING = frozenset({"circle", "line", "path", "rect"})
 
@@ -24,7 +26,7 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
     '<p class="a">1 &lt; 2</p>'
     """
     given = "".join(
-        f' {name.rstrip("_").replace("_", "-")}="{escape(_text(value))}"'
+        f' {name.rstrip("_").replace("_", "-")}="{_escaped(_text(value))}"'
         for name, value in attributes.items()
         if value is not None
     )
@@ -38,7 +40,11 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
 
 def join(*parts: str) -> Html:
     """Concatenate parts; those that are not Html are escaped."""
-    return Html("".join(part if isinstance(part, Html) else escape(part) for part in parts))
+    return Html("".join(part if isinstance(part, Html) else _escaped(part) for part in parts))
+
+
+def _escaped(text: str) -> str:
+    return escape(plain(text))
 
 
 def _text(value: str | float) -> str:

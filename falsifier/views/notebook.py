@@ -98,7 +98,7 @@ def result_html(result: Result) -> str:
 
     found, spent = result.counterexample, result.spent
     shown = found.evaluation if found else result.best
-    title = f"{result.problem.name}: {result.status} after {counted(spent.simulations, 'simulation')}"
+    title = f"{result.problem.name}: {result.status} after {spent.simulations_text}"
     facts: list[Fact] = [("confirmed" if found else "reason", found.reason if found else result.reason)]
     if shown is not None:
         facts += _verdict_facts(shown.verdict) if shown.verdict else []

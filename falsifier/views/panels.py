@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
@@ -18,6 +18,9 @@ from falsifier.stl.formula import Always, Eventually, Predicate, Until
 from falsifier.stl.verdict import Verdict
 
 Array = NDArray[np.float64]
+
+# Values beyond this are drawn at this level: the height of a picture must not overflow.
+_LARGEST_DRAWN = 1e300
 
 
 class Range(Protocol):
@@ -151,15 +154,19 @@ def _input(r: Range, trajectory: Trajectory, candidate: Candidate) -> Panel:
     return Panel(
         f"{r.name} [{r.unit}]" if r.unit else r.name,
         trajectory.times,
-        signal.held(None).sample(trajectory.times),
-        points=tuple(zip(signal.times, signal.values, strict=True)),
-        limits=(r.low, r.high),
+        _drawable(signal.held(None).sample(trajectory.times)),
+        points=tuple(zip(signal.times, map(float, _drawable(signal.values)), strict=True)),
+        limits=(float(_drawable(r.low)), float(_drawable(r.high))),
         steps=signal.interpolation == "constant",
     )
 
 
 def _evaluated(expression: Expression, trajectory: Trajectory) -> Array:
-    return np.broadcast_to(expression.evaluate(trajectory.columns), trajectory.times.shape)
+    return np.broadcast_to(_drawable(expression.evaluate(trajectory.columns)), trajectory.times.shape)
+
+
+def _drawable(values: ArrayLike) -> Array:
+    return np.clip(np.asarray(values, dtype=np.float64), -_LARGEST_DRAWN, _LARGEST_DRAWN)
 
 
 def _sides(predicate: Predicate) -> tuple[Expression, Expression]:

@@ -4,12 +4,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
 from falsifier.views.html import el, join
+from falsifier.views.terminal import error_console, moving, unbroken
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+# Number of failed simulations from which on a warning is due.
+_WARNED_FAILURES = 3
 
 
 @contextmanager
@@ -18,42 +23,46 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     if quiet:
         yield lambda event: None
         return
-    from rich.console import Console
-
-    console = Console(stderr=True)
+    console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
         yield NotebookLine()
         return
     if not console.is_terminal:
-        yield PlainDisplay(console)
+        yield unbroken(PlainDisplay(console))
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as progress:
+    progress = Progress(*columns, console=console, transient=True)
+    with moving(progress):
         task = progress.add_task("starting", total=None, note="")
+        warn = FailureWarning()
 
         def show(event: Event) -> None:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
+                    for line in _notes(event):
+                        progress.console.print(line, highlight=False, markup=False)
                     progress.update(task, description=_title(event), total=total)
                 case Evaluated():
+                    if warning := warn(event):
+                        progress.console.print(warning, highlight=False, markup=False)
                     progress.update(task, completed=event.spent.simulations, note=note(event))
                 case Exchanged():
                     progress.update(task, note=f"LLM replied, {event.spent.tokens} tokens so far")
                 case Confirmed():
-                    progress.console.print(_confirmed(event), highlight=False, markup=False)
+                    progress.console.print(one_line(_confirmed(event)), highlight=False, markup=False)
                 case _:
                     pass
 
-        yield show
+        yield unbroken(show)
 
 
 def progress() -> Listener:
@@ -61,10 +70,8 @@ def progress() -> Listener:
 
     >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
     """
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    return NotebookLine() if console.is_jupyter else PlainDisplay(console)
+    console = error_console()
+    return NotebookLine() if console.is_jupyter else unbroken(PlainDisplay(console))
 
 
 class PlainDisplay:
@@ -72,6 +79,7 @@ class PlainDisplay:
 
     def __init__(self, console: "Console") -> None:
         self._console = console
+        self._warn = FailureWarning()
 
     def __call__(self, event: Event) -> None:
         """Print a line if the event deserves one."""
@@ -82,9 +90,13 @@ class PlainDisplay:
                 for problem in event.problems:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
+                for line in _notes(event):
+                    self._line(line)
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 how = "timed out" if evaluation.status == "timeout" else evaluation.status
                 self._line(f"simulation {event.index + 1} {how}: {evaluation.reason}")
+                if warning := self._warn(event):
+                    self._line(warning)
             case Evaluated(evaluation=evaluation, best=best) if (
                 best is not None and best.candidate is evaluation.candidate
             ):
@@ -95,7 +107,25 @@ class PlainDisplay:
                 pass
 
     def _line(self, text: str) -> None:
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+        self._console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+
+
+class FailureWarning:
+    """Tells once that more than half of the simulations have failed, if these are more than a few."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def __call__(self, event: Evaluated) -> str | None:
+        """Return the warning, or None if there is nothing to tell."""
+        spent = event.spent
+        if self._told or spent.failures < _WARNED_FAILURES or not spent.has_mostly_failed:
+            return None
+        self._told = True
+        return (
+            f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run counts as "
+            "failed if more than half do"
+        )
 
 
 def note(event: Evaluated) -> str:
@@ -151,6 +181,11 @@ class NotebookLine:
             self._handle.update(line)
 
 
+def _notes(event: RunStarted) -> list[str]:
+    """Return what was chosen or ignored when the problems were loaded; what several share, once."""
+    return list(dict.fromkeys(note for problem in event.problems for note in problem.notes))
+
+
 def _confirmed(event: Confirmed) -> str:
     """What came of a violation; several requirements may share the search, so it is named."""
     found = event.confirmation
@@ -159,4 +194,4 @@ def _confirmed(event: Confirmed) -> str:
 
 def _title(event: RunStarted) -> str:
     """The requirements and the engine."""
-    return f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}"
+    return one_line(f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}")

@@ -1,13 +1,13 @@
 """The result of a run as text or JSON."""
 
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted
-from falsifier.counterexamples.store import file_name
+from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search import manifest
 from falsifier.search.budget import Spent
@@ -16,8 +16,8 @@ from falsifier.search.result import Result
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    simulations = counted(result.spent.simulations, "simulation")
-    lines = [f"{result.problem.name}: {result.status} after {simulations} ({seconds_text(result.spent)})"]
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
+    lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
         lines.append(f"  confirmed      {result.counterexample.reason}")
@@ -36,7 +36,7 @@ def result_text(result: Result) -> str:
             lines.append(f"  picture        {_picture(result)}")
         if _can_continue(result):
             lines.append(_continue_line(result.directory))
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def results_text(results: Sequence[Result]) -> str:
@@ -49,7 +49,7 @@ def results_text(results: Sequence[Result]) -> str:
         where = "" if result.counterexample is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
-            f"{counted(result.spent.simulations, 'simulation')}{robustness}{where}"
+            f"{result.spent.simulations_text}{robustness}{where}"
         )
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
@@ -57,13 +57,13 @@ def results_text(results: Sequence[Result]) -> str:
     directories = {result.directory for result in results}
     if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
         lines.append(_continue_line(results[0].directory))
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; results that share a directory have one each."""
     shared = result.directory is not None and manifest.read(result.directory).shared
-    return file_name(result.problem.name if shared else "")
+    return file_of(result.problem.name if shared else "")
 
 
 def result_json(result: Result) -> dict[str, Any]:
@@ -117,7 +117,9 @@ def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
 
 
 def _can_continue(result: Result) -> bool:
-    return result.status in ("interrupted", "failed") and bool(result.evaluations)
+    if not result.evaluations or result.spent.has_mostly_failed:
+        return False
+    return result.status in ("interrupted", "failed")
 
 
 def _continue_line(directory: Path) -> str:
@@ -144,8 +146,3 @@ def seconds_text(spent: Spent) -> str:
 
 def _unit(unit: str) -> str:
     return f" {unit}" if unit else ""
-
-
-def warn(text: str) -> None:
-    """Print a message on stderr, so that stdout contains only results."""
-    print(text, file=sys.stderr)

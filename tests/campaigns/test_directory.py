@@ -34,7 +34,7 @@ def test_a_campaign_is_known_by_its_content(campaign: Path, tmp_path: Path) -> N
     assert campaign_mark(tmp_path) != campaign_mark(campaign)
 
 
-@pytest.mark.parametrize(("content", "named"), [(None, "campaign.json"), ("{}", "falsifier"), ("{", "JSON")])
+@pytest.mark.parametrize(("content", "named"), [(None, "campaign.json"), ("{}", "sum"), ("{", "sum")])
 def test_a_campaign_that_cannot_be_read_is_named(tmp_path: Path, content: str | None, named: str) -> None:
     if content is not None:
         (tmp_path / "campaign.json").write_text(content)

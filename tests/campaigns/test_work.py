@@ -1,7 +1,9 @@
 """What a worker does that sees neither the campaign's directory nor its FMU."""
 
+import copy
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
@@ -16,6 +18,8 @@ from falsifier.search.manifest import describe
 from falsifier.search.records import EvaluatedRecord
 from falsifier.search.request import RunRequest
 from tests.problems import easy
+
+Sent = TypeVar("Sent")
 
 
 @pytest.fixture
@@ -55,7 +59,7 @@ def test_an_fmu_that_the_worker_does_not_have_is_asked_for_and_kept(store: Path,
     model = problem.model
     assert isinstance(model, FmuModel)
     content = model.path.read_bytes()
-    moved = replace(problem, model=_with_path(model, tmp_path / "gone" / "AT.fmu"))
+    moved = _arrived(problem, "model", _arrived(model, "path", tmp_path / "gone" / "AT.fmu"))
     task = remote_task(problem, "AT2")
     task = replace(task, problem=moved)
     assert run_task(task, {}) == Missing(model.sha256)
@@ -64,10 +68,8 @@ def test_an_fmu_that_the_worker_does_not_have_is_asked_for_and_kept(store: Path,
     assert isinstance(run_task(task, {}), Done), "the second time it has the file"
 
 
-def _with_path(model: FmuModel, path: Path) -> FmuModel:
-    """The model as it arrives on a machine that does not have its file: nothing is read when unpickling."""
-    import copy
-
-    arrived = copy.copy(model)
-    object.__setattr__(arrived, "path", path)
+def _arrived(sent: Sent, name: str, value: object) -> Sent:
+    """What was sent to a machine that does not have its file: nothing is read or checked when unpickling."""
+    arrived = copy.copy(sent)
+    object.__setattr__(arrived, name, value)
     return arrived

@@ -4,9 +4,12 @@ from typing import Any
 
 import pytest
 
+from falsifier.campaigns import Follower
 from falsifier.campaigns.directory import locked
-from falsifier.errors import SpecError
-from tests.cli.support import HARD, bench
+from falsifier.errors import JournalError, SpecError
+from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
+from tests.cli.support import HARD, NEVER, bench
 from tests.command import falsifier
 
 
@@ -56,6 +59,7 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
         seen.append(request)
         raise SpecError("seen")
 
+    monkeypatch.setattr("falsifier.cli.campaign.check_request", lambda *_, **__: None)
     monkeypatch.setattr("falsifier.cli.campaign.run_campaign", record)
     command(
         *(
@@ -81,7 +85,7 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
     assert len(asked) == len(request.runs) == 8
     assert ("openai/gpt-5-nano", "low", "MP1", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
-    assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 1500)}
+    assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 100)}
     assert (request.limits.cost, request.calls) == (9.0, 3)
     assert {(r.llm.price, r.llm.anonymous) for r in request.runs} == {((1.0, 2.0), True)}
 
@@ -93,14 +97,31 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
         seen.append(request)
         raise SpecError("seen")
 
+    monkeypatch.setattr("falsifier.cli.campaign.check_request", lambda *_, **__: None)
     monkeypatch.setattr("falsifier.cli.campaign.run_campaign", record)
     command("bench", "--suite", "arch-comp", "--engine", "uniform")
     command("bench", "--suite", "arch-comp", "--instance", "2", "--engine", "uniform")
-    first, second = seen
+    command("bench", "AT1", "--engine", "uniform")
+    first, second, plain = seen
+    # A suite is run as the competition does; other targets as falsifier run would.
+    for request, budget, parameterization in ((first, 1500, "fixed"), (plain, 100, "free")):
+        assert {r.budget.simulations for r in request.runs} == {budget}
+        assert {r.problems[0].parameterization for r in request.runs} == {parameterization}
     assert (len(first.runs), len(second.runs)) == (210, 200)
     assert {r.problems[0].profile for r in first.runs} == {None}
     assert {r.problems[0].profile for r in second.runs} == {"instance2"}
     assert first.suite == "arch-comp"
+
+
+def test_run_and_bench_state_the_same_defaults(command: Any) -> None:
+    for name, budget, parameterization in (
+        ("run", "[default: 100]", "[default: free]"),
+        ("bench", "[default: (100; with --suite 1500)]", "[default: (free; with --suite fixed)]"),
+    ):
+        text = " ".join(command(name, "--help").stdout.split())
+        assert budget in text and parameterization in text
+        assert "Default: surrogate, or the language model" in text
+        assert "\b" not in text and "\\b" not in text
 
 
 @pytest.mark.parametrize(
@@ -126,6 +147,23 @@ def test_watch_says_how_far_a_campaign_is(command: Any) -> None:
         assert result.exit_code == 0
         assert "4/4 runs finished, 2 falsified" in result.stdout
         assert "stopped" not in result.stdout
+
+
+def test_watch_follows_single_runs_too(command: Any, tmp_path: Path) -> None:
+    command("run", NEVER, "--engine", "uniform", "--budget", "5", "--out", "r/a", "--quiet")
+    falsify([lag_problem(), lag_problem("G[0,5] (x <= 50)", name="other")], budget=3, directory="r/b")
+    result = command("watch", "r/a")
+    assert result.exit_code == 0
+    assert "not falsified after 5 simulations, best robustness" in result.stdout
+    assert "1/1 run finished, 0 falsified, 5 simulations" in result.stdout
+    journal = tmp_path / "r" / "a" / "journal.jsonl"
+    journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:-1]))  # as after a kill
+    result = command("watch", "r")
+    assert "LAG surrogate, shared search seed 0: " in result.stdout
+    assert "2/3 runs finished, 1 falsified, 8 simulations" in result.stdout
+    assert "stopped; to continue: falsifier resume r" in result.stdout
+    with pytest.raises(JournalError, match="not a run or campaign"):
+        Follower(tmp_path)
 
 
 def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:
@@ -155,3 +193,9 @@ def test_a_campaign_as_a_user_starts_it(tmp_path: Path) -> None:
     again = falsifier("bench", HARD, "--engine", "corners", "--out", "c", cwd=tmp_path)
     assert again.code == 2
     assert "falsifier resume c" in again.err
+
+
+def test_a_wrong_engine_is_told_before_a_campaign_is_announced(tmp_path: Path) -> None:
+    done = falsifier("bench", "AT1", "--engine", "corner", "--runs", "1", cwd=tmp_path)
+    assert (done.code, done.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert done.err.startswith("falsifier: unknown engine 'corner'; did you mean 'corners'")

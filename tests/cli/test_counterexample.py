@@ -52,6 +52,7 @@ def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
     assert (signals["throttle"]["values"], signals["brake"]["values"]) == ([100.0], [0.0])
     assert done.json["minimal"]
     assert done.json["outcome"] == "confirmed"
+    assert done.json["least_margin"] == pytest.approx(0.2133 / 2, abs=1e-3)
     assert [str(Path(f).parent) for f in done.json["files"]] == ["run", "run", "kept/AT.AT1"]
     assert (folder / "run" / "counterexample.json").exists()
     assert run(folder, "replay", done.json["files"][2]).code == 1
@@ -80,7 +81,7 @@ def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
     assert done.code == 0, done.err
     assert {Path(line).name for line in done.out.splitlines()} == {
         *("counterexample.json", "input.csv", "start_values.json", "start_values.ssv"),
-        *("inputs.mat", "replay.py", "replay.mos", "test_AT1.py"),
+        *("inputs.mat", "replay.py", "replay.mos", "test_AT1.py", "AT.fmu"),
     }
     assert all((folder / line).is_file() for line in done.out.splitlines())
     assert run(folder, "replay", "exported").code == 1

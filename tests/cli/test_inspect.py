@@ -25,10 +25,10 @@ def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
     assert {v["name"] for v in described["variables"]} >= {"throttle", "brake", "speed", "rpm", "gear"}
 
 
-def test_info_says_what_cannot_be_simulated(tmp_path: Path) -> None:
+def test_info_says_what_is_ignored_and_what_cannot_be_simulated(tmp_path: Path) -> None:
     fixtures = ROOT / "tests" / "fixtures" / "fmus"
     clocked = falsifier("info", str(fixtures / "Clocked_3.fmu"), cwd=tmp_path)
-    assert "cannot be simulated: its input clocks (tick) need external ticks" in clocked.out
+    assert "note: input clocks are ignored, so they never tick: tick" in clocked.out
     scheduled = falsifier("info", str(fixtures / "Scheduled_3.fmu"), cwd=tmp_path)
     assert "scheduled execution is not supported" in scheduled.out
 
@@ -39,6 +39,11 @@ def test_info_takes_a_spec_for_its_fmu(tmp_path: Path) -> None:
         falsifier("info", str(spec), cwd=tmp_path).out
         == falsifier("info", str(bundled("fmus") / "AT.fmu"), cwd=tmp_path).out
     )
+
+
+def test_info_takes_a_bundled_requirement_for_its_fmu(tmp_path: Path) -> None:
+    assert falsifier("info", "AT1", "--json", cwd=tmp_path).json["name"].endswith("AT")
+    assert "did you mean 'AT1'?" in falsifier("info", "at1", cwd=tmp_path).err
 
 
 def test_init_writes_a_spec_that_runs(tmp_path: Path) -> None:
@@ -87,3 +92,13 @@ def test_build_writes_an_fmu_for_this_platform(tmp_path: Path) -> None:
 def test_schemas_of_records_are_printed_too(tmp_path: Path) -> None:
     for what in ("manifest", "journal", "campaign"):
         assert falsifier("schema", "--of", what, cwd=tmp_path).json
+
+
+def test_an_fmu_without_outputs_can_be_checked_and_searched(tmp_path: Path) -> None:
+    checked = falsifier("info", str(fixture("NoOutputs_2dymola")), "--check", cwd=tmp_path)
+    assert checked.code == 0, checked.err
+    assert "the FMU declares no outputs; these are its states or other computed variables" in checked.out
+    assert "x changes by at most" in checked.out
+    assert falsifier("init", str(fixture("NoOutputs_2dymola")), "--out", "my.toml", cwd=tmp_path).code == 0
+    done = falsifier("run", "my.toml", "--stl", "G[0,10] (y <= 5)", "--budget", "5", "--quiet", cwd=tmp_path)
+    assert done.code == 1, done.err

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.search.journal import read_journal
+from falsifier.search.journal import read_journal, write_manifest
 from falsifier.search.records import ExchangeRecord
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
@@ -69,7 +69,7 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     with serving(reply(FULL)) as server:
         manifest["request"]["llm"]["api_base"] = server.url
-        (tmp_path / "run" / "manifest.json").write_text(json.dumps(manifest))
+        write_manifest(tmp_path / "run", manifest)
         resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
         assert len(server.received) == 1
         assert "+0.419" in server.received[0].texts[-1]

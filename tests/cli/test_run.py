@@ -1,15 +1,21 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.search.journal import read_journal
+from falsifier.errors import JournalError
+from falsifier.search.journal import read_journal, write_manifest
+from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier, listen_to_interrupts
+from tests.fmu.fixtures import path as fixture
 from tests.patience import HANG, wait_until
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
@@ -62,11 +68,11 @@ def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path)
     path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     wrong = {"--variant": "MP9", "--fallback": "corner", "--engine": "uniform"}
     for option, value in wrong.items():
-        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path)
+        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path, fresh=True)
         assert (done.code, "imported" in done.err) == (2, False), done.err
-    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path)
+    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path, fresh=True)
     assert (done.code, "OPENAI_API_KEY" in done.err) == (2, True), done.err
-    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path)
+    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path, fresh=True)
     assert (done.code, "imported" in done.err) == (3, True), done.err
 
 
@@ -78,6 +84,52 @@ def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path
     assert done.json["best"]["signals"]["throttle"]["values"] == [100.0] * 5
     manifest = json.loads((Path(tmp_path) / done.json["directory"] / "manifest.json").read_text())
     assert [(i["name"], i["low"], i["high"]) for i in manifest["inputs"]] == [("throttle", 0.0, 100.0)]
+
+
+SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*SPEED, "--input", "throttle=50", "--input", "brake=0"), "for example --input throttle=0:100"),
+        (("nosuch.fmu",), "nosuch.fmu: no such file"),
+        ((*SPEED, "--input", "throttle=0-100"), "for example --input throttle=0:100"),
+        ((*SPEED, "--input", "throttle=-5.5..7"), "for example --input throttle=-5.5:7"),
+        ((*SPEED, "--param", "throttle=0:100"), "throttle is an input; write --input throttle=0:100"),
+        (("AT1", "--param", "throttle=3"), "write --input throttle=3.0, or [inputs.throttle] in the spec"),
+        (("at1",), "did you mean 'AT1'?"),
+        (("AT1", "--all"), "for all of its spec: falsifier run AT --all"),
+        (("AT1", "AT2"), "falsifier bench TARGET TARGET"),
+        (("AT",), "for example AT:AT1, or falsify all of them with --all"),
+        ((*SPEED, "--stop-time", "-5"), "stop_time: expected a number greater than 0, got -5.0"),
+        ((*SPEED, "--input", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
+        (("empty.toml",), "empty.toml: the file contains nothing; write [model]"),
+    ],
+)
+def test_what_newcomers_get_wrong_is_answered_with_what_to_write(
+    command: Any, tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    (tmp_path / "my.fmu").symlink_to(bundled("fmus") / "AT.fmu")
+    (tmp_path / "empty.toml").write_text("# nothing yet\n")
+    result = command("run", *arguments)
+    assert result.exit_code != 0
+    assert message in f"{result.output} {result.exception}"
+    assert "Input should" not in str(result.exception)
+
+
+def test_a_folder_is_resumed_without_the_runs_that_only_python_can_continue(
+    command: Any, tmp_path: Path
+) -> None:
+    falsify(lag_problem(), budget=2, directory="a")
+    command("run", "python:tests.problems:impossible", "--engine", "uniform", "--budget", "2", "--out", "b")
+    result = command("resume", ".")
+    assert result.exit_code == 0, result.output
+    assert "NEVER: not falsified after 2 simulations" in result.stdout
+    assert "a: this run's problem was made in Python" in result.stderr
+    assert isinstance(command("resume", "a").exception, JournalError)
+    with pytest.raises(JournalError, match=r"choose another directory, .*resume\(\) with problems=\[...\]"):
+        falsify(lag_problem(), budget=2, directory="a")
 
 
 def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:
@@ -110,7 +162,7 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     assert kept > 5
     request = json.loads((tmp_path / "run" / "manifest.json").read_text())
     request["request"]["budget"]["simulations"] = kept + 2
-    (tmp_path / "run" / "manifest.json").write_text(json.dumps(request))
+    write_manifest(tmp_path / "run", request)
     resumed = falsifier("resume", "run", cwd=tmp_path)
     assert resumed.code == 0, resumed.err
     assert f"{kept} evaluations from the journal" in resumed.err
@@ -131,3 +183,37 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     assert done.code == 2
     assert "file/run" in done.err
     assert "Traceback" not in done.err
+
+
+def test_an_input_of_the_formula_need_not_be_searched(tmp_path: Path) -> None:
+    arguments = (
+        "--stl",
+        "G[0,20] (brake > 10 or speed <= 120)",
+        "--input",
+        "throttle=0:100:7",
+        "--budget",
+        "9",
+    )
+    done = falsifier("run", str(bundled("fmus") / "AT.fmu"), *arguments, "--quiet", cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert "falsified after" in done.out
+
+
+def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:
+    arguments = (
+        "--stl",
+        "G[0,10] (y <= 100)",
+        "--input",
+        "u=4.9:10:1",
+        "--budget",
+        "8",
+        "--engine",
+        "uniform",
+    )
+    done = falsifier("run", str(fixture("Silent_2")), *arguments, "--fmu-log", "logs/fmu.txt", cwd=tmp_path)
+    assert done.code == 3, done.out
+    assert re.search(r"stl: failed after 8 simulations, \d of them failed", done.out)
+    assert re.search(r"warning: \d of \d simulations have failed", done.err)
+    log = (tmp_path / "logs" / "fmu.txt").read_text()
+    assert log.count("simulation ") == 8
+    assert "  error: the solver did not converge: the valve is open too far" in log

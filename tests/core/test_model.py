@@ -1,4 +1,6 @@
+import math
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,7 +8,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.errors import SimulationError
+from falsifier.errors import SimulationError, SpecError
 
 INFO = ModelInfo(
     "tank",
@@ -83,3 +85,23 @@ def test_info_finds_variables_by_name_and_role() -> None:
     assert [v.name for v in INFO.parameters] == ["area"]
     with pytest.raises(KeyError, match="did you mean 'inflow'"):
         INFO["inflwo"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"stop_time": 0.0}, "stop_time: expected a positive number, got 0.0"),
+        ({"output_interval": -0.1}, "output_interval: expected a positive number"),
+        ({"output_interval": 0.3}, "not an integer multiple of output_interval = 0.3 s; try .* 0.333333"),
+        ({"output_interval": 2.0}, "not an integer multiple of output_interval = 2 s; try .* 1$"),
+        ({"step_size": 0.0}, "step_size: expected a positive number"),
+        ({"time_limit": math.inf}, "time_limit: expected a finite number"),
+        ({"outputs": "x"}, "outputs: expected a tuple of names, got 'x'"),
+    ],
+)
+def test_an_experiment_that_cannot_be_run_is_refused_when_it_is_made(
+    wrong: dict[str, Any], message: str
+) -> None:
+    right: dict[str, Any] = {"stop_time": 1.0, "output_interval": 0.1, "outputs": ("x",)}
+    with pytest.raises(SpecError, match=message):
+        Experiment(**right | wrong)

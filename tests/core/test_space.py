@@ -1,4 +1,6 @@
+import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
-from falsifier.errors import CandidateError
+from falsifier.errors import CandidateError, SpecError
 
 THROTTLE = InputRange("throttle", 0.0, 100.0, control_points=7, hold=0.05, unit="%")
 BRAKE = InputRange("brake", 0.0, 325.0, control_points=3, interpolation="constant")
@@ -115,3 +117,41 @@ def test_whole_numbers_are_not_interpolated_freely() -> None:
     assert held.signals["gear"].values == (1.0, 7.0)
     with pytest.raises(CandidateError, match='cannot have linear interpolation; use "constant"'):
         space.admit(Candidate({"gear": Signal((0.0, 2.0), (1.0, 7.0), "linear")}))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"low": 1, "high": 0}, r"input 'u': expected low <= high, got \[1, 0\]"),
+        ({"low": math.nan}, "input 'u': low: expected a finite number, got nan"),
+        ({"high": "5"}, "input 'u': high: expected a finite number, got '5'"),
+        ({"control_points": 0}, "input 'u': control_points: expected a whole number, at least 1, got 0"),
+        ({"interpolation": "cubic"}, "interpolation: expected pchip, linear or constant, got 'cubic'"),
+        ({"hold": 0.0}, "input 'u': hold: expected a positive number, got 0.0"),
+        ({"kind": "float"}, "kind: expected real, integer, boolean or enumeration, got 'float'"),
+        ({"low": 0.2, "high": 0.8, "kind": "integer"}, "contains no integer"),
+        ({"kind": "enumeration", "items": (("on", 3),)}, "contains no item of the enumeration"),
+    ],
+)
+def test_an_input_that_cannot_be_searched_is_refused_when_it_is_made(
+    wrong: dict[str, Any], message: str
+) -> None:
+    given: dict[str, Any] = {"low": 0.0, "high": 1.0, **wrong}
+    with pytest.raises(SpecError, match=message):
+        InputRange("u", given.pop("low"), given.pop("high"), **given)
+
+
+def test_other_parts_of_a_space_are_checked_when_they_are_made() -> None:
+    u, p = InputRange("u", 0, 1), ParameterRange("p", 2, 2)
+    for make, message in (
+        (lambda: ParameterRange("p", 3, 2), r"parameter 'p': expected low <= high, got \[3, 2\]"),
+        (lambda: Freedom(0, 0.1), "max_control_points: expected a whole number, at least 1, got 0"),
+        (lambda: Freedom(3, 0.0), "min_interval: expected a positive number"),
+        (lambda: SearchSpace((u,), (p,), 0.0), "stop_time: expected a positive number"),
+        (lambda: SearchSpace((u, u), (), 1.0), "'u' has two ranges"),
+        (lambda: SearchSpace((u,), (ParameterRange("u", 0, 1),), 1.0), "'u' has two ranges"),
+        (lambda: SearchSpace((p,), (), 1.0), "expected a tuple of InputRange"),  # type: ignore[arg-type]
+        (lambda: SearchSpace([u], (), 1.0), "expected a tuple of InputRange"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(SpecError, match=message):
+            make()

@@ -1,4 +1,5 @@
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,7 +47,8 @@ def assert_local_minimum(problem: Problem, shrunk: Shrunk) -> None:
             except CandidateError:
                 continue
             if simplicity(problem, candidate) < limit:
-                violated = evaluate(problem, candidate).violated
+                robustness = evaluate(problem, candidate).robustness
+                violated = robustness is not None and robustness < 0 and robustness <= -shrunk.least_margin
                 assert not (violated and evaluate(half_step(problem), candidate).violated), propose.__name__
 
 
@@ -122,6 +124,19 @@ def test_a_demanded_margin_is_kept() -> None:
         shrink(problem, original, margin=9.0)
 
 
+def test_half_of_the_margin_is_kept_unless_another_one_is_demanded() -> None:
+    problem = lag_problem("G[10,10] (x <= 2 or x >= 9)", response=ramp)
+    signal = problem.space.decode([0.5] * 4).signals["u"]
+    drive = replace(signal, values=(0.23, 0.55, 0.6, 0.23))
+    original = evaluate(problem, Candidate({"u": drive}))
+    assert original.robustness is not None
+    kept, weak = shrink(problem, original), shrink(problem, original, margin=0.0)
+    assert kept.least_margin == -0.5 * original.robustness
+    assert weak.least_margin == 0.0
+    assert kept.evaluation.robustness is not None and weak.evaluation.robustness is not None
+    assert kept.evaluation.robustness <= 0.5 * original.robustness < weak.evaluation.robustness < 0
+
+
 def test_shrinking_does_not_end_at_a_fragile_one() -> None:
     # x(1) of a constant u is 0.6513 u with 0.1 s and 0.6415 u with 0.05 s: at 0.5 only the former violates.
     problem = euler_problem("G[1,1] (x <= 0.323 or u >= 0.6)")
@@ -141,7 +156,7 @@ def test_at6a_shrinks_to_one_change_of_throttle_without_brake() -> None:
         "brake": Signal((0.0, 20.0), (1.7146, 32.187), "pchip"),
     }
     original = evaluate(problem, problem.space.admit(Candidate(signals)))
-    shrunk = shrink(problem, original)
+    shrunk = shrink(problem, original, margin=0.0)
     found = shrunk.evaluation.candidate.signals
     assert shrunk.minimal
     assert found["brake"].values == (0.0,)

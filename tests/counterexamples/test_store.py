@@ -107,7 +107,11 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [("{", "c.json: not a counterexample file"), ('{"format": 2}', "c.json: format: not a counterexample")],
+    [
+        ("hello", "c.json: not a counterexample file: expected the counterexample.json of a run"),
+        ("[1]", "c.json: not a counterexample file: expected the counterexample.json of a run"),
+        ('{"format": 2}', "c.json: format: not a counterexample"),
+    ],
 )
 def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "c.json").write_text(content)
@@ -165,3 +169,8 @@ def test_the_formula_is_kept_as_text() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9 or u < -2)")
     stored = to_store(violation(problem))
     assert parse(stored.formula) == problem.requirement.formula
+
+
+def test_a_path_may_be_a_text(tmp_path: Path) -> None:
+    path = save(to_store(violation(lag_problem())), tmp_path / "counterexample.json")
+    assert load(str(path)) == load(path) == load(str(tmp_path))

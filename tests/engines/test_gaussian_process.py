@@ -47,3 +47,13 @@ def test_distances_are_euclidean() -> None:
 def test_equal_costs_are_no_trouble() -> None:
     assert np.isfinite(standardised(np.full(5, 3.0))).all()
     assert np.isfinite(standardised(np.array([2.0]))).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_length_scales_that_shrink_from_fit_to_fit_leave_a_covariance_that_can_be_factored(seed: int) -> None:
+    """Found in a long search: after many refits the factor of the covariance did not exist."""
+    rng = np.random.default_rng(seed)
+    apart = 10.0 ** -rng.uniform(3, 12) * rng.standard_normal((80, 8))
+    points = rng.random((5, 8))[rng.integers(0, 5, 80)] + apart
+    process = fit_lengths(points, rng.standard_normal(80), np.full(8, 1e-8), rng, noise=1e-4)
+    assert np.isfinite(process.weights).all()

@@ -10,7 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.search.run import falsify
-from falsifier.stl import reference
+from falsifier.stl import second_monitor
 from falsifier.testing import lag_problem
 from tests.stepped import euler_problem
 
@@ -89,7 +89,7 @@ def test_robustness_zero_is_refuted() -> None:
 
 def test_monitors_that_disagree_refute(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = lag_problem()
-    monkeypatch.setattr(reference, "robustness", lambda formula, trajectory: 0.25)
+    monkeypatch.setattr(second_monitor, "robustness", lambda formula, trajectory: 0.25)
     found = confirm(problem, highest(problem))
     assert (found.outcome, found.reference) == ("refuted", 0.25)
     assert "but rtamt computes +0.25" in found.reason
@@ -100,7 +100,7 @@ def test_without_the_second_monitor_nothing_is_confirmed(monkeypatch: pytest.Mon
         raise MonitorError("out of order")
 
     problem = lag_problem()
-    monkeypatch.setattr(reference, "robustness", fail)
+    monkeypatch.setattr(second_monitor, "robustness", fail)
     found = confirm(problem, highest(problem))
     assert (found.outcome, found.reference) == ("refuted", None)
     assert "could not be evaluated by rtamt: out of order" in found.reason

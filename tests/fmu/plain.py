@@ -103,27 +103,28 @@ def enter_step_mode(functions: Functions) -> tuple[int, int]:
 def co_simulate(
     functions: Functions, ports: Addresses, pieces: Pieces, held_ports: Addresses, held_pieces: Pieces,
     current: int, values: int, getters: Addresses, outputs: int, width: int,
-    step: float, first: int, last: int, every: int, report: Table,
+    stop_time: float, steps: int, first: int, last: int, every: int, report: Table,
 ) -> None:  # fmt: skip
     """Do the communication steps first..last-1; see stepping.co_simulate."""
     del current
     instance, version = functions[INSTANCE], functions[FMI_VERSION]
     kept = (c_double * held_ports[3]).from_address(values + 8 * ports[3])
-    status, where, k = 0, DONE, first
+    status, where, k, step = 0, DONE, first, stop_time / steps
     while k < last and where == DONE:
-        _put_inputs(ports, pieces, k * step)
+        start, end = k * step, stop_time if k + 1 == steps else min((k + 1) * step, stop_time)
+        _put_inputs(ports, pieces, start)
         status = exchange_values(instance, version, ports)
         if status > 1:
             where = SETTING
             break
-        new = _put_inputs(held_ports, held_pieces, k * step)
+        new = _put_inputs(held_ports, held_pieces, start)
         if k > 0 and new != list(kept):
             status, where = _event_3(functions, held_ports)
             if where != DONE:
                 break
         for j, value in enumerate(new):
             kept[j] = value
-        status, where, ends = _advance(functions, k * step, (k + 1) * step, step)
+        status, where, ends = _advance(functions, start, end, end - start)
         if where != DONE:
             break
         k += 1

@@ -1,4 +1,5 @@
 import importlib.util
+import re
 import shutil
 import zipfile
 from pathlib import Path
@@ -35,6 +36,93 @@ def test_an_fmu_without_sources_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"Lag_2\.fmu: contains no C sources"):
         build(fixtures.path("Lag_2"), tmp_path / "out.fmu")
     assert not list(tmp_path.iterdir())
+
+
+def rearranged(tmp_path: Path, name: str, **files: str | None) -> Path:
+    """A copy of a fixture with sources, some files added, replaced or (None) moved to subfolders."""
+    target = tmp_path / f"{name}.fmu"
+    with zipfile.ZipFile(fixtures.path(name)) as source, zipfile.ZipFile(target, "w") as made:
+        for entry in source.namelist():
+            key = entry.removeprefix("sources/").replace(".", "_")
+            if key not in files:
+                made.writestr(entry, source.read(entry))
+        for key, text in files.items():
+            if text is not None:
+                made.writestr(f"sources/{key.rpartition('_')[0]}.{key.rpartition('_')[2]}", text)
+    return target
+
+
+def without_listing(path: Path) -> None:
+    """Remove the list of source files from an FMI 2 description."""
+    with zipfile.ZipFile(path) as source:
+        content = {name: source.read(name) for name in source.namelist()}
+    text = content["modelDescription.xml"].decode()
+    shorter = re.sub(r"<SourceFiles>.*?</SourceFiles>", "", text, flags=re.DOTALL)
+    assert shorter != text
+    with zipfile.ZipFile(path, "w") as target:
+        for name, data in content.items():
+            target.writestr(name, shorter if name == "modelDescription.xml" else data)
+
+
+def simulates_like_the_fixture(built: Path, fixture: str) -> bool:
+    model, known = FmuModel(built), fixtures.isolated(fixture)
+    signals = {"u": ramp(1.0)}
+    runs = [run(m, ("y",), signals=signals)["y"].tolist() for m in (model, known)]
+    model.close()
+    return bool(runs[0] == runs[1])
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("name", "file", "shell"), [("Lag_2sources", "all_c", "shell2.c"), ("Lag_3sources", "own_c", "shell3.c")]
+)
+def test_function_prefixes_of_the_sources_have_no_effect(
+    tmp_path: Path, name: str, file: str, shell: str
+) -> None:
+    major = name[4]
+    text = f'#define FMI{major}_FUNCTION_PREFIX Lag_\n#define MODEL "lag.h"\n#include "{shell}"\n'
+    build_description = (
+        '<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="Lag">'
+        '<SourceFileSet><SourceFile name="own.c"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>'
+    )
+    extra = {"buildDescription_xml": build_description} if major == "3" else {}
+    source = rearranged(tmp_path, name, **{file: text}, **extra)
+    built = build(source, tmp_path / "out.fmu")
+    assert simulates_like_the_fixture(built, name.removesuffix("sources"))
+
+
+@needs_compiler
+def test_sources_in_subfolders_are_found_and_included_ones_are_not_compiled_twice(tmp_path: Path) -> None:
+    text = '#define MODEL "lag.h"\n#include "../shell2.c"\n'
+    source = rearranged(tmp_path, "Lag_2sources", all_c=None, **{"model/all_c": text})
+    without_listing(source)
+    assert simulates_like_the_fixture(build(source, tmp_path / "out.fmu"), "Lag_2")
+
+
+@needs_compiler
+def test_the_drafts_name_of_the_build_description_counts_too(tmp_path: Path) -> None:
+    with zipfile.ZipFile(fixtures.path("Lag_3sources")) as source:
+        description = source.read("sources/buildDescription.xml").decode()
+    other = rearranged(tmp_path, "Lag_3sources", buildDescription_xml=None, build_description_xml=description)
+    assert simulates_like_the_fixture(build(other, tmp_path / "out.fmu"), "Lag_3")
+
+
+@needs_compiler
+def test_a_result_that_cannot_be_loaded_is_not_written(tmp_path: Path) -> None:
+    text = '#define MODEL "lag.h"\nvoid gone(void);\n__attribute__((constructor)) static void at_load(void) '
+    source = rearranged(tmp_path, "Lag_2sources", all_c=text + '{ gone(); }\n#include "shell2.c"\n')
+    with pytest.raises(ModelError, match=r"the sources compile, but the result cannot be used: (?s:.*)gone"):
+        build(source, tmp_path / "out.fmu")
+    assert [p.name for p in tmp_path.iterdir()] == ["Lag_2sources.fmu"]
+
+
+@needs_compiler
+def test_many_errors_are_summed_up(tmp_path: Path) -> None:
+    text = "\n".join(f"int f{k}(void) {{ return missing{k}; }}" for k in range(50))
+    source = rearranged(tmp_path, "Lag_2sources", all_c=text)
+    with pytest.raises(ModelError, match="50 errors, the first:") as caught:
+        build(source, tmp_path / "out.fmu")
+    assert len(str(caught.value).splitlines()) == 6
 
 
 @needs_compiler

@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu import read_info
 from falsifier.fmu.description import Description, parse, read_description
@@ -26,7 +27,9 @@ def test_agrees_with_fmpy(name: str) -> None:
     info = description.info
     assert (info.name, info.fmi_version) == (expected.modelName, expected.fmiVersion)
     assert description.token == expected.guid
-    assert (info.stop_time, info.tolerance) == (10.0, 1e-6)
+    default = expected.defaultExperiment
+    assert info.stop_time == float(default.stopTime)
+    assert info.tolerance == (None if default.tolerance is None else float(default.tolerance))
     assert ("co-simulation" in info.interfaces) == (expected.coSimulation is not None)
     assert ("model-exchange" in info.interfaces) == (expected.modelExchange is not None)
     scalars = {v.name: v for v in expected.modelVariables if not v.dimensions}
@@ -36,10 +39,14 @@ def test_agrees_with_fmpy(name: str) -> None:
         twin = scalars[variable.name]
         slot = description.slots[variable.name]
         assert slot.reference == twin.valueReference
-        assert variable.unit == (twin.unit or "")
+        assert variable.unit == ("" if twin.unit == "1" else twin.unit or "")
         assert variable.description == (twin.description or "")
-        assert variable.low == (None if twin.min is None else float(twin.min))
-        if twin.start is not None and variable.kind != "boolean":
+        # Limits that stand for "none" in some exporters are none here.
+        low = None if twin.min is None else float(twin.min)
+        assert variable.low == (low if low is None or abs(low) < 1e30 else None)
+        if variable.kind == "string":
+            assert variable.start == twin.start
+        elif twin.start is not None and variable.kind != "boolean":
             assert variable.start == float(twin.start)
         if variable.causality in ("input", "output"):
             assert variable.causality == twin.causality
@@ -138,3 +145,8 @@ def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
     assert read_info(copy).name == "Lag"
     copy.write_bytes(fixtures.path("Ball_2").read_bytes())
     assert read_info(copy).name == "Ball"
+
+
+@pytest.mark.parametrize("name", ["CC", "NN"])
+def test_a_dimensionless_variable_has_no_unit(name: str) -> None:
+    assert "1" not in {v.unit for v in read_info(bundled("fmus") / f"{name}.fmu").variables}

@@ -1,4 +1,21 @@
-from falsifier.fmu.environment import worker_environment
+import pytest
+
+from falsifier.fmu import posix
+from falsifier.fmu.environment import protect_secrets, worker_environment
+
+
+@pytest.mark.parametrize(
+    ("name", "confines", "hides"),
+    [("OPENAI_API_KEY", False, 1), ("OPENAI_API_KEY", True, 0), ("PATH", False, 0), ("PATH", True, 0)],
+)
+def test_memory_is_hidden_if_it_holds_secrets_and_fmus_are_not_confined(
+    monkeypatch: pytest.MonkeyPatch, name: str, confines: bool, hides: int
+) -> None:
+    calls: list[None] = []
+    monkeypatch.setattr(posix, "can_confine", lambda: confines)
+    monkeypatch.setattr(posix, "hide_memory", lambda: calls.append(None))
+    protect_secrets({name: "value"})
+    assert len(calls) == hides
 
 
 def test_everything_is_passed_on_but_secrets() -> None:

@@ -1,9 +1,12 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu.simulator import FmuModel
+from tests.command import ROOT
 from tests.fmu.fixtures import isolated, local, path, run
 from tests.fmu.support import ERROR, TALK
 
@@ -35,6 +38,27 @@ def test_messages_belong_to_the_simulation_that_they_came_from() -> None:
     model.close()
 
 
+def test_the_messages_of_an_fmu_that_others_load_are_printed_when_this_one_is_closed() -> None:
+    """fmpy has one logger per process: were it freed with its FMU, the next message would crash."""
+    program = f"""
+import gc
+from tests.fmu.fixtures import local, run
+from tests.fmu.support import TALK
+from tests.modelica.support import opened
+model = local("Misdeeds_2")
+assert run(model, ("y",), parameters={{"misdeed": TALK}}).log
+model.close()
+gc.collect()
+with opened({str(path("Misdeeds_2"))!r}) as [other]:
+    other.start(misdeed=TALK).run(["y"], 1.0, 0.1)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout.splitlines()) == {"warning: valve nearly closed"}
+
+
 def test_equal_files_are_loaded_once_and_closing_removes_the_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -44,7 +68,7 @@ def test_equal_files_are_loaded_once_and_closing_removes_the_folder(
     models = [FmuModel(copy, isolate=False) for _ in range(2)]
     for model in models:
         run(model, ("h",))
-    assert len(list(tmp_path.glob("falsifier-fmu-*"))) == 1
+    assert len([p for p in tmp_path.glob("falsifier-fmu-*") if p.is_dir()]) == 1
     models[0].close()
     assert not list(tmp_path.glob("falsifier-fmu-*"))
     models[1].close()

@@ -69,5 +69,5 @@ def test_discrete_inputs_change_at_events_only() -> None:
 
 def test_a_model_that_leaves_its_domain_fails_with_the_time() -> None:
     """Van der Pol's equation run with negative damping of the far field blows up in finite time."""
-    with pytest.raises(SimulationError, match=r"the step returned .* at t = "):
+    with pytest.raises(SimulationError, match=r"no step is small enough.* at t = "):
         run(local("VanDerPol_2", ME), ("x",), stop=50.0, parameters={"mu": -1.0, "x": 5.0})

@@ -2,8 +2,6 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu import isolation
-from falsifier.fmu.nursery import REAP
 from tests.fmu.support import assert_nothing_is_left, script
 
 
@@ -29,26 +27,3 @@ for pid in (fmu._worker.pid, REGISTRY._nursery._process.pid):
         seen = process.stdout.read()
     assert "hidden" not in seen
     assert seen.count("LICENSE=port@host") == 2
-
-
-# A nursery that says something, and then the exit code of the worker that it is asked for.
-TALKING = f"""
-import json, socket, sys
-sys.path[:] = json.loads(sys.argv[1])
-from falsifier.fmu.channel import Reply, receive_request, send_reply
-sock = socket.socket(fileno=int(sys.argv[2]))
-send_reply(sock, Reply())
-assert receive_request(sock)[0] == {REAP}
-send_reply(sock, Reply(text="compiling", more=True))
-send_reply(sock, Reply(text="7"))
-"""
-
-
-def test_what_the_nursery_says_is_logged_and_is_not_the_answer(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(isolation, "_BOOT", TALKING)
-    nursery = isolation.Nursery()
-    assert nursery.reap(1) == 7
-    nursery.close()
-    assert [record.getMessage() for record in caplog.records] == ["compiling"]

@@ -1,7 +1,8 @@
 from falsifier.core.model import ModelInfo
 from falsifier.fmu import stepper
-from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.description import Description
 from falsifier.fmu.ports import make_ports
+from falsifier.fmu.slot import Slot
 from tests.fmu import plain
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.errors import SimulationError
+from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import archive
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import read_description
+from falsifier.fmu.library import Library
 from falsifier.fmu.plan import make_plan
 from falsifier.fmu.session import Session
 from falsifier.fmu.worker_order import Reuse
@@ -28,7 +29,7 @@ WAYS: list[tuple[str, Reuse]] = [
     ("SavedState_3", "state"),
     ("LyingState_2", "instance"),
     ("SpentState_3", "instance"),
-    ("KeepsStatic_2", "process"),
+    ("KeepsStatic_2", "library"),
 ]
 
 
@@ -75,3 +76,20 @@ def test_in_a_process_of_its_own_repeated_runs_are_equal(name: str) -> None:
     runs = [run(model, ("y",))["y"].tolist() for _ in range(4)]
     assert runs == [runs[0]] * 4
     model.close()
+
+
+def test_an_instance_that_cannot_be_replaced_is_a_failed_simulation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_library: Library) -> None:
+        raise ModelError("instantiating the FMU failed")
+
+    with prepared("NoReset_2", tmp_path) as (session, room):
+        session.run()
+        first = room.outputs.copy()
+        with monkeypatch.context() as broken:
+            broken.setattr(Library, "renew", fail)
+            with pytest.raises(SimulationError, match="instantiating the FMU failed"):
+                session.run()
+        session.run()
+        np.testing.assert_array_equal(room.outputs, first)

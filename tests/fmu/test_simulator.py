@@ -42,5 +42,3 @@ def test_interfaces_that_are_not_there_name_the_one_that_is() -> None:
         FmuModel(fixtures.path("Stiff_2"))
     with pytest.raises(ModelError, match="scheduled execution is not supported"):
         FmuModel(fixtures.path("Scheduled_3"))
-    with pytest.raises(ModelError, match="would have to tick its clocks 'tick'"):
-        FmuModel(fixtures.path("Clocked_3"))

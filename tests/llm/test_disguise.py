@@ -8,10 +8,11 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.disguise import Disguise, renamed
+from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
 from falsifier.problem.loading import load_problem
 from falsifier.stl import parse
+from falsifier.stl.renaming import renamed
 
 REAL = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT1"
 

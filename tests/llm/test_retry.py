@@ -1,6 +1,7 @@
 """Patience with passing failures, shared between runs."""
 
 import threading
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -123,3 +124,49 @@ def test_server_restarts_while_asked() -> None:
     assert reply.text == "back"
     assert reply.attempts == 4
     assert len(server.received) == 4
+
+
+def test_no_slot_within_the_limit_is_an_error() -> None:
+    gate = Gate(concurrency=1)
+    with (
+        gate.passage(),
+        pytest.raises(ChatError, match=r"other requests .* are still waiting"),
+        gate.passage(0.0),
+    ):
+        pass
+
+
+def test_a_pause_longer_than_the_limit_is_an_error_and_leaves_the_slot_free() -> None:
+    gate = Gate(concurrency=1, sleep=Naps())
+    gate.pause(100.0)
+    with pytest.raises(ChatError, match="pause for another 100 s"), gate.passage(10.0):
+        pass
+    assert gate._slots.acquire(blocking=False)
+
+
+def test_any_limit_can_be_waited_for() -> None:
+    gate = Gate(concurrency=1)
+    entered, done = threading.Event(), threading.Event()
+
+    def occupy() -> None:
+        with gate.passage():
+            entered.set()
+            done.wait()
+
+    other = threading.Thread(target=occupy)
+    other.start()
+    entered.wait()
+    threading.Timer(0.05, done.set).start()
+    with gate.passage(1e300):
+        pass
+    other.join()
+
+
+def test_a_wait_beyond_the_deadline_is_not_begun() -> None:
+    naps = Naps()
+    chat = RetryingChat(
+        ScriptedChat([TransientChatError("busy", retry_after=50.0), "late"]), Gate(sleep=naps)
+    )
+    with pytest.raises(ChatError, match=r"no time is left to ask again\. busy"):
+        chat.complete(QUESTION.model_copy(update={"deadline": time.monotonic() + 20.0}))
+    assert naps.taken == []

@@ -8,7 +8,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError, SpecError
 from falsifier.problem.joining import Joined, join, join_fmu
-from falsifier.problem.options import changes_from_options
+from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import path as fixture
 

@@ -66,7 +66,15 @@ def test_parameters_have_their_nominal_value() -> None:
 
 @pytest.mark.parametrize(
     ("variable", "value", "fits"),
-    [(GEAR, 3, True), (GEAR, 2, False), (Variable("n", "integer"), 2.5, False), (Variable("x"), 2.5, True)],
+    [
+        (GEAR, 3, True),
+        (GEAR, 2, False),
+        (Variable("n", "integer"), 2.5, False),
+        (Variable("x"), 2.5, True),
+        (Variable("x", low=0.0), -3.0, False),
+        (Variable("x", high=2.0), 2.5, False),
+        (Variable("x", low=0.0, high=2.0), 2.0, True),
+    ],
 )
 def test_a_fixed_value_must_be_one_that_the_variable_can_have(
     variable: Variable, value: float, fits: bool

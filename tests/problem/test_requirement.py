@@ -2,7 +2,8 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import SpecError
-from falsifier.problem.requirement import parse_requirement
+from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.stl import parse
 from falsifier.testing import lag_problem
 
 INFO = lag_problem().info
@@ -27,3 +28,10 @@ def test_what_cannot_be_judged_names_file_key_and_place(text: str, named: str) -
         parse_requirement(text, INFO, EXPERIMENT, file="my.toml", key="requirements.R.formula")
     assert str(caught.value).startswith("my.toml: requirements.R.formula: ")
     assert named in str(caught.value)
+
+
+def test_a_requirement_has_a_name_and_a_parsed_formula() -> None:
+    with pytest.raises(SpecError, match="expected a name"):
+        Requirement(None, parse("G (x < 1)"))  # type: ignore[arg-type]
+    with pytest.raises(SpecError, match=r"requirement 'low': expected a formula; use parse\('G \(x < 1\)'\)"):
+        Requirement("low", "G (x < 1)")  # type: ignore[arg-type]

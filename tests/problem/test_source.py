@@ -2,7 +2,7 @@ import pytest
 from pydantic import ValidationError
 
 from falsifier.problem.loading import load_source
-from falsifier.problem.options import changes_from_options
+from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 
 CHANGED = ProblemSource(target="AT1", changes=changes_from_options(inputs=["brake=0"], stop_time=30.0))
@@ -10,7 +10,7 @@ CHANGED = ProblemSource(target="AT1", changes=changes_from_options(inputs=["brak
 
 @pytest.mark.parametrize(
     ("target", "name"),
-    [("AT1", "AT1"), ("specs/AT.toml:AT1", "AT1"), ("python:a.b:make", "make"), ("my.fmu", "my.fmu")],
+    [("AT1", "AT1"), ("specs/AT.toml:AT1", "AT1"), ("python:a.b:make", "make"), ("my.fmu", "my")],
 )
 def test_its_name_is_the_targets_last_part(target: str, name: str) -> None:
     assert ProblemSource(target=target).name == name

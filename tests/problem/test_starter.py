@@ -27,9 +27,9 @@ def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) 
     assert ranges["in_Enumeration"] == (1, 3, "enumeration")
     assert ranges["in_Boolean"] == (0, 1, "boolean")
     assert ranges["in_Int8"] == (0, 1, "integer")
-    assert "# 1 = first, 2 = second, 3 = third\n[inputs.in_Enumeration]\nrange = [1, 3]\n" in text
+    assert "[inputs.in_Enumeration]\n# 1 = first, 2 = second, 3 = third\nrange = [1, 3]\n" in text
     assert "[inputs.in_Boolean]\nrange = [0, 1]\n" in text
-    assert "[inputs.in_Int8]\nrange = [0, 1]  # the FMU specifies no min and max: replace" in text
+    assert "[inputs.in_Int8]\nrange = [0, 1]  # unbounded: the FMU specifies no min and max; replace" in text
 
 
 def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> None:
@@ -43,12 +43,49 @@ def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> 
     assert len(problem.space.parameters) == 1, "without inputs a parameter is searched"
 
 
-def test_an_fmu_without_outputs_has_nothing_to_require() -> None:
+def test_an_fmu_that_computes_nothing_has_nothing_to_require() -> None:
     info = read_info(fmu_path("Lag_2"))
-    with pytest.raises(SpecError, match="no numeric output"):
+    with pytest.raises(SpecError, match="computes no variable that a requirement could be about"):
         starter_spec(fmu_path("Lag_2"), replace(info, variables=info.inputs))
 
 
 def test_names_that_toml_cannot_have_bare_are_quoted() -> None:
     text = starter_spec(fmu_path("Arrays_3"), read_info(fmu_path("Arrays_3")))
     assert set(tomllib.loads(text)["inputs"]) == {"u[1]", "u[2]"}
+
+
+def written(name: str, folder: Path) -> Path:
+    spec = folder / "my.toml"
+    spec.write_text(starter_spec(fmu_path(name), read_info(fmu_path(name))), encoding="utf-8")
+    return spec
+
+
+def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> None:
+    spec = written("OddNames_2", tmp_path)
+    data = tomllib.loads(spec.read_text(encoding="utf-8"))
+    assert list(data["inputs"]) == ['Öffnung "Ventil" 1']
+    problem = load_problem(str(spec))
+    assert problem.space.names == ('Öffnung "Ventil" 1',)
+    assert problem.requirement.formula.signals == ("größe.y",)
+    # Parameters are offered in comments; what these say is valid, too.
+    offered = [line.removeprefix("# ") for line in spec.read_text("utf-8").splitlines() if "LOW" in line]
+    keys = [next(iter(tomllib.loads(line.replace("[LOW, HIGH]", "[1, 2]")))) for line in offered]
+    assert keys == ["'T of # plant'", "Verstärkung"]
+
+
+def test_without_outputs_states_are_offered(tmp_path: Path) -> None:
+    spec = written("NoOutputs_2dymola", tmp_path)
+    assert "# The FMU declares no outputs. Requirements may name any variable: x\n" in spec.read_text("utf-8")
+    assert load_problem(str(spec)).requirement.formula.signals == ("x",)
+
+
+def test_unbounded_inputs_are_said_to_be_so(tmp_path: Path) -> None:
+    text = written("HugeLimits_2", tmp_path).read_text("utf-8")
+    assert "range = [0.0, 1.0]  # unbounded: the FMU specifies no min and max" in text
+
+
+@pytest.mark.parametrize("name", ["Lag_1cs", "Lag_2", "Lag_3", "Arrays_3", "Aliases_3", "ClocksAndBinary_3"])
+def test_every_starter_can_be_loaded(tmp_path: Path, name: str) -> None:
+    if not fmu_path(name).is_file():
+        pytest.skip("no such fixture")
+    assert load_problem(str(written(name, tmp_path))).name == "R1"

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from falsifier.errors import SpecError
@@ -33,10 +34,19 @@ def test_an_unknown_price_stays_unknown_and_forbids_a_limit_on_money() -> None:
 def test_a_budget_needs_a_positive_limit() -> None:
     with pytest.raises(SpecError, match="at least one limit"):
         Budget(None)
-    with pytest.raises(SpecError, match="simulations must be positive, got 0"):
+    with pytest.raises(SpecError, match="simulations: expected a whole number, at least 1, got 0"):
         Budget(0)
 
 
 def test_remaining_cuts_a_batch() -> None:
     assert Budget(10).remaining(Spent(simulations=8), 4) == 2
     assert Budget(None, seconds=1).remaining(Spent(simulations=8), 4) == 4
+
+
+def test_whole_numbers_of_numpy_become_ints() -> None:
+    budget = Budget(np.int32(3), tokens=np.int64(5))  # type: ignore[arg-type]
+    assert (type(budget.simulations), type(budget.tokens)) == (int, int)
+    with pytest.raises(
+        SpecError, match=r"budget: simulations: expected a whole number, at least 1, got 2\.5"
+    ):
+        Budget(2.5)  # type: ignore[arg-type]

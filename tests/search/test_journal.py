@@ -6,21 +6,21 @@ import pytest
 
 from falsifier.errors import JournalError
 from falsifier.search.journal import Journal, JournalReader, open_journal, read_journal, recorded_candidates
-from falsifier.search.records import AskedRecord
+from falsifier.search.records import AskedRecord, Record, line_of
 from falsifier.search.run import falsify
 from tests.problems import impossible
 from tests.search.test_tally import evaluated
 
 
 def test_candidates_are_found_in_batches(tmp_path: Path) -> None:
-    lines = [
+    lines: list[Record] = [
         AskedRecord(
             first=0, n=2, candidates=[{"origin": "a"}, {"origin": "b"}], seconds=0.1, requirement="R"
         ),
         evaluated(0, 1.0),
         AskedRecord(first=2, n=2, candidates=[{"origin": "c"}], seconds=0.1, requirement="R"),
     ]
-    (tmp_path / "journal.jsonl").write_text("".join(f"{line.model_dump_json()}\n" for line in lines))
+    (tmp_path / "journal.jsonl").write_bytes(b"".join(line_of(line, i) for i, line in enumerate(lines, 1)))
     found = recorded_candidates(read_journal(tmp_path))
     assert [found[i].origin for i in range(3)] == ["a", "b", "c"]
 
@@ -29,12 +29,12 @@ def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> Non
     reader = JournalReader(tmp_path)
     assert list(reader.new()) == [] and not reader.begun
     path = tmp_path / "journal.jsonl"
-    lines = [evaluated(i, float(i)).model_dump_json() for i in range(3)]
-    path.write_text(f"{lines[0]}\n{lines[1][:20]}")
+    lines = [line_of(evaluated(i, float(i)), i + 1) for i in range(3)]
+    path.write_bytes(lines[0] + lines[1][:20])
     assert [r.index for r in reader.new()] == [0]  # type: ignore[union-attr]
-    path.write_text("".join(f"{line}\n" for line in lines))
+    path.write_bytes(b"".join(lines))
     assert [r.index for r in reader.new()] == [1, 2]  # type: ignore[union-attr]
-    path.write_text(f"{lines[0]}\n")
+    path.write_bytes(lines[0])
     assert reader.shrank
 
 

@@ -19,7 +19,7 @@ from falsifier.search.loop import Live, search
 from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
 from falsifier.search.run import falsify
 from falsifier.testing import lag_problem
-from tests.problems import broken, never
+from tests.problems import broken, mostly_broken, never
 from tests.search.support import run
 
 
@@ -61,6 +61,17 @@ def test_failed_simulations_are_evaluations_with_a_reason() -> None:
     assert failed
     assert len(failed) < 12
     assert all(e.robustness is None and "'x' is nan at t = 0.5 s" in e.reason for e in failed)
+
+
+def test_a_run_in_which_most_simulations_fail_has_failed() -> None:
+    result = run(lag_problem("G[0,10] (x <= 2)", response=mostly_broken), budget=20)
+    failures = sum(e.status == "failed" for e in result.evaluations)
+    assert 10 < failures < 20
+    assert (result.status, result.spent.failures) == ("failed", failures)
+    assert result.reason.startswith(f"{failures} of 20 simulations failed; the last error: ")
+    assert "'x' is nan at t = 0.5 s" in result.reason
+    assert result.best is not None
+    assert result.spent.simulations_text == f"20 simulations, {failures} of them failed"
 
 
 def test_a_model_that_always_fails_ends_the_run_early() -> None:
@@ -162,6 +173,6 @@ def whole(problem: Problem, kind: ValueKind) -> Problem:
 )
 def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
     problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
-    result = run(problem, engine=engine, budget=20)
-    assert result.spent.simulations == 20
+    result = run(problem, engine=engine, budget=8)
+    assert result.spent.simulations == 8
     assert {e.candidate.signals["u"].values for e in result.evaluations} <= {(-1.0,), (0.0,), (1.0,)}

@@ -1,4 +1,3 @@
-import json
 from pathlib import Path
 
 import pytest
@@ -52,11 +51,11 @@ def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match=str(tmp_path)):
         manifest.read(tmp_path)
     content = DESCRIBED.model_dump(mode="json") | {"stop_time": "late"}
-    (tmp_path / "manifest.json").write_text(json.dumps(content))
+    write_manifest(tmp_path, content)
     with pytest.raises(JournalError, match="stop_time"):
         manifest.read(tmp_path)
     (tmp_path / "manifest.json").write_text("{")
-    with pytest.raises(JournalError, match="JSON"):
+    with pytest.raises(JournalError, match="is damaged"):
         manifest.read(tmp_path)
 
 

@@ -1,14 +1,18 @@
 """The one way to search, as users call it."""
 
 import json
+from collections import deque
 from pathlib import Path
 
 import pytest
+from numpy import int64
 
+from falsifier.core.files import bundled
 from falsifier.engines import make_engine
 from falsifier.errors import JournalError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
 from falsifier.search.budget import Budget
@@ -17,7 +21,7 @@ from falsifier.search.journal import holds_run
 from falsifier.search.request import LLMSettings
 from falsifier.search.run import falsify, resume
 from falsifier.testing import lag_problem
-from tests.problems import easy, hard, impossible
+from tests.problems import easy, easy_again, hard, impossible
 
 EASY = "python:tests.problems:easy"
 
@@ -44,6 +48,23 @@ def test_several_problems_give_several_results_in_their_order() -> None:
     assert only.falsified
 
 
+@pytest.mark.parametrize("other", [easy_again(), lag_problem(points=2, name="EASY")], ids=["shared", "apart"])
+def test_problems_of_one_call_have_different_names(other: Problem, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"two of the problems are named 'EASY'.*name=\.\.\."):
+        falsify([easy(), hard(), other], "corners", budget=5, directory=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None:
+    formulas = {"low": "G[0,1] (speed <= 500)", "high": "G[0,1] (speed <= -1)"}
+    fmu = bundled("fmus") / "AT.fmu"
+    problems = [Problem.from_fmu(fmu, formula, name=name) for name, formula in formulas.items()]
+    results = falsify(problems, "corners", budget=1, directory=tmp_path)
+    assert [(r.problem.name, r.falsified) for r in results] == [("low", False), ("high", True)]
+    assert [r.problem.name for r in resume(tmp_path)] == ["low", "high"]
+    assert Problem.from_fmu(fmu, formulas["low"]).name == "stl"
+
+
 def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Path) -> None:
     falsify([impossible(), lag_problem(points=2, name="APART")], "corners", budget=2, directory=tmp_path)
     assert {p.name for p in tmp_path.iterdir() if holds_run(p)} == {"NEVER", "APART"}
@@ -54,6 +75,32 @@ def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Pat
 def test_a_budget_may_be_a_number_of_simulations() -> None:
     counts = [falsify(impossible(), "uniform", budget=b).spent.simulations for b in (3, Budget(3))]
     assert counts == [3, 3]
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("seed", -1),
+        ("seed", 0.5),
+        ("jobs", 0),
+        ("jobs", True),
+        ("budget", 2.5),
+        ("budget", "10"),
+        ("budget", True),
+    ],
+)
+def test_numbers_that_cannot_be_used_are_named(name: str, given: object) -> None:
+    with pytest.raises(SpecError, match=f"{name}: expected a whole number, at least"):
+        falsify(easy(), "corners", **{name: given})  # type: ignore[call-overload]
+
+
+def test_whole_numbers_may_be_those_of_numpy() -> None:
+    result = falsify(impossible(), "uniform", budget=int64(3), seed=int64(7))  # type: ignore[call-overload]
+    assert result.spent.simulations == 3
+
+
+def test_any_sequence_of_problems_gives_a_list() -> None:
+    assert [r.problem.name for r in falsify(deque([easy(), hard()]), "corners", budget=1)] == ["EASY", "HARD"]
 
 
 def test_a_chat_leads_by_itself_and_its_name_is_recorded(tmp_path: Path) -> None:

@@ -69,7 +69,8 @@ def test_every_requirement_has_its_own_numbers(results: dict[str, Result], runs:
 
 
 def test_what_was_recorded_is_what_each_would_have_judged(directory: Path, runs: dict[str, Run]) -> None:
-    candidates = [e.candidate for e in recorded_evaluations(directory, read_journal(directory))]
+    recorded = recorded_evaluations(directory, read_journal(directory))
+    candidates = [e.candidate for e in recorded.values()]
     for problem in PROBLEMS:
         robustness = runs[problem.name].robustness
         judged = [evaluate(problem, candidate).robustness for candidate in candidates[: len(robustness)]]

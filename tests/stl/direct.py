@@ -1,10 +1,12 @@
 """The semantics written down once more, as slow and direct as the definition."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.stl.constants import Constant
 from falsifier.stl.formula import (
     Always,
     And,
@@ -38,6 +40,8 @@ class Direct:
 
     def judge(self, f: Formula, k: int = 0) -> tuple[float, int]:
         """Robustness at sample k and the sample that decided it."""
+        if isinstance(f, Constant):
+            return math.inf if f.value else -math.inf, k
         if isinstance(f, Predicate):
             here = {name: column[k] for name, column in self.columns.items()}
             left, right = float(f.left.evaluate(here)), float(f.right.evaluate(here))
@@ -71,7 +75,7 @@ class Direct:
     def _until(self, f: Until, k: int, end: int) -> tuple[float, int]:
         left = first_smallest([self.judge(f.left, i) for i in range(k, end + 1)])
         right = self.judge(f.right, end)
-        return left if left[0] < right[0] else right
+        return smaller(left, right)
 
 
 def smaller(left: tuple[float, int], right: tuple[float, int]) -> tuple[float, int]:

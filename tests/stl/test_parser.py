@@ -192,7 +192,9 @@ MISTAKES = [
     ("x - 1", 1, "x - 1 >= 0"),
     ("a and x - 1", 7, "compare it"),
     ("3", 1, "compare it"),
-    ("true", 1, "not b"),
+    ("true", 1, "compare a signal"),
+    ("G[0,5] (x <= 3 or true)", 1, "compare a signal"),
+    ("x == true", 6, "not b"),
     ("x => 3", 6, ">="),
     ("x <= 5 ms", 8, "own unit"),
     ("pow(x,2) <= 3", 1, "x^y"),
@@ -210,6 +212,17 @@ MISTAKES = [
     ("1e999 <= x", 1, "1e308"),
     ("x <= 'a", 6, "second one"),
     ("x implies y", 3, "->"),
+    ("g[0,1] (x <= 3)", 8, "write G"),
+    ("f[0,1] x <= 3", 8, "write F"),
+    ("a and b u[0,1] c", 9, "write U"),
+    ("g[0.5,1] x <= 3", 2, "write G"),
+    ("g[0,1](x <= 3)", 1, "write G"),
+    ("globally (x <= 3)", 10, "write G"),
+    ("globally[0,20] (x <= 3)", 16, "write G"),
+    ("Always[0,20] (x <= 3)", 14, "lower case: always"),
+    ("FINALLY x <= 3", 9, "write F"),
+    ("[] (x <= 3)", 1, "[] is written G"),
+    ("a -> <>[0,3] (x <= 3)", 6, "<> is written F"),
     ("a <= b\nand c <== d", 16, "=="),
     ("(" * 500 + "b" + ")" * 500, 101, "split"),
     ("b" + " and b" * 300, 1, "split"),
@@ -224,8 +237,11 @@ def test_what_is_not_one_formula_is_an_error_that_points_there(text: str, positi
     assert f"(position {position})" in first
     assert hint in str(caught.value)
     start = text.rfind("\n", 0, position - 1) + 1
-    assert line[2:] == text[start:].split("\n")[0]
-    assert caret == " " * (2 + position - 1 - start) + "^"
+    shown, whole = line[2:], text[start:].split("\n")[0]
+    column = position - 1 - start
+    assert shown in whole and len(shown) >= min(len(whole), 150), "long lines are cut around the position"
+    assert f"{line} "[caret.index("^")] == f"{whole} "[column]
+    assert caret == " " * (2 + column) + "^" or len(whole) > len(shown)
 
 
 TEMPORAL = ["G", "F", "U", "X", "[0,1]", "[0, 1", "not"]

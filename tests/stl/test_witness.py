@@ -62,10 +62,11 @@ def test_connectives_go_to_the_operand_that_decided_the_left_one_on_ties(text: s
     [
         ([0.0, 0.0, 4.0, 0.0, 0.0, 0.0], "x >= 0", 1),  # x was lowest on the way
         ([0.0, 0.5, 0.0, 0.0, 0.0, 0.0], "y >= 0", 1),
-        ([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], "y >= 0", 1),  # a tie goes to the right operand
+        ([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], "x >= 0", 1),  # a tie, with x lowest before y is at its best
+        ([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], "x >= 0", 1),  # a tie
     ],
 )
-def test_until_goes_left_only_where_that_is_strictly_smaller(
+def test_until_goes_to_the_smaller_operand_the_left_one_on_ties(
     right: list[float], decider: str, sample: int
 ) -> None:
     last = way("(x >= 0) U[1,2] (y >= 0)", x=X, y=right)[-1]

@@ -3,6 +3,7 @@ from typing import Any
 
 import pytest
 
+from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem, load_problems
 from tests.systems.driving import ROOT
 
@@ -43,7 +44,13 @@ def test_spec_loads(system: str) -> None:
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_fmu_speaks_for_itself(system: str) -> None:
-    info = load_problems(system)[0].info
+    from fmpy import read_model_description
+
+    problem = load_problems(system)[0]
+    info = problem.info
+    assert isinstance(problem.model, FmuModel)
+    # Dimensionless variables have the unit 1 in the file.
+    units = {v.name: v.unit for v in read_model_description(str(problem.model.path)).modelVariables}
     assert len(info.description.split()) > 15
     assert set(info.interfaces) == {"co-simulation", "model-exchange"}
     for variable in (*info.inputs, *info.outputs, *info.parameters):
@@ -52,7 +59,7 @@ def test_fmu_speaks_for_itself(system: str) -> None:
         if variable.kind != "real":
             assert variable.literals or variable.kind == "boolean", variable.name
             continue
-        assert variable.unit, variable.name
+        assert units[variable.name], variable.name
         assert variable.low is not None and variable.high is not None, variable.name
 
 

@@ -4,8 +4,10 @@ from typing import Any
 import pytest
 
 from falsifier import falsify
+from falsifier.testing import lag_problem
 from falsifier.views.progress import make_display, progress
-from tests.problems import hard, impossible
+from falsifier.views.text import result_json, result_text
+from tests.problems import broken, hard, impossible, mostly_broken
 
 
 class Shown:
@@ -47,3 +49,22 @@ def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) 
     with make_display() as display:
         falsify(hard(), "corners", budget=5, listeners=[display])
     assert "falsified; violation confirmed" in front_end.lines[-1]
+
+
+def test_a_warning_comes_once_when_most_simulations_have_failed(capsys: pytest.CaptureFixture[str]) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", response=mostly_broken)
+    with make_display() as display:
+        result = falsify(problem, "uniform", budget=20, seed=1, listeners=[display])
+    warnings = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+    assert len(warnings) == 1
+    assert re.match(r"warning: \d+ of \d+ simulations have failed; the run counts as failed", warnings[0])
+    assert f"failed after 20 simulations, {result.spent.failures} of them failed" in result_text(result)
+    assert result_json(result)["spent"]["failures"] == result.spent.failures
+
+
+def test_a_few_failures_bring_no_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    with make_display() as display:
+        falsify(
+            lag_problem("G[0,10] (x <= 2)", response=broken), "uniform", budget=2, seed=1, listeners=[display]
+        )
+    assert "warning" not in capsys.readouterr().err

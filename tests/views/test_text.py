@@ -14,7 +14,6 @@ from falsifier.views.text import (
     result_text,
     results_text,
     seconds_text,
-    warn,
 )
 from tests.problems import easy, hard, impossible, unusable
 
@@ -122,8 +121,3 @@ def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
 def test_seconds_say_where_they_went() -> None:
     spent = Spent(seconds=12.34, simulation_seconds=10.0, engine_seconds=2.0)
     assert seconds_text(spent) == "12.3 s; simulator 10.00 s, engine 2.00 s"
-
-
-def test_warnings_go_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:
-    warn("mind this")
-    assert capsys.readouterr() == ("", "mind this\n")

@@ -8,7 +8,7 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.analysis.published import COLUMNS, Published, Score, read_published
+from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, read_published
 from falsifier.campaigns.analysis.runs import Run, columns, frame, histories, load, load_run
 from falsifier.campaigns.analysis.statistics import Statistics, group, statistics
 from falsifier.campaigns.analysis.tables import Table, ablation_table, llms_table, main_table

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.plan import Method, method_of
-from falsifier.counterexamples.store import file_name
+from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.search import manifest as manifests
 from falsifier.search.budget import Spent
@@ -67,7 +67,7 @@ class Run:
     @property
     def counterexample_file(self) -> Path:
         """Path of the counterexample, for ``falsifier replay``, which creates the file if it is missing."""
-        return self.directory / file_name(self.requirement if self.shared else "")
+        return self.directory / file_of(self.requirement if self.shared else "")
 
     @property
     def seed(self) -> int:

@@ -7,10 +7,11 @@ from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from typing import Any
 
-from falsifier.campaigns.analysis.published import COLUMNS, Published, Score, rank
+from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
 from falsifier.campaigns.plan import Method
+from falsifier.core.literals import csv_cell, markdown_text, one_line
 
 NONE = "–"
 
@@ -43,11 +44,9 @@ class Table:
     def markdown(self) -> str:
         """Format as a Markdown table with its title and notes."""
         lines = [self.header, tuple("---" for _ in self.header), *self.rows]
-        body = "\n".join(
-            f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines
-        )
+        body = "\n".join(f"| {' | '.join(map(markdown_text, row))} |" for row in lines)
         notes = "".join(f"\n\n{note}" for note in self.notes)
-        return f"**{self.title}**\n\n{body}{notes}\n"
+        return f"**{markdown_text(self.title)}**\n\n{body}{notes}\n"
 
     def _repr_markdown_(self) -> str:
         return self.markdown()
@@ -56,13 +55,12 @@ class Table:
         """Format as comma-separated values."""
         buffer = StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(self.header)
-        writer.writerows(self.rows)
+        writer.writerows(map(csv_cell, row) for row in (self.header, *self.rows))
         return buffer.getvalue()
 
     def text(self) -> str:
         """Format as plain text with aligned columns."""
-        rows = [self.header, *self.rows]
+        rows = [tuple(map(one_line, row)) for row in (self.header, *self.rows)]
         widths = [max(len(row[i]) for row in rows) for i in range(len(self.header))]
         lines = [
             "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
@@ -82,14 +80,14 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
     for (requirement, method), members in group(runs).items():
         found = statistics(members)
         others = published.scores(requirement) if comparable(method) else {}
-        place = rank(score(found), others.values()) if others else None
+        competitors = published.competitors(requirement) if others else []
         rows.append(
             (
                 requirement,
                 method.label,
                 _rate(found),
                 *_numbers(found),
-                _place(place),
+                _place(score(found), competitors),
                 *(_cell(others.get(name)) for name in names),
             )
         )
@@ -150,8 +148,8 @@ _NUMBERS = (
 _LEGEND = (
     "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
     "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
-    "means per run. Rank: position among the published columns shown, by FR, then by mean S; ties share a "
-    "rank. Published cells: falsified runs / mean S."
+    "means per run. Rank: position among all published tools known for the requirement, by FR, then by "
+    "mean S; ties share a rank. Published cells: falsified runs / mean S."
 )
 
 
@@ -186,8 +184,11 @@ def _interval(interval: Interval | None, decimals: int) -> str:
     return NONE if interval is None else f"{interval[0]:.{decimals}f}..{interval[1]:.{decimals}f}"
 
 
-def _place(place: int | None) -> str:
-    return NONE if place is None else str(place)
+def _place(own: Score, competitors: Sequence[Score]) -> str:
+    place = rank(own, competitors) if competitors else None
+    if place is None:
+        return NONE
+    return f"{place} (tie)" if is_tied(own, competitors) else str(place)
 
 
 def _cell(cell: Score | None) -> str:
@@ -199,7 +200,9 @@ def _cell(cell: Score | None) -> str:
 
 def _sources(published: Published) -> tuple[str, ...]:
     return tuple(
-        f"Source of {COLUMNS[name]}: {source}." for name, source in published.sources.items() if source
+        f"Source of {COLUMNS.get(name, name)}: {source}."
+        for name, source in published.sources.items()
+        if source
     )
 
 

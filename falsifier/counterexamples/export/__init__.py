@@ -5,19 +5,27 @@
     counterexample.json         for falsifier itself
     input.csv                   input signals, for FMPy, fmusim and OpenModelica
     start_values.json, .ssv     parameters and start values, for scripts and for SSP tools
+    MODEL.fmu                   copy of the FMU
     replay.py                   simulates both with FMPy only; writes outputs.csv, prints the critical time
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
     test_NAME.py                a pytest test that fails as long as the counterexample violates
 """
 
+import shutil
 from pathlib import Path
 
 from falsifier.counterexamples.export.inputs import input_table, start_values
-from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
-from falsifier.counterexamples.export.tables import write_csv, write_json, write_mat, write_ssv
+from falsifier.counterexamples.export.scripts import (
+    identifier,
+    openmodelica_script,
+    pytest_file,
+    replay_script,
+)
+from falsifier.counterexamples.export.tables import file_columns, write_csv, write_json, write_mat, write_ssv
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
 
 __all__ = ["export_counterexample"]
@@ -41,16 +49,18 @@ def export_counterexample(
     table, start = input_table(problem, evaluation.candidate), start_values(problem, evaluation.candidate)
     files = [
         save(stored, directory / FILE_NAME),
-        write_json(start, directory / "start_values.json"),
+        write_json(start, directory / "start_values.json", problem.model),
         write_ssv(start, problem.name, directory / "start_values.ssv"),
         write_mat(table, start, directory / "inputs.mat"),
     ]
     if table.columns:
-        files.append(write_csv(table, directory / "input.csv"))
+        files.append(write_csv(table, directory / "input.csv", problem.model))
+    if isinstance(problem.model, FmuModel):
+        files.append(copied_fmu(problem.model, directory))
     scripts = {
-        "replay.py": replay_script(problem, evaluation, directory),
+        "replay.py": replay_script(problem, evaluation, file_columns(table, problem.model)),
         "replay.mos": openmodelica_script(problem, start),
-        f"test_{_identifier(problem.name)}.py": pytest_file(stored),
+        f"test_{identifier(problem.name)}.py": pytest_file(stored),
     }
     for name, text in scripts.items():
         if text is not None:
@@ -59,5 +69,9 @@ def export_counterexample(
     return files
 
 
-def _identifier(name: str) -> str:
-    return "".join(c if c.isalnum() else "_" for c in name)
+def copied_fmu(model: FmuModel, directory: Path) -> Path:
+    """Copy the FMU next to the scripts, which then need nothing else of this machine."""
+    target = directory / model.path.name
+    if not target.exists() or not target.samefile(model.path):
+        shutil.copyfile(model.path, target)
+    return target

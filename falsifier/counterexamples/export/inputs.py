@@ -54,10 +54,11 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
     return _without_repetition(InputTable(times[[k for k, _ in rows]], columns))
 
 
-def start_values(problem: Problem, candidate: Candidate) -> dict[str, float]:
-    """Parameters and start values that differ from the model's own, by name."""
+def start_values(problem: Problem, candidate: Candidate) -> dict[str, float | str]:
+    """Parameters, strings and start values that differ from the model's own, by name."""
     inputs = {v.name for v in problem.info.inputs}
-    settings = {**problem.parameters, **candidate.parameters}
+    settings: dict[str, float | str] = {**problem.parameters, **candidate.parameters}
+    settings |= dict(problem.experiment.strings)
     return {name: value for name, value in settings.items() if name not in inputs}
 
 

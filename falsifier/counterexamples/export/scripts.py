@@ -1,10 +1,10 @@
 """The text of scripts that simulate a counterexample in other tools."""
 
-import json
-from collections.abc import Mapping
-from os.path import relpath
-from pathlib import Path
+import re
+import shlex
+from collections.abc import Iterable, Mapping
 
+from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
 from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
@@ -12,10 +12,11 @@ from falsifier.problem.problem import Problem
 
 # Rows that replay.py prints before and after the critical time.
 _SHOWN_ROWS = 3
+_LONGEST_IDENTIFIER = 80
 _FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
-_REPLAY = '''\
-"""Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows at the critical time.
+_REPLAY_ABOUT = """\
+Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows at the critical time.
 
     pip install fmpy
     python replay.py [MODEL.fmu]
@@ -24,15 +25,34 @@ _REPLAY = '''\
 Recorded robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {predicate}
 """
 
+_REPLAY = '''\
+{about}
+
+import csv
 import json
 import sys
 from pathlib import Path
 
+import numpy as np
 from fmpy import simulate_fmu
-from fmpy.util import read_csv
 
 HERE = Path(__file__).resolve().parent
 FMU = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / {fmu}
+# Columns of input.csv after the time; named here, because spreadsheets may change what stands in the file.
+INPUTS = {inputs}
+# Name of each output: the FMU's variable, and the element if that is an array.
+OUTPUTS = {outputs}
+
+
+def read_inputs():
+    """Read input.csv; cells of arrays hold all elements, separated by spaces."""
+    with (HERE / "input.csv").open(newline="", encoding="utf-8") as file:
+        rows = [[tuple(map(float, cell.split())) for cell in row] for row in list(csv.reader(file))[1:]]
+    sizes = [len(cell) for cell in rows[0]]
+    names = ["time", *INPUTS]
+    columns = [(n, float, (size,)) if size > 1 else (n, float) for n, size in zip(names, sizes)]
+    return np.array([tuple(c if len(c) > 1 else c[0] for c in row) for row in rows], columns)
+
 
 result = simulate_fmu(
     str(FMU),
@@ -43,20 +63,24 @@ result = simulate_fmu(
     output_interval={step!r},
     relative_tolerance={tolerance!r},
     record_events=False,
-    start_values=json.loads((HERE / "start_values.json").read_text()),
-    input={inputs},
-    output={outputs},
+    start_values=json.loads((HERE / "start_values.json").read_text(encoding="utf-8")),
+    input=read_inputs() if INPUTS else None,
+    output=sorted({{variable for variable, _ in OUTPUTS.values()}}),
 )[::{every}]
+columns = {{"time": result["time"]}}
+for name, (variable, element) in OUTPUTS.items():
+    columns[name] = result[variable].reshape(len(result), -1)[:, element]
 
-lines = [",".join(result.dtype.names)]
-lines += [",".join(repr(float(value)) for value in row) for row in result]
-(HERE / "outputs.csv").write_text("\\n".join(lines) + "\\n")
+with (HERE / "outputs.csv").open("w", newline="", encoding="utf-8") as file:
+    writer = csv.writer(file, lineterminator="\\n")
+    writer.writerow(columns)
+    writer.writerows([float(value) for value in row] for row in zip(*columns.values()))
 
 shown = {shown}
 critical = int(abs(result["time"] - {critical_time!r}).argmin())
 print("".join(f"{{name:>14}}" for name in shown))
 for k in range(max(critical - {around}, 0), min(critical + {around} + 1, len(result))):
-    values = "".join(f"{{float(result[name][k]):14.6g}}" for name in shown)
+    values = "".join(f"{{float(columns[name][k]):14.6g}}" for name in shown)
     print(values + ("  <- critical time" if k == critical else ""))
 print(f"all {{len(result)}} rows are in outputs.csv next to this script")
 '''
@@ -67,14 +91,14 @@ _OPENMODELICA = """\
 // First set the path of the model in loadFile, and in simulate its full name if it differs from the FMU's.
 //
 // {requirement}: {formula}
-loadFile("{file}");
+loadFile({file});
 simulate({model}, startTime=0, stopTime={stop_time!r}, numberOfIntervals={intervals},
-  outputFormat="csv", simflags="{flags}");
+  outputFormat="csv", simflags={flags});
 getErrorString();
 """
 
-_PYTEST = '''\
-"""Fails as long as the counterexample in this folder violates {requirement}."""
+_PYTEST = """\
+{about}
 
 from pathlib import Path
 
@@ -87,11 +111,17 @@ def test_{name}_is_no_longer_violated() -> None:
     stored = load(FILE)
     replayed = replay(stored, problem_of(stored))
     assert replayed.status != "violates", replayed.text
-'''
+"""
 
 
-def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> str | None:
-    """Python script that needs only FMPy; None if the model is not an FMU."""
+def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str]) -> str | None:
+    """Python script that needs only FMPy; None if the model is not an FMU.
+
+    Args:
+        problem: what was simulated.
+        evaluation: the counterexample.
+        inputs: names of the columns of input.csv after the time.
+    """
     model, verdict, experiment = problem.model, evaluation.verdict, problem.experiment
     if not isinstance(model, FmuModel) or verdict is None:
         return None
@@ -99,43 +129,46 @@ def replay_script(problem: Problem, evaluation: Evaluation, directory: Path) -> 
     # FMPy uses the output interval as communication step. If the problem's step is smaller, the script
     # records at that step and keeps every n-th row.
     step = (is_co_simulation and experiment.step_size) or experiment.output_interval
-    return _REPLAY.format(
-        requirement=problem.name,
-        formula=" ".join(str(problem.requirement.formula).split()),
+    about = _REPLAY_ABOUT.format(
+        requirement=one_line(problem.name),
+        formula=one_line(str(problem.requirement.formula)),
         robustness=verdict.robustness,
         critical_time=verdict.critical_time,
-        predicate=verdict.predicate,
-        fmu=json.dumps(Path(relpath(model.path, directory.resolve())).as_posix()),
+        predicate=one_line(verdict.predicate),
+    )
+    return _REPLAY.format(
+        about=python_docstring(about),
+        critical_time=verdict.critical_time,
+        fmu=repr(model.path.name),
         fmi_type=_FMPY_TYPES[model.interface],
         stop_time=experiment.stop_time,
         step=experiment.stop_time / round(experiment.stop_time / step),
         tolerance=experiment.tolerance,
-        inputs='read_csv(HERE / "input.csv")' if _has_inputs(problem) else "None",
-        outputs=json.dumps(list(experiment.outputs)),
-        shown=json.dumps(
-            ["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]
-        ),
+        inputs=repr(list(inputs)),
+        outputs=repr({name: tuple(model.place(name)) for name in experiment.outputs}),
+        shown=repr(["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]),
         around=_SHOWN_ROWS,
         every=round(experiment.output_interval / step),
     )
 
 
-def openmodelica_script(problem: Problem, start: Mapping[str, float]) -> str | None:
+def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> str | None:
     """OpenModelica script; None if the model is not an FMU."""
     if not isinstance(problem.model, FmuModel):
         return None
-    overrides = ",".join(f"{name}={value!r}" for name, value in start.items())
+    texts = {name: value if isinstance(value, str) else repr(value) for name, value in start.items()}
+    overrides = ",".join(f"{name}={text}" for name, text in texts.items())
     flags = ["-csvInput=input.csv"] if _has_inputs(problem) else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name
     return _OPENMODELICA.format(
-        requirement=problem.name,
-        formula=" ".join(str(problem.requirement.formula).split()),
-        file=f"{name.split('.')[0]}/package.mo" if "." in name else f"{name}.mo",
-        model=name,
+        requirement=one_line(problem.name),
+        formula=one_line(str(problem.requirement.formula)),
+        file=modelica_string(f"{name.split('.')[0]}/package.mo" if "." in name else f"{name}.mo"),
+        model=modelica_path(name),
         stop_time=problem.experiment.stop_time,
         intervals=problem.experiment.samples - 1,
-        flags=" ".join(flags),
+        flags=modelica_string(shlex.join(flags)),  # omc starts the simulation with a shell
     )
 
 
@@ -143,8 +176,18 @@ def pytest_file(stored: StoredCounterexample) -> str | None:
     """Test of the counterexample file next to it; None if its problem cannot be loaded from a file."""
     if stored.problem is None:
         return None
-    name = "".join(c if c.isalnum() else "_" for c in stored.requirement)
-    return _PYTEST.format(requirement=stored.requirement, name=name.lower())
+    requirement = one_line(stored.requirement)
+    about = f"Fails as long as the counterexample in this folder violates {requirement}."
+    return _PYTEST.format(about=python_docstring(about), name=identifier(stored.requirement).lower())
+
+
+def identifier(name: str) -> str:
+    """Return a name as part of a Python identifier, and of the name of a Python file.
+
+    >>> identifier("car x-1")
+    'car_x_1'
+    """
+    return re.sub(r"\W", "_", name, flags=re.ASCII)[:_LONGEST_IDENTIFIER]
 
 
 def _has_inputs(problem: Problem) -> bool:

@@ -53,6 +53,8 @@ class Coordinates:
 
     def of(self, trajectory: Trajectory) -> NDArray[np.float64]:
         """Return the coordinates of a trajectory, shape (samples, dimension)."""
+        if not self.outputs:
+            return np.empty((len(trajectory), 0))
         stacked = np.stack([trajectory[name] for name in self.outputs], axis=1)
         return np.asarray(stacked @ self._differences.T)
 

@@ -53,7 +53,7 @@ class StartState:
         first = np.stack([t.states[0] for t in traces])
         self._mean = first.mean(axis=0)
         self._weights = None
-        if np.ptp(first, axis=0).max() > 1e-9 * max(1.0, float(np.abs(first).max())):
+        if np.ptp(first, axis=0).max(initial=0.0) > 1e-9 * max(1.0, float(np.abs(first).max(initial=0.0))):
             inputs = np.stack([t.inputs[0] for t in traces])
             self._centre = inputs.mean(axis=0)
             z = inputs - self._centre

@@ -1,12 +1,12 @@
 """The simulations so far, in the form that learning and planning need."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.box import Array
+from falsifier.engines.box import Array, learnable
 from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
 from falsifier.engines.surrogate.grid import Grid, Trace, trace_of
 from falsifier.engines.surrogate.layout import Layout
@@ -59,6 +59,7 @@ class History:
         trajectory, robustness = evaluation.trajectory, evaluation.robustness
         if trajectory is None or robustness is None:
             return None
+        trajectory, robustness = _learnable(trajectory), float(learnable(robustness))
         if self.objective is None:
             self._start(trajectory)
         assert self.objective is not None and self._coordinates is not None
@@ -90,6 +91,11 @@ class History:
             self._coordinates,
             discrete=frozenset(name for name in outputs if _is_discrete(problem, name, trajectory)),
             stretches=self.settings.stretches,
+            constants={
+                name: float(trajectory[name][0])
+                for name in formula.signals
+                if name not in driven and name not in outputs
+            },
         )
 
     def scaled_objective(self) -> Objective:
@@ -119,6 +125,10 @@ def scaled_costs(samples: Sequence[Sample], objective: Objective) -> Array:
     """Return the scaled robustness of the simulated traces, shape (samples,)."""
     stacked = [np.concatenate(leaf) for leaf in zip(*(s.values for s in samples), strict=True)]
     return np.asarray(objective.cost(stacked), dtype=np.float64)
+
+
+def _learnable(trajectory: Trajectory) -> Trajectory:
+    return replace(trajectory, columns={name: learnable(c) for name, c in trajectory.columns.items()})
 
 
 def _is_discrete(problem: Problem, name: str, trajectory: Trajectory) -> bool:

@@ -1,7 +1,7 @@
 """The cost that planning minimises on predicted traces: robustness with margins in comparable units."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class Objective:
         formulas: the formula; if it contains discrete signals, also relaxed ones, whose mean has a slope.
         scales: scale of each leaf.
         offsets: correction of each leaf, in the leaf's own unit.
+        constants: values of signals that the formula names and no candidate varies: inputs kept constant.
     """
 
     space: SearchSpace
@@ -35,6 +36,7 @@ class Objective:
     formulas: tuple[CoarseFormula, ...]
     scales: tuple[float, ...]
     offsets: tuple[float, ...]
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def leaves(self) -> tuple[Leaf, ...]:
@@ -60,6 +62,7 @@ class Objective:
             inputs: scaled inputs, shape (m, cells, inputs).
         """
         columns = self.coordinates.columns(states)
+        columns |= {name: np.full(states.shape[:2], value) for name, value in self.constants.items()}
         for j, r in enumerate(self.space.inputs):
             held = np.concatenate([inputs[:, :, j], inputs[:, -1:, j]], axis=1)
             columns[r.name] = r.low + (r.high - r.low) * held
@@ -122,6 +125,7 @@ def make_objective(
     *,
     discrete: frozenset[str],
     stretches: Sequence[float],
+    constants: Mapping[str, float],
 ) -> Objective:
     """Return the objective for a formula, with all scales 1 until ``rescaled``."""
     plain = coarse_formula(formula, grid.step, discrete=discrete)
@@ -129,4 +133,4 @@ def make_objective(
     if any(leaf.discrete for leaf in plain.leaves):
         formulas = [coarse_formula(formula, grid.step, discrete=discrete, stretch=s) for s in stretches]
     count = len(plain.leaves)
-    return Objective(space, grid, coordinates, tuple(formulas), (1.0,) * count, (0.0,) * count)
+    return Objective(space, grid, coordinates, tuple(formulas), (1.0,) * count, (0.0,) * count, constants)

@@ -1,7 +1,8 @@
 """The surrogate engine: learn the dynamics, plan on them, simulate, refit."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from falsifier.engines.box import Array
 from falsifier.engines.corner_walk import CornerWalk, Levels
 from falsifier.engines.surrogate.arms import choose_arm, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
+from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.forecast import Ensemble, Forecast
 from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.history import History, Sample, scaled_costs
@@ -65,6 +67,7 @@ class Surrogate:
         )
         self.layout = planning_layout(space, self.grid)
         self.history = History(problem, self.grid, self.layout, self.settings)
+        self.feasibility = Feasibility(self.grid)
         self.dynamics = Ensemble(self.settings)
         windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
         self._windows = windows
@@ -81,6 +84,7 @@ class Surrogate:
         self._asked = self._planned = self._simple = 0
         self._pending: dict[object, Pending] = {}
         self._suggested: list[Array] = []
+        self._failed: list[Array] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates, each from the arm that is chosen for it."""
@@ -92,6 +96,10 @@ class Surrogate:
             told = self.problem.space.admit(evaluation.candidate)
             pending = self._pending.pop(told.key, None)
             sample = self.history.add(evaluation, pending.arm if pending else "")
+            point = self.layout.point(told)
+            self.feasibility.add(self.layout, point, failed=sample is None)
+            if sample is None:
+                self._failed.append(point)
             if pending is not None:
                 self._settle(pending, sample)
 
@@ -143,10 +151,20 @@ class Surrogate:
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
         pending = self._propose(rng)
+        for _ in range(self.settings.retries):
+            if self._risk(pending) == 0.0:
+                break
+            pending = min(pending, self._propose(rng), key=self._risk)
         self._asked += 1
         candidate = pending.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
         self._pending[candidate.key] = pending
         return candidate
+
+    def _risk(self, pending: Pending) -> float:
+        """Return the excess risk that its simulation fails; plans and trust regions have considered it."""
+        if pending.region is not None or pending.forecast is not None:
+            return 0.0
+        return float(self.feasibility.excess(pending.layout, pending.point[None])[0])
 
     def _propose(self, rng: np.random.Generator) -> Pending:
         kind = self._opening[self._asked] if self._asked < len(self._opening) else ""
@@ -186,7 +204,7 @@ class Surrogate:
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
-        why = f"inputs switch between their bounds every {dwell:.3g} s, a fraction of an inner window"
+        why = f"inputs take a random bound{_pace(self.layout, dwell)}"
         return Pending("switching", self.layout, switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
@@ -196,9 +214,9 @@ class Surrogate:
         points, elites = self.history.points, order[: settings.elites]
         suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
         self._suggested = []
-        asked = [p.point for p in self._pending.values() if p.layout is self.layout]
+        asked = [p.point for p in self._pending.values() if p.layout is self.layout] + self._failed
         result = plan(
-            self.dynamics.predictor(self.layout, objective),
+            self._with_risk(self.dynamics.predictor(self.layout, objective)),
             self.layout,
             elites=np.concatenate([suggested, points[elites]]),
             critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
@@ -216,6 +234,13 @@ class Surrogate:
         forecast = self.dynamics.forecast(self.layout, objective, result.point)
         return Pending("dynamics", self.layout, result.point, why, forecast=forecast)
 
+    def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:
+        """Return predicted costs that also count the risk of a failure, if there has been one."""
+        if not self.feasibility.has_failures:
+            return predict
+        weight = self.settings.risk_weight
+        return lambda points: predict(points) + weight * self.feasibility.excess(self.layout, points)
+
     def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
         """Fit the dynamics; return the indices of the samples, those with the lowest robustness first."""
         samples = self.history.samples
@@ -230,6 +255,21 @@ class Surrogate:
             self._regions += 1
             self._region = TrustRegion(layout.dimension, self.settings)
         layout = self._region_layouts[(self._regions - 1) % len(self._region_layouts)]
-        point = self._region.ask(rng)
+        point = self._region.ask(rng, partial(self.feasibility.excess, layout))
         why = f"direct search in a trust region of {layout.dimension} coordinates"
         return Pending("region", layout, point, why, region=self._region)
+
+
+def _pace(layout: Layout, dwell: float) -> str:
+    """Say how often switching inputs can change: control points may be further apart than the dwell time."""
+    paces: dict[str, list[str]] = {}
+    for r, coding in zip(layout.space.inputs, layout.codings, strict=True):
+        pace = f"every {dwell:.3g} s, a fraction of an inner window"
+        if len(coding.times) < 2:
+            pace = "for the whole simulation"
+        elif (gap := coding.times[1] - coding.times[0]) > dwell:
+            pace = f"at each control point, {gap:.3g} s apart"
+        paces.setdefault(pace, []).append(r.name)
+    if len(paces) == 1:
+        return f" {next(iter(paces))}"
+    return ": " + "; ".join(f"{' and '.join(names)} {pace}" for pace, names in paces.items())

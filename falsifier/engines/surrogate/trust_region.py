@@ -1,5 +1,7 @@
 """Search without dynamics: Bayesian optimisation in a box around the best point (a trust region)."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from falsifier.engines.box import Array
@@ -37,20 +39,28 @@ class TrustRegion:
         """Whether it has become so small that a new start is more promising."""
         return self._length < _MIN_LENGTH
 
-    def ask(self, rng: np.random.Generator) -> Array:
-        """Return the next point, shape (d,)."""
+    def ask(self, rng: np.random.Generator, risk: Callable[[Array], Array] | None = None) -> Array:
+        """Return the next point, shape (d,).
+
+        Args:
+            rng: random generator.
+            risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,); None: none fails.
+        """
+        risk = risk or _no_risk
         self._asked += 1
         if self._asked <= self._settings.region_start or len(self._points) < 2:
-            point = rng.random(self._dimension)
-            at_bound = rng.random(self._dimension) < self._settings.region_bound_start
-            return np.where(at_bound, np.round(point), point)
+            drawn = [self._first(rng)]
+            while risk(drawn[-1][None])[0] > 0.0 and len(drawn) <= self._settings.retries:
+                drawn.append(self._first(rng))
+            return drawn[int(np.argmin(risk(np.array(drawn))))]
         points, costs = self._recent()
         process = fit_lengths(points, standardised(costs), self._lengths, rng, noise=_NOISE)
         self._lengths = process.lengths
         candidates = self._candidates(points[int(np.argmin(costs))], rng)
         mean, deviation = process.predict(candidates)
         # A lower confidence bound with a random factor balances exploitation and exploration.
-        return np.asarray(candidates[int(np.argmin(mean - abs(rng.standard_normal()) * deviation))])
+        bound = mean - abs(rng.standard_normal()) * deviation
+        return np.asarray(candidates[int(np.argmin(bound + self._settings.risk_weight * risk(candidates)))])
 
     def tell(self, point: Array, cost: float) -> None:
         """Learn the cost of a point."""
@@ -67,6 +77,12 @@ class TrustRegion:
             self._length, self._successes = min(_MAX_LENGTH, 2 * self._length), 0
         if self._failures >= max(4, self._dimension // 2):
             self._length, self._failures = self._length / 2, 0
+
+    def _first(self, rng: np.random.Generator) -> Array:
+        """Return a random point, many of its coordinates at bounds."""
+        point = rng.random(self._dimension)
+        at_bound = rng.random(self._dimension) < self._settings.region_bound_start
+        return np.where(at_bound, np.round(point), point)
 
     def _recent(self) -> tuple[Array, Array]:
         """Return the points and costs for the process: the latest ones and the best one."""
@@ -89,3 +105,7 @@ class TrustRegion:
         points = np.where(to_bound, np.round(points), points)
         jump = changed & (rng.random(shape) < settings.region_jump)
         return np.where(jump, rng.random(shape), points)
+
+
+def _no_risk(points: Array) -> Array:
+    return np.zeros(len(points))

@@ -48,7 +48,7 @@ def mutations(
         parents: points to change, shape (p, d).
         count: number of children.
         critical: critical time of each parent as a share of the horizon, shape (p,), or None if unknown. If
-            known, half of the changes of held cells end there, because later inputs have no effect on it.
+            known, half of the changes of held cells end there, because only earlier inputs led to it.
     """
     chosen = rng.integers(0, len(parents), count)
     children = parents[chosen].copy()

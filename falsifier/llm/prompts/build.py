@@ -26,7 +26,7 @@ from falsifier.llm.prompts.blocks import (
 from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
 from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View, shown_unit
+from falsifier.llm.prompts.view import View
 from falsifier.stl import in_words
 
 # Control-point times listed individually; of longer lists the first ones and the last.
@@ -128,7 +128,7 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     freedom = r.free if free else None
     return InputLine(
         name=r.name,
-        unit=shown_unit(r.unit),
+        unit=r.unit,
         description=r.description,
         kind=r.kind,
         items=_items(r),
@@ -148,7 +148,7 @@ def _parameter(p: ParameterRange) -> ParameterLine:
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
         name=p.name,
-        unit=shown_unit(p.unit),
+        unit=p.unit,
         description=p.description,
         kind=p.kind,
         items=_items(p),

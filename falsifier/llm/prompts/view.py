@@ -31,7 +31,7 @@ class View:
 
     def unit(self, name: str) -> str:
         """Unit of a signal; empty if unknown or dimensionless."""
-        return shown_unit(self.info[name].unit) if name in self.info else ""
+        return self.info[name].unit if name in self.info else ""
 
     def description(self, name: str) -> str:
         """Description of a signal; empty if it has none."""
@@ -45,8 +45,3 @@ class View:
     def formula_outputs(self) -> tuple[str, ...]:
         """Signals of the formula that are not searched inputs, in order of appearance."""
         return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)
-
-
-def shown_unit(unit: str) -> str:
-    """Unit as prompts show it: empty for 1, which FMUs use for dimensionless variables."""
-    return "" if unit == "1" else unit

@@ -6,7 +6,7 @@ needs a display.
 
 from typing import TYPE_CHECKING
 
-from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_rates
+from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from falsifier.views.plotting.diagnosis import plot_diagnosis
 from falsifier.views.plotting.evaluation import (
     plot,
@@ -29,6 +29,7 @@ __all__ = [
     "plot_diagnosis",
     "plot_evaluation",
     "plot_history",
+    "plot_iteration_times",
     "plot_panel",
     "plot_predictions",
     "plot_rates",

@@ -1,10 +1,22 @@
-"""New axes, and the figure that axes belong to; without pyplot, which keeps global state."""
+"""New axes, the figure that axes belong to, and text on it; without pyplot, which keeps global state."""
 
 from typing import TYPE_CHECKING
+
+from falsifier.core.literals import one_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+# Maximum number of characters of a title or label.
+_LONGEST_CAPTION = 120
+
+
+def caption(text: str) -> str:
+    """Return a text for a picture: one line, not too long, and without matplotlib's mathematical notation."""
+    line = one_line(text)
+    shown = line if len(line) <= _LONGEST_CAPTION else f"{line[:_LONGEST_CAPTION]} ..."
+    return shown.replace("$", r"\$")
 
 
 def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":

@@ -1,14 +1,15 @@
 """Figures of runs and campaigns."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import Run, Statistics, group, statistics
 from falsifier.campaigns.analysis.curves import falsification_curve
 from falsifier.core.words import counted
-from falsifier.views.plotting.axes import figure_of, own_axes
+from falsifier.views.plotting.axes import caption, figure_of, own_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +33,7 @@ def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
     if run.counterexample is not None:
         found = run.counterexample
         ax.plot(found + 1, run.robustness[found], "o", color=_FOUND, label="counterexample")
-    ax.set(xlabel="simulation", ylabel="robustness", title=f"{run.requirement}: {run.method.label}")
+    ax.set(xlabel="simulation", ylabel="robustness", title=caption(f"{run.requirement}: {run.method.label}"))
     ax.legend()
     return figure_of(ax)
 
@@ -45,34 +46,86 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
         by_method.setdefault(run.method.label, []).append(run)
     for label, members in by_method.items():
         counts, shares = falsification_curve(members)
-        ax.step(
-            counts, shares, where="post", linewidth=1.6, label=f"{label} ({counted(len(members), 'run')})"
-        )
+        name = caption(f"{label} ({counted(len(members), 'run')})")
+        ax.step(counts, shares, where="post", linewidth=1.6, label=name)
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
     if by_method:
         ax.legend()
     return figure_of(ax)
 
 
-def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
-    """Plot the mean number of simulations until falsification with standard deviation, one bar per method."""
+def plot_comparison(
+    runs: Iterable[Run], ax: "Axes | None" = None, *, apart: Collection[str] = ()
+) -> "Figure":
+    """Plot the mean number of simulations until falsification with standard deviation, one bar per method.
+
+    Args:
+        runs: runs of a campaign.
+        ax: where to draw; None: a new figure.
+        apart: requirements that need many more simulations than the others: they get a panel of their own
+            with a logarithmic axis. Only in a new figure.
+
+    Raises:
+        ValueError: if requirements are to be drawn apart on given axes.
+    """
     cells = {key: statistics(members) for key, members in group(runs).items()}
     requirements = list(dict.fromkeys(requirement for requirement, _ in cells))
+    panels = [p for p in ([r for r in requirements if (r in apart) == own] for own in (False, True)) if p]
+    if len(panels) < 2:
+        ax = ax if ax is not None else own_axes(max(6.0, 1.2 * len(requirements)))
+        _bars(ax, cells, requirements)
+        if apart:
+            ax.set_yscale("log")
+        ax.legend()
+        return figure_of(ax)
+    if ax is not None:
+        raise ValueError("two panels need a new figure: omit ax, or apart")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(max(7.0, 1.2 * len(requirements) + 1.0), 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[len(panel) for panel in panels])
+    for axes, panel in zip((left, right), panels, strict=True):
+        _bars(axes, cells, panel)
+    right.set_yscale("log")
+    right.set_ylabel("")
+    left.legend()
+    return figure
+
+
+def plot_iteration_times(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
+    """Plot the mean wall-clock time per simulation, the engine included, one bar per method."""
+    totals: dict[str, list[float]] = {}
+    for run in runs:
+        if run.spent.simulations:
+            totals.setdefault(run.method.label, []).append(run.spent.seconds / run.spent.simulations)
+    ax = ax if ax is not None else own_axes(max(5.0, 1.4 * len(totals)))
+    bars = ax.bar(list(map(caption, totals)), [float(np.mean(each)) for each in totals.values()], color=_BEST)
+    ax.bar_label(bars, fmt="%.3g", fontsize=8, padding=2)
+    ax.set(ylabel="seconds per simulation (mean)")
+    return figure_of(ax)
+
+
+_Cells = Mapping[tuple[str, Method], Statistics]
+
+
+def _bars(ax: "Axes", cells: _Cells, requirements: Sequence[str]) -> None:
     methods = list(dict.fromkeys(method for _, method in cells))
-    ax = ax if ax is not None else own_axes(max(6.0, 1.2 * len(requirements)))
     width = 0.8 / max(len(methods), 1)
     for i, method in enumerate(methods):
         found = [cells.get((requirement, method)) for requirement in requirements]
         at = np.arange(len(requirements)) + (i - (len(methods) - 1) / 2) * width
         means = _each(found, lambda s: s.mean)
         bars = ax.bar(
-            at, means, width, yerr=_each(found, lambda s: s.deviation), label=method.label, capsize=2
+            at,
+            means,
+            width,
+            yerr=_each(found, lambda s: s.deviation),
+            label=caption(method.label),
+            capsize=2,
         )
         ax.bar_label(bars, [f"{s.falsified}/{s.runs}" if s else "" for s in found], fontsize=7, padding=2)
-    ax.set_xticks(np.arange(len(requirements)), requirements)
+    ax.set_xticks(np.arange(len(requirements)), list(map(caption, requirements)))
     ax.set(ylabel="simulations (mean, standard deviation)")
-    ax.legend()
-    return figure_of(ax)
 
 
 def _each(found: Sequence[Statistics | None], value: Callable[[Statistics], float | None]) -> list[float]:

@@ -10,7 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.views.panels import Panel, panels
-from falsifier.views.plotting.axes import figure_of, own_axes
+from falsifier.views.plotting.axes import caption, figure_of, own_axes
 from falsifier.views.plotting.trajectory import plot_trajectory
 
 if TYPE_CHECKING:
@@ -59,22 +59,22 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         plot_panel(ax, panel)
         ax.axvline(verdict.critical_time, color=_CRITICAL, linewidth=0.8, linestyle=":")
     axes[-1].set_xlabel("time [s]")
-    parameters = "".join(f"  {name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
-    figure.suptitle(
-        f"{problem.name}: robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s"
-        + parameters,
-        fontsize=11,
-    )
+    parameters = "".join(f", {name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
+    decided = f"robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s"
+    figure.suptitle(f"{caption(problem.name)}: {decided}{caption(parameters)}", fontsize=11)
     return figure
 
 
-def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
+def plot_requirement(
+    problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None, *, inset: float | None = None
+) -> "Figure":
     """Plot the quantity that decided the verdict, with its bound, its window and the critical time.
 
     Args:
         problem: the problem with the requirement.
         evaluation: an evaluation with its trajectory.
         ax: where to draw; None: a new figure.
+        inset: length in s of the time around the critical one that a second, enlarged plot inside shows.
 
     Raises:
         ValueError: if the evaluation has no trajectory.
@@ -84,13 +84,30 @@ def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None"
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     ax = ax if ax is not None else own_axes(8, 3)
     drawn = panels(problem.requirement.formula, trajectory, evaluation.candidate, (), verdict)
-    plot_panel(ax, next(panel for panel in drawn if panel.critical is not None))
+    decisive = next(panel for panel in drawn if panel.critical is not None)
+    plot_panel(ax, decisive)
+    if inset is not None:
+        _plot_inset(ax, decisive, verdict.critical_time, inset)
     ax.axvline(verdict.critical_time, color=_CRITICAL, linewidth=0.8, linestyle=":")
     ax.set(
         xlabel="time [s]",
         title=f"robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s",
     )
     return figure_of(ax)
+
+
+def _plot_inset(ax: "Axes", panel: Panel, critical: float, length: float) -> None:
+    """Draw the panel again, enlarged around the critical time, in the lower right corner."""
+    inside = ax.inset_axes((0.62, 0.12, 0.35, 0.42))
+    plot_panel(inside, panel)
+    inside.set(xlim=(critical - length / 2, critical + length / 2), ylabel="")
+    near = abs(panel.times - critical) <= length / 2
+    values = [panel.values[near], *(b.values[near & (panel.times <= b.end)] for b in panel.bounds)]
+    low, high = min(v.min() for v in values if v.size), max(v.max() for v in values if v.size)
+    margin = 0.1 * (high - low) or 1.0
+    inside.set_ylim(low - margin, high + margin)
+    inside.tick_params(labelsize=7)
+    ax.indicate_inset_zoom(inside)
 
 
 def plot_panel(ax: "Axes", panel: Panel) -> None:
@@ -114,7 +131,7 @@ def plot_panel(ax: "Axes", panel: Panel) -> None:
         ax.set_ylim(low - margin, high + margin)
         for limit in panel.limits:
             ax.axhline(limit, color=_WINDOW, linewidth=0.6, linestyle=":")
-    ax.set_ylabel(panel.title)
+    ax.set_ylabel(caption(panel.title))
 
 
 def save_figure(figure: "Figure", path: Path) -> None:

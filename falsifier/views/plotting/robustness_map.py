@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from falsifier.counterexamples.robustness_map import RobustnessMap
+from falsifier.views.plotting.axes import caption
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +25,7 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         _plot_map(right, found)
     else:
         _plot_line(right, found)
-    figure.suptitle(f"{title}: robustness around the counterexample".removeprefix(": "))
+    figure.suptitle(f"{caption(title)}: robustness around the counterexample".removeprefix(": "))
     return figure
 
 
@@ -47,7 +48,7 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     if (found.surface < 0).any() and (found.surface >= 0).any():
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
-    ax.set(xlabel=first.label, ylabel=second.label)
+    ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
     ax.figure.colorbar(mesh, ax=ax, label="robustness (< 0: violated)")
 
 
@@ -56,4 +57,4 @@ def _plot_line(ax: "Axes", found: RobustnessMap) -> None:
     ax.plot(found.grid[0], found.surface[0], color=_HOLDS, linewidth=1.2)
     ax.plot(coordinate.value, found.original, "o", color=_VIOLATES)
     ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
-    ax.set(xlabel=coordinate.label, ylabel="robustness")
+    ax.set(xlabel=caption(coordinate.label), ylabel="robustness")

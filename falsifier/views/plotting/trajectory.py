@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.views.plotting.axes import figure_of, own_axes
+from falsifier.views.plotting.axes import caption, figure_of, own_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ def plot_signal(trajectory: Trajectory, name: str, ax: "Axes | None" = None, *, 
     """
     ax = ax if ax is not None else own_axes(8, 2.5)
     colour = None if label else _COLOUR
-    ax.plot(trajectory.times, trajectory[name], linewidth=1.2, label=label or None, color=colour)
+    ax.plot(trajectory.times, trajectory[name], linewidth=1.2, label=caption(label) or None, color=colour)
     unit = trajectory.units.get(name, "")
-    ax.set(xlabel="time [s]", ylabel=f"{name} [{unit}]" if unit else name)
+    ax.set(xlabel="time [s]", ylabel=caption(f"{name} [{unit}]" if unit else name))
     return figure_of(ax)

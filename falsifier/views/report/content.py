@@ -7,9 +7,8 @@ from pathlib import Path
 
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.core.candidate import Candidate
-from falsifier.core.trajectory import Trajectory
-from falsifier.problem.options import options_from
-from falsifier.search.journal import read_journal, recorded_candidates
+from falsifier.problem.shorthand import options_from
+from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse
 from falsifier.views.panels import Panel, panels
@@ -114,7 +113,9 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     problem, budget = request.source, request.budget
     if problem is None:
         return "(no command: the problem was made in Python)"
-    target = problem.target.rpartition(":")[0] if shared else problem.target
+    if shared and problem.stl is not None:
+        return "(no command: these requirements were searched together in Python)"
+    target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
         ("--profile", problem.profile),
@@ -170,12 +171,12 @@ def _shown(run: Run) -> Shown:
     index = run.counterexample if run.counterexample is not None else run.best
     assert index is not None
     candidate = recorded_candidates(read_journal(run.directory))[index]
-    path = run.directory / run.trajectories.get(index, "-")
-    if not path.is_file():
+    trajectory = recorded_trajectory(run.directory, run.trajectories.get(index))
+    if trajectory is None:
         return Shown(run, candidate, [])
     drawn = panels(
         parse(run.manifest.requirement.formula),
-        Trajectory.load(path),
+        trajectory,
         candidate,
         run.manifest.inputs,
         run.verdict,

@@ -5,11 +5,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from falsifier.campaigns.analysis import Run, load
+from falsifier.core.literals import plain
 from falsifier.core.words import counted
 from falsifier.views.report.content import replay_command, run_command, searches
-
-# Characters that XML 1.0 does not allow; reasons may contain anything that a model printed.
-_NO_CONTROLS = {code: "�" for code in range(32) if chr(code) not in "\t\n\r"}
 
 
 def junit_report(directory: Path) -> str:
@@ -34,7 +32,7 @@ def _suite(label: str, runs: list[Run]) -> ElementTree.Element:
         "skipped": sum(not run.finished and run.status != "failed" for run in runs),
     }
     suite = ElementTree.Element(
-        "testsuite", name=label, time=f"{sum(r.spent.seconds for r in searches(runs)):.3f}"
+        "testsuite", name=plain(label), time=f"{sum(r.spent.seconds for r in searches(runs)):.3f}"
     )
     for name, count in counts.items():
         suite.set(name, str(count))
@@ -45,7 +43,7 @@ def _suite(label: str, runs: list[Run]) -> ElementTree.Element:
 def _case(label: str, run: Run) -> ElementTree.Element:
     case = ElementTree.Element(
         "testcase",
-        classname=f"{label}.{run.requirement}",
+        classname=plain(f"{label}.{run.requirement}"),
         name=f"seed {run.seed}",
         time=f"{run.spent.seconds:.3f}",
     )
@@ -53,18 +51,16 @@ def _case(label: str, run: Run) -> ElementTree.Element:
         count = counted(run.simulations, "simulation")
         message = f"robustness {run.verdict.robustness:+.6g} after {count}"
         failure = ElementTree.SubElement(case, "failure", message=message, type="falsified")
-        failure.text = "\n".join(
-            line.translate(_NO_CONTROLS)
-            for line in (
-                run.manifest.requirement.formula,
-                f"at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
-                run.reason,
-                replay_command(run),
-                run_command(run.manifest.request, shared=run.shared),
-            )
+        lines = (
+            run.manifest.requirement.formula,
+            f"at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
+            run.reason,
+            replay_command(run),
+            run_command(run.manifest.request, shared=run.shared),
         )
+        failure.text = plain("\n".join(lines))
     elif run.status == "failed":
-        ElementTree.SubElement(case, "error", message=run.reason.translate(_NO_CONTROLS), type="failed")
+        ElementTree.SubElement(case, "error", message=plain(run.reason), type="failed")
     elif not run.finished:
         ElementTree.SubElement(case, "skipped", message=run.status)
     return case

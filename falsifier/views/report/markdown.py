@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.core.words import counted
 from falsifier.views.report.content import Content, Section, gather, replay_command, run_command
 
@@ -13,7 +14,7 @@ def markdown_report(directory: Path) -> str:
         JournalError: if the directory is neither, or is damaged.
     """
     content = gather(directory)
-    parts = [f"# Falsification report: {content.title}", content.table.markdown().rstrip()]
+    parts = [f"# Falsification report: {markdown_text(content.title)}", content.table.markdown().rstrip()]
     parts += [_section(section) for section in content.sections if any(r.falsified for r in section.runs)]
     return "\n\n".join([*parts, _environment(content)]) + "\n"
 
@@ -21,15 +22,17 @@ def markdown_report(directory: Path) -> str:
 def _section(section: Section) -> str:
     """A falsified requirement, with the counterexample found in the fewest simulations."""
     run = min((run for run in section.runs if run.falsified), key=lambda run: run.simulations)
-    lines = [f"## {section.name}: falsified", f"`{_inline(section.formula)}`"]
+    lines = [f"## {markdown_text(section.name)}: falsified", markdown_code(section.formula)]
     if run.verdict is not None:
         lines.append(
             f"Robustness {run.verdict.robustness:+.6g} at t = {run.verdict.critical_time:.6g} s, "
-            f"decided by `{_inline(run.verdict.predicate)}`, after {counted(run.simulations, 'simulation')} "
-            f"with {run.method.label}, seed {run.seed}."
+            f"decided by {markdown_code(run.verdict.predicate)}, after "
+            f"{counted(run.simulations, 'simulation')} with {markdown_text(run.method.label)}, "
+            f"seed {run.seed}."
         )
-    repeat = run_command(run.manifest.request, shared=run.shared)
-    lines.append(f"```sh\n{replay_command(run)}\n{repeat}\n```")
+    commands = (replay_command(run), run_command(run.manifest.request, shared=run.shared))
+    listing = "\n".join(map(one_line, commands))
+    lines.append(f"```sh\n{listing}\n```")
     return "\n\n".join(lines)
 
 
@@ -39,7 +42,3 @@ def _environment(content: Content) -> str:
     manifest = content.runs[0].manifest
     packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
     return f"falsifier {manifest.falsifier}, Python {manifest.python}, {manifest.platform}, {packages}."
-
-
-def _inline(text: str) -> str:
-    return " ".join(text.replace("`", "'").split())

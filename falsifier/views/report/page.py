@@ -4,6 +4,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Table
+from falsifier.campaigns.progress import total
+from falsifier.core.files import file_name
 from falsifier.core.words import choices, counted
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
@@ -60,7 +62,7 @@ def _overview(content: Content) -> str:
         f"{counted(len(runs), 'run')}, {falsified} falsified",
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
-        counted(sum(run.simulations for run in searches(runs)), "simulation"),
+        total(run.spent for run in searches(runs)).simulations_text,
         f"started {started}",
     ]
     return ", ".join(parts) + "."
@@ -133,7 +135,7 @@ def _legend(section: Section) -> Html:
 def _shown(shown: Shown, *, opened: bool) -> Html:
     run, verdict = shown.run, shown.run.verdict
     robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
-    heading = f"{run.method.label}, seed {run.seed}: {counted(run.simulations, 'simulation')}, {robustness}"
+    heading = f"{run.method.label}, seed {run.seed}: {run.spent.simulations_text}, {robustness}"
     critical = verdict.critical_time if verdict else None
     facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
     if verdict is not None:
@@ -192,4 +194,4 @@ def _environment(content: Content) -> Html:
 
 
 def _anchor(section: Section) -> str:
-    return f"requirement-{section.name}"
+    return f"requirement-{file_name(section.name)}"

@@ -7,13 +7,19 @@ from falsifier.campaigns.analysis import columns, frame, histories, load, load_r
 from falsifier.errors import JournalError
 from falsifier.problem.source import ProblemSource
 from falsifier.search.journal import (
-    JournalReader,
     read_journal,
     recorded_evaluations,
     write_manifest,
 )
 from falsifier.search.manifest import describe
-from falsifier.search.records import AskedRecord, EvaluatedRecord, Record, VerdictRecord
+from falsifier.search.records import (
+    AskedRecord,
+    EvaluatedRecord,
+    Record,
+    VerdictRecord,
+    line_of,
+    parse_line,
+)
 from falsifier.search.request import RunRequest
 from tests.problems import easy
 
@@ -23,7 +29,7 @@ def test_a_run_is_loaded_as_it_was(campaign: Path) -> None:
     assert len(runs) == 8
     for run in runs:
         records = read_journal(run.directory)
-        evaluations = recorded_evaluations(run.directory, records)
+        evaluations = list(recorded_evaluations(run.directory, records).values())
         assert run.robustness.tolist() == [e.robustness for e in evaluations]
         assert run.simulations == len(evaluations)
         assert run.falsified == (run.counterexample is not None) == (run.requirement == "HARD")
@@ -65,19 +71,18 @@ def test_loading_reads_each_line_once_and_passes_over_the_candidates(
     write_manifest(tmp_path, describe(request, [problem], "corners").model_dump(mode="json"))
     candidate = problem.space.decode([0.5, 0.25, 0.1, -0.3], origin="uniform").to_json()
     verdict = VerdictRecord(robustness=0.1, critical_time=3.0, predicate="x <= 0.9", values={"x": 0.8})
-    with (tmp_path / "journal.jsonl").open("w") as file:
+    with (tmp_path / "journal.jsonl").open("wb") as file:
         for i in range(1000):
             asked = AskedRecord(first=i, n=1, candidates=[candidate], seconds=1e-4, requirement="EASY")
             done = EvaluatedRecord(index=i, status="ok", verdicts={"EASY": verdict}, seconds=0.01)
-            file.write(f"{asked.model_dump_json()}\n{done.model_dump_json()}\n")
+            file.write(line_of(asked, 2 * i + 1) + line_of(done, 2 * i + 2))
     parsed: list[str] = []
-    parse = JournalReader._parsed
 
-    def counted(reader: JournalReader, line: bytes) -> Record:
-        record = parse(reader, line)
+    def counted(line: bytes, number: int) -> Record:
+        record = parse_line(line, number)
         parsed.append(record.kind)
         return record
 
-    monkeypatch.setattr(JournalReader, "_parsed", counted)
+    monkeypatch.setattr("falsifier.search.journal.parse_line", counted)
     assert load_run(tmp_path).simulations == 1000
     assert parsed == ["evaluated"] * 1000

@@ -16,7 +16,7 @@ PUBLISHED = Published(
     },
     {"MP1": {"HARD": Score(9, 10, 25.2)}},
     {"gpt-5-mini-high": {"HARD": Score(10, 10, 1.0)}},
-    {"best": "a report"},
+    sources={"best": "a report"},
 )
 
 
@@ -36,7 +36,7 @@ def test_the_main_table_stands_beside_the_published_numbers(runs: list[Run]) -> 
     assert cells(table.rows, table.header, "FR") == ["2/2", "2/2", "0/2", "0/2"]
     # uniform needs 2 and 1 simulations, corners too
     assert cells(table.rows, table.header, "mean S") == ["1.5", "1.5", "–", "–"]
-    assert cells(table.rows, table.header, "rank") == ["2", "2", "–", "–"]
+    assert cells(table.rows, table.header, "rank") == ["2 (tie)", "2 (tie)", "–", "–"]
     assert cells(table.rows, table.header, "best ARCH-COMP tool")[0] == "FReaK 10 / 1.5"
     assert cells(table.rows, table.header, "LLM-Falsifier")[2] == "0 / –"
     assert any("a report" in note for note in table.notes)
@@ -52,7 +52,7 @@ def test_free_parameterizations_and_other_profiles_stand_apart_and_without_publi
     for row in table.rows:
         apart = "free" in row[1] or "instance2" in row[1]
         assert (row[-1] == "") == apart
-        assert row[table.header.index("rank")] in (("–",) if apart else ("2", "–"))
+        assert row[table.header.index("rank")] in (("–",) if apart else ("2 (tie)", "–"))
 
 
 def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:

@@ -34,7 +34,7 @@ def by_fmpy(problem: Problem, candidate: Candidate, directory: Path, interface: 
         output_interval=problem.experiment.output_interval,
         record_events=False,
         start_values=json.loads(start.read_text()),
-        input=read_csv(write_csv(table, directory / "input.csv")) if table.columns else None,
+        input=read_csv(write_csv(table, directory / "input.csv", problem.model)) if table.columns else None,
         output=list(problem.experiment.outputs),
     )
 

@@ -1,4 +1,6 @@
 import ast
+import csv
+import json
 import os
 import subprocess
 import sys
@@ -8,14 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from falsifier.core.files import bundled
 from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
 from falsifier.counterexamples.store import FILE_NAME, load, to_store
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.testing import lag_problem
 from tests.command import ROOT
 from tests.counterexamples.export.support import AT_INPUTS, confirmed, exported
+from tests.fmu.fixtures import path as fmu_path
 
 
 def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: Path) -> None:
@@ -29,7 +34,7 @@ def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: P
         text=True,
         check=True,
     )
-    assert imported(tmp_path / "replay.py") - sys.stdlib_module_names == {"fmpy"}
+    assert imported(tmp_path / "replay.py") - sys.stdlib_module_names == {"fmpy", "numpy"}
     lines = (tmp_path / "outputs.csv").read_text().splitlines()
     assert lines[0] == "time,speed,rpm,gear"
     rows = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
@@ -43,6 +48,72 @@ def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: P
     )
     assert shown[3].endswith("<- critical time")
     assert "all 5001 rows are in outputs.csv" in where
+
+
+def replayed(problem: Problem, values: list[float], directory: Path) -> dict[str, list[float]]:
+    """Export what a point gives, run replay.py there, and return the columns of its table."""
+    evaluation = evaluate(problem, problem.space.decode(values))
+    assert evaluation.trajectory is not None, evaluation.reason
+    exported(problem, evaluation, "not used", directory)
+    script = directory / "replay.py"
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    with (directory / "outputs.csv").open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    found = {name: [float(row[k]) for row in rows] for k, name in enumerate(header)}
+    for name in problem.experiment.outputs:
+        np.testing.assert_allclose(found[name], evaluation.trajectory[name], rtol=1e-9, atol=1e-9)
+    return found
+
+
+def test_arrays_reproduce_in_fmpy(tmp_path: Path) -> None:
+    problem = Problem.from_fmu(
+        fmu_path("Arrays_3"),
+        "G[0,10] (y[2] + x[1] <= 1e6)",
+        inputs={"u[1]": (-1.0, 1.0, 2), "u[2]": (-1.0, 1.0, 2)},
+        parameters={"A[1,2]": 0.5, "offset[2]": (0.0, 30.0)},
+    )
+    found = replayed(problem, [1.0, -1.0, 0.5, 0.25, 7.0], tmp_path)
+    assert {"y[1]", "y[2]", "x[1]"} <= found.keys()
+    assert json.loads((tmp_path / "start_values.json").read_text()) == {
+        "A": [0.0, 0.5, -1.0, 0.0],
+        "offset": [10.0, 7.0],
+    }
+    assert (tmp_path / "input.csv").read_text().splitlines()[:2] == ['"time","u"', "0.0,1.0 0.5"]
+    problem.model.close()
+
+
+def test_two_names_of_one_input_reproduce_in_fmpy(tmp_path: Path) -> None:
+    problem = Problem.from_fmu(fmu_path("Aliases_3"), "G[0,10] (plant.u + plant.y <= 0)")
+    found = replayed(problem, [10.0] * len(problem.space.dimensions), tmp_path)
+    assert found["plant.y"] == found["y"]
+    assert (tmp_path / "input.csv").read_text().splitlines()[0] == '"time","u"'
+    problem.model.close()
+
+
+def test_odd_names_reproduce_in_fmpy(tmp_path: Path) -> None:
+    problem = Problem.from_fmu(fmu_path("OddNames_2"), "G[0,10] (größe.y <= 0)")
+    replayed(problem, [10.0] * len(problem.space.dimensions), tmp_path)
+    problem.model.close()
+
+
+def test_strings_reproduce_in_fmpy(tmp_path: Path) -> None:
+    (tmp_path / "gain.txt").write_text("2.5")
+    problem = Problem.from_fmu(
+        fmu_path("Table_2"), "G[0,1] (y <= 0)", parameters={"fileName": str(tmp_path / "gain.txt")}
+    )
+    found = replayed(problem, [1.0] * len(problem.space.dimensions), tmp_path)
+    assert found["y"][-1] == 2.5
+    problem.model.close()
+
+
+def test_an_export_names_no_folder_of_this_machine(tmp_path: Path) -> None:
+    problem = load_problem("AT1")
+    evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["constant"]))
+    exported(problem, evaluation, "AT1", tmp_path / "a" / "b")
+    moved = (tmp_path / "a" / "b").rename(tmp_path / "moved")
+    assert str(bundled("fmus")) not in (moved / "replay.py").read_text()
+    subprocess.run([sys.executable, str(moved / "replay.py")], capture_output=True, check=True)
 
 
 def imported(script: Path) -> set[str]:
@@ -92,7 +163,7 @@ def test_where_a_smaller_step_is_simulated_every_so_many_rows_are_kept(tmp_path:
     problem = load_problem("AT1")
     problem = replace(problem, experiment=replace(problem.experiment, step_size=0.002))
     evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["constant"]))
-    script = replay_script(problem, evaluation, tmp_path)
+    script = replay_script(problem, evaluation, [])
     assert script is not None
     assert "output_interval=0.002," in script
     assert ")[::5]" in script
@@ -101,7 +172,7 @@ def test_where_a_smaller_step_is_simulated_every_so_many_rows_are_kept(tmp_path:
 def test_models_that_are_no_fmu_and_problems_made_in_python_have_no_scripts(tmp_path: Path) -> None:
     problem = lag_problem()
     evaluation = evaluate(problem, problem.space.decode([1.0] * 4))
-    assert replay_script(problem, evaluation, tmp_path) is None
+    assert replay_script(problem, evaluation, []) is None
     assert openmodelica_script(problem, {}) is None
     assert pytest_file(to_store(confirmed(problem, evaluation))) is None
 

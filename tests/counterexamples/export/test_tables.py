@@ -10,7 +10,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.inputs import InputTable, input_table
-from falsifier.counterexamples.export.tables import matlab_name, write_csv, write_json, write_mat, write_ssv
+from falsifier.counterexamples.export.tables import matlab_names, write_csv, write_json, write_mat, write_ssv
 from falsifier.testing import lag_problem
 
 
@@ -29,14 +29,14 @@ def test_the_mat_file_holds_time_and_value_by_names_that_matlab_accepts(tmp_path
     assert content["u"].tolist() == [[0.0, 0.0], [5.0, 0.0], [5.0, 1.0], [10.0, 1.0]]
     assert content["start_values"]["a_b_2_"][0, 0].item() == 3.0
     assert [[cell.item() for cell in row] for row in content["names"]] == [["u", "u"], ["a_b_2_", "a.b[2]"]]
-    assert matlab_name("1 x") == "x1_x"
+    assert matlab_names(["1 x", "1_x", "end"]) == {"1 x": "x1_x", "1_x": "x1_x_2", "end": "end_2"}
 
 
 def test_the_csv_reads_back_exactly(tmp_path: Path) -> None:
     table = InputTable(
         np.array([0.0, 0.1 + 0.2, 1.0]), {"u": np.array([1 / 3, -0.0, 1e-300]), "a,b": np.ones(3)}
     )
-    path = write_csv(table, tmp_path / "i.csv")
+    path = write_csv(table, tmp_path / "i.csv", lag_problem().model)
     with path.open(newline="") as file:
         header, *rows = csv.reader(file)
     assert header == ["time", "u", "a,b"]
@@ -67,4 +67,4 @@ def test_without_start_values_the_files_are_empty_and_valid(tmp_path: Path) -> N
     ],
 )
 def test_names_are_those_that_matlab_accepts(name: str, accepted: str) -> None:
-    assert matlab_name(name) == accepted
+    assert matlab_names([name]) == {name: accepted}

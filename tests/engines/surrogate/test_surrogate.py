@@ -1,6 +1,8 @@
+import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
@@ -57,12 +59,15 @@ def _oscillator(
 
 def switch_problem(formula: str) -> Problem:
     """The lag, of which only ``mode`` is seen: 1 where x is above a half, else 0."""
-    problem = lag_problem(formula, free=FREE)
+    problem = lag_problem(free=FREE)
     info = ModelInfo(
         "switch", variables=(Variable("u", causality="input"), Variable("mode", "integer", "output"))
     )
     experiment = replace(problem.experiment, outputs=("mode",))
-    return replace(problem, model=FunctionModel(_switch, info), experiment=experiment)
+    requirement = Requirement("SWITCH", parse(formula))
+    return replace(
+        problem, model=FunctionModel(_switch, info), experiment=experiment, requirement=requirement
+    )
 
 
 def _switch(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
@@ -110,3 +115,30 @@ def test_parallel_candidates_differ() -> None:
     engine = Surrogate(problem, seed=0, settings=Settings(pool=60, children=30, generations=2))
     engine.tell([evaluate(problem, c) for c in engine.ask(3)])
     assert len({c.key for c in engine.ask(6)}) == 6
+
+
+@pytest.mark.parametrize(
+    ("points", "free", "why"),
+    [
+        (3, None, "inputs take a random bound at each control point, 5 s apart"),
+        (4, FREE, "inputs take a random bound every "),
+        (1, None, "inputs take a random bound for the whole simulation"),
+    ],
+)
+def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | None, why: str) -> None:
+    problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", points=points, free=free)
+    engine = Surrogate(problem, seed=0, settings=HASTY)
+    assert any(candidate.rationale.startswith(why) for candidate in engine.ask(4))
+
+
+def test_switching_inputs_with_different_control_points_say_so_for_each() -> None:
+    problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", inputs=3, points=3)
+    u, v, w = problem.space.inputs
+    space = replace(problem.space, inputs=(u, replace(v, control_points=101), w))
+    engine = Surrogate(replace(problem, space=space), seed=0, settings=HASTY)
+    why = next(c.rationale for c in engine.ask(4) if "random bound" in c.rationale)
+    assert re.fullmatch(
+        r"inputs take a random bound: u and w at each control point, 5 s apart; "
+        r"v every (0\.5|1) s, a fraction of an inner window",
+        why,
+    )

@@ -1,15 +1,20 @@
 """What is seen of one sample, on trajectories made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts.observations import details, facts, grid_step, monitor_for
 from falsifier.llm.prompts.view import View
+from falsifier.problem.requirement import Requirement
+from falsifier.stl import parse
 from falsifier.testing import Array, lag_problem
 
 TIMES = lag_problem().experiment.times
@@ -86,16 +91,15 @@ def test_no_more_signals_than_can_be_read() -> None:
     def many(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
         return {f"y{i}": np.sin(times + i) for i in range(40)}
 
-    from dataclasses import replace
-
-    from falsifier.core.model import FunctionModel, ModelInfo, Variable
-
-    problem = lag_problem("G[0,10] (y7 <= 2)")
+    problem = lag_problem()
     names = tuple(f"y{i}" for i in range(40))
     variables = tuple(Variable(n, causality="output") for n in names)
     info = ModelInfo("many", variables=(*problem.info.variables[:1], *variables))
     problem = replace(
-        problem, model=FunctionModel(many, info), experiment=replace(problem.experiment, outputs=names)
+        problem,
+        model=FunctionModel(many, info),
+        requirement=Requirement("MANY", parse("G[0,10] (y7 <= 2)")),
+        experiment=replace(problem.experiment, outputs=names),
     )
     lines = list(details(View.of(problem), evaluate(problem, problem.space.decode([0.0] * 4))))
     told = {each.split(":")[0] for each in lines if each.startswith("y")}

@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from falsifier.llm.prompts.view import View, shown_unit
+from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
 
@@ -28,12 +28,7 @@ def test_units_descriptions_and_types_by_name() -> None:
     assert (view.unit("nobody"), view.kind("nobody"), view.description("nobody")) == ("", "real", "")
 
 
-def test_a_number_without_dimension_has_no_unit() -> None:
-    assert (shown_unit("1"), shown_unit("m"), shown_unit("")) == ("", "m", "")
-    view = View.of(lag_problem())
-    info = replace(view.info, variables=tuple(replace(v, unit="1") for v in view.info.variables))
-    assert replace(view, info=info).unit("x") == ""
-
-
 def test_the_formulas_outputs_are_its_signals_that_are_not_searched() -> None:
-    assert View.of(lag_problem("G[0,10] (u + x <= 3 and v >= x)")).formula_outputs == ("x", "v")
+    problem = lag_problem("G[0,10] (u + x <= 3 and v >= x)", inputs=2)
+    partly = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
+    assert View.of(partly).formula_outputs == ("x", "v")

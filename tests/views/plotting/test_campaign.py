@@ -1,12 +1,13 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from falsifier.campaigns.analysis import load
 from falsifier.search.journal import read_journal, recorded_evaluations
-from falsifier.views.plotting import plot_comparison, plot_history, plot_rates
+from falsifier.views.plotting import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from tests.views.plotting.support import xs, ys
 
 
@@ -14,7 +15,7 @@ def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path)
     found = next(run for run in load(campaign) if run.falsified)
     figure = plot_history(found)
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
-    recorded = recorded_evaluations(found.directory, read_journal(found.directory))
+    recorded = list(recorded_evaluations(found.directory, read_journal(found.directory)).values())
     assert ys(lines["robustness"]).tolist() == [e.robustness for e in recorded]
     best = ys(lines["smallest so far"])
     assert (np.diff(best) <= 0).all() and best[-1] == min(e.robustness or 0.0 for e in recorded)
@@ -41,3 +42,25 @@ def test_a_comparison_has_a_bar_for_each_requirement_and_method(campaign: Path) 
     assert [bar.get_height() for bar in bars] == [1.5, 0.0, 1.5, 0.0]
     assert [text.get_text() for text in ax.texts] == ["2/2", "0/2", "2/2", "0/2"]
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["HARD", "NEVER"]
+
+
+def test_requirements_apart_have_a_panel_with_a_logarithmic_axis(campaign: Path) -> None:
+    runs = load(campaign)
+    left, right = plot_comparison(runs, apart=["HARD"]).axes
+    assert [tick.get_text() for tick in right.get_xticklabels()] == ["HARD"]
+    assert [tick.get_text() for tick in left.get_xticklabels()] == ["NEVER"]
+    assert (left.get_yscale(), right.get_yscale()) == ("linear", "log")
+    bars = [bar for bar in right.patches if isinstance(bar, Rectangle)]
+    assert [bar.get_height() for bar in bars] == [1.5, 1.5]
+    with pytest.raises(ValueError, match="a new figure"):
+        plot_comparison(runs, Figure().subplots(), apart=["HARD"])
+
+
+def test_iteration_times_are_wall_clock_time_per_simulation(campaign: Path) -> None:
+    runs = load(campaign)
+    ax = plot_iteration_times(runs).axes[0]
+    bars = [bar for bar in ax.patches if isinstance(bar, Rectangle)]
+    uniform = [r.spent.seconds / r.spent.simulations for r in runs if r.method.engine == "uniform"]
+    assert len(bars) == 2
+    assert bars[0].get_height() == pytest.approx(np.mean(uniform))
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["uniform", "corners"]

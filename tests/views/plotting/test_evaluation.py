@@ -23,6 +23,21 @@ def test_a_requirement_is_drawn_on_given_axes_up_to_its_critical_time() -> None:
     assert f"decided at t = {evaluation.verdict.critical_time:.5g} s" in ax.get_title()
 
 
+def test_an_inset_shows_the_curve_and_its_bound_around_the_critical_time() -> None:
+    evaluation, ax = simulated(), Figure().subplots()
+    assert evaluation.verdict is not None
+    plot_requirement(hard(), evaluation, ax, inset=2.0)
+    (inside,) = ax.child_axes
+    low, high = inside.get_xlim()
+    assert (low + high) / 2 == pytest.approx(evaluation.verdict.critical_time)
+    assert high - low == pytest.approx(2.0)
+    assert len(inside.get_lines()) == 3, "the curve, its bound, and the dot at the critical time"
+    bottom, top = inside.get_ylim()
+    value = ys(inside.get_lines()[-1])[0]
+    assert bottom < value < top
+    assert top - bottom < ax.get_ylim()[1] - ax.get_ylim()[0]
+
+
 def test_an_evaluation_has_a_panel_for_what_is_compared_and_for_each_input() -> None:
     problem = lag_problem(parameters=[START])
     evaluation = evaluate(problem, problem.space.decode([1.0, 1.0, 0.5, 1.0, 0.25]))

@@ -1,4 +1,4 @@
-from falsifier.problem.options import changes_from_options
+from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest

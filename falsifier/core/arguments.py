@@ -1,0 +1,55 @@
+"""Checks of values that users write in Python."""
+
+from collections.abc import Sequence
+from math import isfinite
+from numbers import Real
+from operator import index
+from typing import SupportsIndex
+
+from falsifier.errors import SpecError
+
+
+def whole(name: str, given: object, *, least: int) -> int:
+    """Return a whole number that a user gave, numpy's too, as an int.
+
+    Raises:
+        SpecError: naming the argument, if it is no whole number or less than the least.
+    """
+    try:
+        if isinstance(given, SupportsIndex) and not isinstance(given, bool) and index(given) >= least:
+            return index(given)
+    except TypeError:  # such as an array of numpy, which has an index only if it is a single whole number
+        pass
+    raise SpecError(f"{name}: expected a whole number, at least {least}, got {given!r}")
+
+
+def finite(name: str, given: object) -> float:
+    """Return a number that a user gave, numpy's too, as a float.
+
+    Raises:
+        SpecError: naming the argument, if it is no number, NaN or infinite.
+    """
+    if isinstance(given, Real) and not isinstance(given, bool) and isfinite(given):
+        return float(given)
+    raise SpecError(f"{name}: expected a finite number, got {given!r}")
+
+
+def positive(name: str, given: object) -> float:
+    """Return a positive number that a user gave, such as a duration in s.
+
+    Raises:
+        SpecError: naming the argument, if it is no number, not positive, NaN or infinite.
+    """
+    if (number := finite(name, given)) > 0:
+        return number
+    raise SpecError(f"{name}: expected a positive number, got {given!r}")
+
+
+def one_of(name: str, given: object, allowed: Sequence[str]) -> None:
+    """Check that a word is one of those allowed.
+
+    Raises:
+        SpecError: naming the argument and the allowed words.
+    """
+    if given not in allowed:
+        raise SpecError(f"{name}: expected {', '.join(allowed[:-1])} or {allowed[-1]}, got {given!r}")

@@ -1,0 +1,129 @@
+"""Any text, written so that another language reads exactly this text and nothing else.
+
+Names come from spec files, FMUs and journals that others wrote. Whatever stands in one, it must not become
+code in a script, a formula in a spreadsheet, or markup in a report. ``repr``, ``shlex`` and the JSON and XML
+libraries do the rest.
+"""
+
+import json
+import re
+
+# What UTF-8 or XML 1.0 cannot contain, control characters other than tab and newline, and those that reverse
+# the direction of what follows.
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+# What cannot be part of a string in any language.
+_UNWRITABLE = re.compile("[\x00\ud800-\udfff]")
+_REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+_FORMULA_STARTS = tuple("=+-@＝＋－＠\t\n")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_TOML_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_MODELICA_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
+_MODELICA_ESCAPES = {
+    "\a": "\\a", "\b": "\\b", "\f": "\\f", "\n": "\\n", "\r": "\\r", "\t": "\\t", "\v": "\\v",
+    '"': '\\"', "'": "\\'", "\\": "\\\\",
+}  # fmt: skip
+
+
+def plain(text: str) -> str:
+    r"""Return a text without control characters and characters that no file can hold; lines stay lines.
+
+    >>> plain("a\x1b[31mb")
+    'a�[31mb'
+    """
+    return _UNPRINTABLE.sub(_REPLACEMENT, text)
+
+
+def one_line(text: str) -> str:
+    r"""Return a text as one plain line, for titles, comments and messages.
+
+    >>> one_line("a\nb\u2028c")
+    'a b c'
+    """
+    return plain(" ".join(text.splitlines()))
+
+
+def python_docstring(text: str) -> str:
+    """Return a text of several lines as a Python string in triple quotes."""
+    written = (c if c == "\n" or (c.isprintable() and c not in '"\\') else _python_escape(c) for c in text)
+    return f'"""{"".join(written)}"""'
+
+
+def modelica_string(text: str) -> str:
+    r"""Return a text as a Modelica string.
+
+    >>> print(modelica_string('a"b\\c'))
+    "a\"b\\c"
+    """
+    return f'"{"".join(_MODELICA_ESCAPES.get(c, c) for c in _writable(text))}"'
+
+
+def modelica_path(name: str) -> str:
+    """Return a model's name in Modelica; in single quotes unless it is a path of plain identifiers.
+
+    >>> modelica_path("Cars.AT"), modelica_path("x); system(1")
+    ('Cars.AT', "'x); system(1'")
+    """
+    if _MODELICA_PATH.fullmatch(name):
+        return name
+    return f"'{''.join(_MODELICA_ESCAPES.get(c, c) for c in _writable(name))}'"
+
+
+def toml_string(text: str) -> str:
+    r"""Return a text as a TOML string; without escapes if possible.
+
+    >>> print(toml_string('a "b"'), toml_string("a'b\n"))
+    'a "b"' "a'b\n"
+    """
+    if text.isprintable() and "'" not in text and ('"' in text or "\\" in text):
+        return f"'{text}'"
+    # TOML escapes as JSON does, and DEL in addition.
+    return json.dumps(_writable(text), ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def toml_key(name: str) -> str:
+    """Return a name as a TOML key, quoted if necessary.
+
+    >>> toml_key("speed"), toml_key("a.b")
+    ('speed', '"a.b"')
+    """
+    return name if _TOML_KEY.fullmatch(name) else toml_string(name)
+
+
+def csv_cell(text: str) -> str:
+    """Return the content of a CSV cell that spreadsheets show as text or as a number, never run as a formula.
+
+    Quotes and commas are up to the csv module.
+
+    >>> csv_cell("=1+2"), csv_cell("-0.5"), csv_cell("AT1")
+    ("'=1+2", '-0.5', 'AT1')
+    """
+    cell = plain(text)
+    return f"'{cell}" if cell.startswith(_FORMULA_STARTS) and not _NUMBER.fullmatch(cell) else cell
+
+
+def markdown_text(text: str) -> str:
+    r"""Return a text as one line of Markdown without markup, also within a table.
+
+    >>> print(markdown_text("a|b <img>"))
+    a\|b \<img>
+    """
+    return re.sub(r"([\\`*\[\]<|])", r"\\\1", one_line(text))
+
+
+def markdown_code(text: str) -> str:
+    """Return a text as code within a line of Markdown.
+
+    >>> markdown_code("a `b`")
+    '`` a `b` ``'
+    """
+    line = one_line(text)
+    longest = max(map(len, re.findall("`+", line)), default=0)
+    return f"`{line}`" if not longest else f"{'`' * (longest + 1)} {line} {'`' * (longest + 1)}"
+
+
+def _python_escape(character: str) -> str:
+    return f"\\{character}" if character in '"\\' else repr(character)[1:-1]
+
+
+def _writable(text: str) -> str:
+    return _UNWRITABLE.sub(_REPLACEMENT, text)

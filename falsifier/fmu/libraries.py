@@ -1,0 +1,38 @@
+"""Which file of an FMU is the library of each interface on this platform."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePosixPath
+
+from falsifier.core.model import Interface
+from falsifier.fmu import archive
+
+
+def find_libraries(
+    names: Sequence[str], fmi_version: str, identifiers: Mapping[Interface, str]
+) -> tuple[dict[Interface, PurePosixPath], tuple[str, ...]]:
+    """Look up the libraries among an FMU's entries; the only one for this platform may have any name.
+
+    Returns:
+        The path of the library by interface, missing if there is none, and what the user should know.
+    """
+    libraries: dict[Interface, PurePosixPath] = {}
+    said: list[str] = []
+    for interface, identifier in identifiers.items():
+        expected = archive.library_file(fmi_version, identifier)
+        found = _find(names, expected)
+        if found is None:
+            continue
+        libraries[interface] = found
+        if found != expected:
+            said.append(
+                f"its library is called {found.name}, not {expected.name}; it is the only one, so it is used"
+            )
+    return libraries, tuple(dict.fromkeys(said))
+
+
+def _find(names: Iterable[str], expected: PurePosixPath) -> PurePosixPath | None:
+    paths = (PurePosixPath(name) for name in names)
+    found = [p for p in paths if p.parent == expected.parent and p.suffix == expected.suffix]
+    if expected in found:
+        return expected
+    return found[0] if len(found) == 1 else None

@@ -1,0 +1,240 @@
+"""What FMU processes need from the operating system; each function does as much as the system offers.
+
+Linux has all of it: sealed memory, adoption of orphans, isolation of processes from each other. Elsewhere the
+functions do less, or nothing, and say so.
+"""
+
+import contextlib
+import ctypes
+import fcntl
+import os
+import resource
+import signal
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import IO
+
+_IS_LINUX = sys.platform == "linux"
+
+_SET_PARENT_DEATH_SIGNAL, _SET_DUMPABLE, _SET_CHILD_SUBREAPER, _SET_NO_NEW_PRIVILEGES = 1, 4, 36, 38
+_LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
+# System calls and constants of Landlock, the same on all architectures (linux/landlock.h).
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
+_ASK_VERSION, _RULE_PATH_BENEATH = 1, 1
+_MOVE_BETWEEN_FOLDERS, _SCOPE_SIGNAL = 1 << 13, 1 << 1
+_VERSION_WITH_MOVES, _VERSION_WITH_SIGNALS = 2, 6
+# What lets root read the memory of other processes: SYS_MODULE, SYS_RAWIO, SYS_PTRACE, SYS_ADMIN, PERFMON,
+# BPF, CHECKPOINT_RESTORE.
+_READING_CAPABILITIES = sum(1 << number for number in (16, 17, 19, 21, 38, 39, 40))
+_CAPABILITY_VERSION = 0x20080522
+# Processes that fork faster than they are killed are left after this time.
+_SWEEPING_SECONDS = 2.0
+
+
+def sealed_file(size: int) -> IO[bytes]:
+    """Open a file without a name whose size no process can change, in memory if the system supports that.
+
+    A process that maps a file dies when another one shortens it, and a file that grows fills the memory.
+    """
+    if hasattr(os, "memfd_create"):
+        file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
+        file.truncate(size)
+        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+        return file
+    with tempfile.TemporaryFile() as named:
+        file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
+    file.truncate(size)
+    return file
+
+
+def lock_file(path: Path) -> int | None:
+    """Create and lock a file; the lock ends with the last process that has the returned descriptor open.
+
+    Returns:
+        The descriptor; None if another process has locked the file.
+    """
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def hide_memory() -> None:
+    """Keep other processes of the same user from reading this one's memory and environment (Linux).
+
+    Debuggers cannot attach then, and there are no core dumps. Programs that this one starts are not affected.
+    """
+    _control(_SET_DUMPABLE, 0)
+
+
+def confine() -> bool:
+    """Keep this process and what it starts from reading and signalling other processes (Linux with Landlock).
+
+    Files and the network stay as they are.
+
+    Returns:
+        Whether the system supports it.
+    """
+    if not _IS_LINUX:
+        return False
+    # Required by Landlock; also, programs that are started later gain no privileges.
+    _control(_SET_NO_NEW_PRIVILEGES, 1)
+    with contextlib.suppress(OSError, AttributeError):
+        _drop_capabilities()
+    try:
+        _enter_landlock()
+    except OSError:
+        return False
+    return True
+
+
+def can_confine() -> bool:
+    """Whether ``confine`` separates processes on this system."""
+    try:
+        return _IS_LINUX and _landlock_version() >= _VERSION_WITH_MOVES
+    except OSError:
+        return False
+
+
+def adopt_orphans() -> None:
+    """Become the parent of all descendants whose own parent ends, so that they can be found (Linux)."""
+    _control(_SET_CHILD_SUBREAPER, 1)
+
+
+def open_life(pid: int) -> int | None:
+    """Open a descriptor that becomes readable when a process ends; None where there is none (not Linux)."""
+    try:
+        return os.pidfd_open(pid) if hasattr(os, "pidfd_open") else None
+    except OSError:
+        return None
+
+
+def end_with_parent(parent: int) -> None:
+    """Kill this process when its parent ends (Linux)."""
+    _control(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:  # it has ended already
+        os._exit(1)
+
+
+def end_group(group: int) -> None:
+    """Kill a process group: what a process has started, where its descendants cannot be found otherwise."""
+    with contextlib.suppress(OSError):
+        os.killpg(group, signal.SIGKILL)
+
+
+def end_descendants(keep: Collection[int] = ()) -> None:
+    """Kill everything that descends from this process, and wait for it (Linux); see adopt_orphans.
+
+    Args:
+        keep: ids of children that stay, with what descends from them.
+    """
+    until = time.monotonic() + _SWEEPING_SECONDS
+    while strays := [pid for pid in children() if pid not in keep]:
+        for pid in strays:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        for pid in strays:
+            with contextlib.suppress(OSError):
+                os.waitpid(pid, os.WNOHANG)
+        if time.monotonic() > until:
+            return
+        time.sleep(0.0005)
+
+
+def children() -> list[int]:
+    """Return the process ids of this process's children, adopted ones included (Linux; else none)."""
+    if not _IS_LINUX:
+        return []
+    me = os.getpid()
+    try:
+        return [int(pid) for pid in Path(f"/proc/{me}/task/{me}/children").read_text().split()]
+    except OSError:  # a kernel without this file
+        return [pid for pid, parent in _all_processes() if parent == me]
+
+
+def limit_resources(memory_share: float) -> None:
+    """Allow this process no core dumps, and only this share of the machine's memory (Linux)."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if _IS_LINUX:
+        # RLIMIT_DATA counts what a model allocates, not the address space that runtimes merely reserve.
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        _, allowed = resource.getrlimit(resource.RLIMIT_DATA)
+        limit = int(memory * memory_share)
+        limit = limit if allowed == resource.RLIM_INFINITY else min(limit, allowed)
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+
+
+def flush_lines() -> None:
+    """Make C's stdout line-buffered, so that what the FMU printed before a crash is not lost."""
+    libc = ctypes.CDLL(None)
+    with contextlib.suppress(AttributeError, ValueError):
+        stdout = ctypes.c_void_p.in_dll(libc, "stdout")
+        libc.setvbuf(stdout, None, _LINE_BUFFERED, 0)
+
+
+def _control(option: int, value: int) -> None:
+    if _IS_LINUX:
+        unused = ctypes.c_ulong(0)
+        ctypes.CDLL(None).prctl(option, ctypes.c_ulong(value), unused, unused, unused)
+
+
+def _enter_landlock() -> None:
+    """Enter a domain that allows all file accesses: processes outside it are out of reach all the same."""
+    version = _landlock_version()
+    if version < _VERSION_WITH_MOVES:
+        raise OSError("this Landlock would forbid moving files between folders")
+    scope = _SCOPE_SIGNAL if version >= _VERSION_WITH_SIGNALS else 0
+    # Of the three fields, older kernels know only those that they need here; they accept the others as zeros.
+    attributes = struct.pack("=QQQ", _MOVE_BETWEEN_FOLDERS, 0, scope)
+    rules = _system_call(_CREATE_RULESET, attributes, ctypes.c_size_t(len(attributes)), 0)
+    try:
+        everything = os.open("/", os.O_PATH | os.O_CLOEXEC)
+        try:
+            rule = struct.pack("=Qi", _MOVE_BETWEEN_FOLDERS, everything)
+            _system_call(_ADD_RULE, rules, _RULE_PATH_BENEATH, rule, 0)
+        finally:
+            os.close(everything)
+        _system_call(_RESTRICT_SELF, rules, 0)
+    finally:
+        os.close(rules)
+
+
+def _landlock_version() -> int:
+    return _system_call(_CREATE_RULESET, None, ctypes.c_size_t(0), _ASK_VERSION)
+
+
+def _drop_capabilities() -> None:
+    """Give up what lets root read the memory of other processes; no effect for other users."""
+    libc = ctypes.CDLL(None)
+    header = ctypes.create_string_buffer(struct.pack("=Ii", _CAPABILITY_VERSION, 0), 8)
+    sets = ctypes.create_string_buffer(24)
+    if libc.capget(header, sets):
+        return
+    kept = [~_READING_CAPABILITIES & 0xFFFFFFFF] * 3 + [~_READING_CAPABILITIES >> 32 & 0xFFFFFFFF] * 3
+    held = struct.unpack("=6I", sets.raw)
+    libc.capset(header, struct.pack("=6I", *(a & b for a, b in zip(held, kept, strict=True))))
+
+
+def _system_call(*arguments: object) -> int:
+    libc = ctypes.CDLL(None, use_errno=True)
+    found = int(libc.syscall(*arguments))
+    if found < 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
+    return found
+
+
+def _all_processes() -> Iterator[tuple[int, int]]:
+    """Process ids and those of the parents."""
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                fields = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
+                yield int(entry.name), int(fields[1])

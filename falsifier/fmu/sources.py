@@ -1,0 +1,98 @@
+"""Which C files of an FMU one library is compiled from."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from falsifier.errors import ModelError
+
+# The standard's name, and that of drafts of FMI 3, which some exporters still write.
+_BUILD_DESCRIPTIONS = ("buildDescription.xml", "build_description.xml")
+_INCLUDED = re.compile(r'^\s*#\s*include\s*"([^"]+\.c)"', re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """What one library is compiled from.
+
+    Attributes:
+        files: paths of the C files below ``sources``.
+        defines: preprocessor macros and their values.
+        includes: folders below ``sources`` in which headers are looked up.
+    """
+
+    files: tuple[str, ...]
+    defines: Mapping[str, str] = field(default_factory=dict)
+    includes: tuple[str, ...] = (".",)
+
+
+def find_sources(path: Path, folder: Path, major: int, identifier: str) -> Sources:
+    """Return what one library of an extracted FMU is compiled from.
+
+    Files that the FMU lists, else all C files that no other C file includes.
+
+    Args:
+        path: path of the FMU, for messages.
+        folder: folder to which it was extracted.
+        major: major FMI version.
+        identifier: model identifier of the library.
+
+    Raises:
+        ModelError: if there are no sources, or listed ones are missing.
+    """
+    root = folder / "sources"
+    listed = _listed_2(folder, identifier) if major < 3 else _listed_3(root, identifier)
+    files = listed.files or tuple(_unlisted(root))
+    if not files:
+        raise ModelError(f"{path}: contains no C sources; export it with sources or for this platform")
+    missing = [f for f in files if not (root / f).is_file()]
+    if missing:
+        raise ModelError(f"{path}: the source files {', '.join(missing)} are missing; export it again")
+    headers = (p.parent.relative_to(root).as_posix() for p in sorted(root.rglob("*.h")))
+    return Sources(files, listed.defines, tuple(dict.fromkeys((".", *listed.includes, *headers))))
+
+
+def _unlisted(root: Path) -> Iterator[str]:
+    files = sorted(root.rglob("*.c"))
+    included = {
+        (file.parent / name).resolve()
+        for file in files
+        for name in _INCLUDED.findall(file.read_text(encoding="utf-8", errors="replace"))
+    }
+    return (f.relative_to(root).as_posix() for f in files if f.resolve() not in included)
+
+
+def _listed_2(folder: Path, identifier: str) -> Sources:
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    for interface in (*root.findall("CoSimulation"), *root.findall("ModelExchange")):
+        files = tuple(f.attrib["name"] for f in interface.findall("SourceFiles/File"))
+        if files and interface.get("modelIdentifier") == identifier:
+            return Sources(files)
+    return Sources(())
+
+
+def _listed_3(root: Path, identifier: str) -> Sources:
+    described = next((root / name for name in _BUILD_DESCRIPTIONS if (root / name).is_file()), None)
+    if described is None:
+        return Sources(())
+    configurations = ElementTree.parse(described).getroot().findall("BuildConfiguration")
+    own = [c for c in configurations if c.get("modelIdentifier", identifier) == identifier]
+    # A configuration for another platform lists that platform's own files.
+    general = [c for c in own if "platform" not in c.attrib] or own
+    sets = general[0].findall("SourceFileSet") if general else []
+    return Sources(
+        tuple(_attributes(sets, "SourceFile")),
+        {
+            macro.attrib["name"]: macro.get("value", "")
+            for each in sets
+            for macro in each.findall("PreprocessorDefinition")
+        },
+        tuple(_attributes(sets, "IncludeDirectory")),
+    )
+
+
+def _attributes(sets: list[Element], tag: str) -> Iterator[str]:
+    return (element.attrib["name"] for each in sets for element in each.findall(tag))

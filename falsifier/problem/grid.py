@@ -1,0 +1,152 @@
+"""The monitored time grid, if the user states none: it fits the FMU's step, the formulas' times and the end.
+
+All times are compared as fractions: in floating point 3 s is not a multiple of 0.003 s.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, gcd, lcm
+
+from falsifier.errors import FormulaError, SpecError
+from falsifier.stl import Formula, parse
+
+# Number of intervals if the FMU specifies no step.
+_DEFAULT_INTERVALS = 1000
+# Maximum number of intervals that times such as 3.14159 s may cause; the FMU's own step may cause more.
+_MAX_INTERVALS = 100_000
+# Largest denominator of times like 1/30 s, which are written with many digits.
+_MAX_DENOMINATOR = 100_000
+_ROUNDING = 1e-12
+# Intervals with this many digits or more are no rounder than others.
+_MANY_DIGITS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A time grid.
+
+    Attributes:
+        interval: its step in s.
+        reason: why this one, in words.
+    """
+
+    interval: float
+    reason: str
+
+
+def choose_grid(
+    stop_time: float,
+    *,
+    times: Iterable[float] = (),
+    fmu_step: float | None = None,
+    step_size: float | None = None,
+) -> Grid:
+    """Return the grid with the FMU's step, or the next finer one, that fits the stop time and all times.
+
+    Args:
+        stop_time: end of the simulation in s.
+        times: times in s that formulas name; those after the stop time are ignored.
+        fmu_step: the FMU's default step in s, if it specifies one.
+        step_size: communication step in s, if it is stated; the interval is a multiple of it, if possible.
+
+    Raises:
+        SpecError: if only a very fine grid fits.
+    """
+    stop = exact(stop_time)
+    named = sorted({t for t in map(exact, times) if 0 < t <= stop})
+    common = _common(stop, *named)
+    if fmu_step and fmu_step > stop_time:
+        fmu_step = None
+    wanted = exact(fmu_step) if fmu_step else stop / _DEFAULT_INTERVALS
+    count = _count(common, wanted, exact(step_size) if step_size else None)
+    interval = common / count
+    finest = min(wanted, stop / _MAX_INTERVALS)
+    if interval < finest:
+        rounded = stop / _DEFAULT_INTERVALS
+        raise SpecError(
+            f"no grid of at most {_MAX_INTERVALS} intervals fits the stop time {_text(stop)} s and the "
+            f"formula's times {_listed(named)}; round these times, for example to multiples of "
+            f"{_text(rounded)} s",
+            key="model.output_interval",
+        )
+    return Grid(float(interval), _reason(interval, stop, named, fmu_step))
+
+
+def formula_times(formulas: Iterable[str]) -> list[float]:
+    """Return the bounds in s of all windows; formulas that cannot be parsed have none."""
+    found: list[float] = []
+    for text in formulas:
+        try:
+            formula = parse(text)
+        except FormulaError:
+            continue
+        found += _bounds(formula)
+    return found
+
+
+def fitting_interval(formula: Formula, stop_time: float, fmu_step: float | None) -> float | None:
+    """Return the step in s of a grid on which the formula can be evaluated; None if there is none."""
+    if formula.horizon() > stop_time:
+        return None
+    try:
+        return choose_grid(stop_time, times=_bounds(formula), fmu_step=fmu_step).interval
+    except SpecError:
+        return None
+
+
+def exact(seconds: float) -> Fraction:
+    """Return a time as the fraction that was meant: 0.1 as 1/10, 0.3333333333333333 as 1/3.
+
+    >>> exact(0.1), exact(1 / 30)
+    (Fraction(1, 10), Fraction(1, 30))
+    """
+    written = Fraction(repr(float(seconds)))
+    near = written.limit_denominator(_MAX_DENOMINATOR)
+    return near if abs(near - written) <= _ROUNDING * abs(written) else written
+
+
+def _bounds(formula: Formula) -> list[float]:
+    windows = (getattr(part, "window", None) for part in formula.walk())
+    return [bound for window in windows if window is not None for bound in (window.start, window.end)]
+
+
+def _common(*times: Fraction) -> Fraction:
+    """Return the largest time of which all of these are multiples."""
+    denominator = lcm(*(t.denominator for t in times))
+    return Fraction(gcd(*(int(t * denominator) for t in times)), denominator)
+
+
+def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
+    """Return the number of intervals in the common time: few that are no longer than wanted, and round."""
+    count = max(1, ceil(common / wanted))
+    if common == count * wanted:
+        return count
+    if step_size is None or common % step_size:
+        # Thirds of a second have no end in decimals, however many digits are looked at.
+        return min(range(count, 2 * count + 1), key=lambda n: (min(_digits(common / n), _MANY_DIGITS), n))
+    steps = int(common / step_size)
+    return next(n for n in range(min(count, steps), steps + 1) if not steps % n)
+
+
+def _digits(seconds: Fraction) -> int:
+    """Return the number of significant digits with which a time is written."""
+    return len(f"{float(seconds):.15g}".partition("e")[0].replace(".", "").strip("0"))
+
+
+def _reason(interval: Fraction, stop: Fraction, named: list[Fraction], fmu_step: float | None) -> str:
+    fits = f"the stop time {_text(stop)} s" + (f" and the formula's times {_listed(named)}" if named else "")
+    if fmu_step is None:
+        return f"the FMU specifies no step; this divides {fits}"
+    if interval == exact(fmu_step):
+        return "the FMU's step"
+    return f"the FMU's step {fmu_step:g} s does not divide {fits}; this does"
+
+
+def _listed(times: list[Fraction]) -> str:
+    shown = [_text(t) for t in times[:4]] + (["..."] if len(times) > 4 else [])
+    return ", ".join(shown) + " s"
+
+
+def _text(seconds: Fraction) -> str:
+    return f"{float(seconds):.6g}"

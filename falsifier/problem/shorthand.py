@@ -1,0 +1,239 @@
+"""Conversion of Python values and command-line options to the sections of a spec."""
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from falsifier.core.model import Interface
+from falsifier.core.signals import INTERPOLATIONS
+from falsifier.errors import SpecError, did_you_mean, rejected
+from falsifier.problem.defaults import DEFAULT_POINTS
+from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection
+
+_DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+
+# A constant value; (low, high), (low, high, points) or (low, high, points, interpolation) to search; None to
+# search between the FMU's min and max; or a complete section of a spec.
+InputChoice = (
+    float
+    | tuple[float, float]
+    | tuple[float, float, int]
+    | tuple[float, float, int, str]
+    | InputSection
+    | None
+)
+# A value, text for a string, a range to search, or a complete section of a spec.
+ParameterChoice = float | str | tuple[float, float] | ParameterSection
+
+
+def changes_from(
+    *,
+    inputs: Mapping[str, InputChoice],
+    parameters: Mapping[str, ParameterChoice],
+    **experiment: float | Interface | None,
+) -> ModelChanges:
+    """Return the changes for Python values.
+
+    Args:
+        inputs: choices by input name.
+        parameters: choices by parameter name.
+        experiment: fields of ModelChanges; None leaves a field unchanged.
+
+    Raises:
+        SpecError: naming the input, parameter or field that is invalid.
+    """
+    sections = {name: _input_section(name, choice) for name, choice in inputs.items()}
+    return _changes(
+        sections, {name: _parameter_section(name, choice) for name, choice in parameters.items()}, experiment
+    )
+
+
+def changes_from_options(
+    *,
+    inputs: Iterable[str] = (),
+    parameters: Iterable[str] = (),
+    **experiment: float | Interface | None,
+) -> ModelChanges:
+    """Return the changes for command-line options.
+
+    Args:
+        inputs: ``name=low:high``, ``name=low:high:points`` or ``name=low:high:points:interpolation``
+            (searched), ``name`` (searched as in the spec, or between the FMU's min and max) or
+            ``name=value`` (kept constant).
+        parameters: ``name=value`` (fixed), ``name=low:high`` (searched) or ``name=text`` (a string; a file is
+            named relative to the current folder).
+        experiment: fields of ModelChanges; None leaves a field unchanged.
+
+    Raises:
+        SpecError: naming the option that is invalid.
+    """
+    return _changes(
+        _once("--input", map(_input, inputs)), _once("--param", map(_parameter, parameters)), experiment
+    )
+
+
+def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
+    """Return the command-line options for these changes, the inverse of ``changes_from_options``.
+
+    >>> options_from(changes_from_options(inputs=["u=0:1:3"], stop_time=5.0))
+    [('--input', 'u=0:1:3'), ('--stop-time', '5.0')]
+    """
+    options = [("--input", _input_option(name, section)) for name, section in changes.inputs.items()]
+    for name, parameter in changes.parameters.items():
+        options.append(("--param", f"{name}={_parameter_option(parameter)}"))
+    for field in ("interface", "stop_time", "output_interval", "time_limit"):
+        if (value := getattr(changes, field)) is not None:
+            options.append((f"--{field.replace('_', '-')}", str(value)))
+    return options
+
+
+def _changes(
+    inputs: Mapping[str, object],
+    parameters: Mapping[str, object],
+    experiment: Mapping[str, float | Interface | None],
+) -> ModelChanges:
+    data: dict[str, Any] = {"inputs": inputs, "parameters": parameters}
+    data |= {name: value for name, value in experiment.items() if value is not None}
+    try:
+        return ModelChanges.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise SpecError(f"{where}: {rejected(first['msg'], first['input'])}") from None
+
+
+def _input_section(name: str, choice: InputChoice) -> object:
+    match choice:
+        case None:
+            return {}
+        case InputSection():
+            return choice.model_dump(exclude_unset=True)
+        case int() | float():
+            return {"value": choice}
+        case (low, high, *more) if len(more) <= 2:
+            section = {"range": (low, high), "control_points": DEFAULT_POINTS}
+            return section | dict(zip(("control_points", "interpolation"), more, strict=False))
+    raise SpecError(f"inputs.{name}: expected a number, (low, high[, points[, interpolation]]) or None")
+
+
+def _parameter_section(name: str, choice: ParameterChoice) -> object:
+    match choice:
+        case ParameterSection():
+            return choice.model_dump(exclude_unset=True)
+        case int() | float():
+            return {"value": choice}
+        case str():
+            return {"value": named_file(choice, Path())}
+        case (low, high):
+            return {"range": (low, high)}
+    raise SpecError(f"parameters.{name}: expected a number, text or (low, high)")
+
+
+def _once(flag: str, sections: Iterable[tuple[str, dict[str, object]]]) -> dict[str, dict[str, object]]:
+    found: dict[str, dict[str, object]] = {}
+    for name, section in sections:
+        if name in found:
+            raise SpecError(f"{flag} {name}: given twice; drop one of them")
+        found[name] = section
+    return found
+
+
+def _input(option: str) -> tuple[str, dict[str, object]]:
+    if option.strip() and "=" not in option:
+        return option.strip(), {}
+    name, parts = _split(option, "--input")
+    if len(parts) == 1:
+        if _as_number(parts[0]) is None:
+            raise SpecError(
+                f"--input {option}: expected a number, or a range LOW:HIGH with a colon, for example "
+                f"--input {name}={_as_range(parts[0])}"
+            )
+        return name, {"value": _number(parts[0], option)}
+    section: dict[str, object] = {"range": (_number(parts[0], option), _number(parts[1], option))}
+    section["control_points"] = DEFAULT_POINTS
+    if len(parts) > 2:
+        if not parts[2].isdigit():
+            raise SpecError(
+                f"--input {option}: {parts[2]!r} is not a number of control points; expected 1 or more"
+            )
+        section["control_points"] = int(parts[2])
+    if len(parts) > 3:
+        if parts[3] not in INTERPOLATIONS:
+            raise SpecError(
+                f"--input {option}: unknown interpolation; {did_you_mean(parts[3], INTERPOLATIONS)}"
+            )
+        section["interpolation"] = parts[3]
+    if len(parts) > 4:
+        raise SpecError(f"--input {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
+    return name, section
+
+
+def _parameter(option: str) -> tuple[str, dict[str, object]]:
+    name, parts = _split(option, "--param")
+    numbers = [_as_number(part) for part in parts]
+    if None in numbers:
+        return name, {"value": named_file(":".join(parts), Path())}
+    if len(numbers) == 1:
+        return name, {"value": numbers[0]}
+    if len(numbers) == 2:
+        return name, {"range": (numbers[0], numbers[1])}
+    raise SpecError(f"--param {option}: expected NAME=VALUE or NAME=LOW:HIGH")
+
+
+def named_file(text: str, folder: Path) -> str:
+    """Return the absolute path if the text names a file, or a folder with a slash; otherwise the text."""
+    path = folder / text
+    try:
+        is_path = path.is_file() or ("/" in text and path.is_dir())
+    except (OSError, ValueError):
+        return text
+    return str(path.absolute()) if text and is_path else text
+
+
+def _split(option: str, flag: str) -> tuple[str, list[str]]:
+    name, equals, rest = option.partition("=")
+    if not equals or not name.strip() or not rest.strip():
+        raise SpecError(f"{flag} {option}: expected NAME=..., for example throttle=0:100:7")
+    return name.strip(), rest.strip().split(":")
+
+
+def _as_number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _number(text: str, option: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise SpecError(f"{option}: {text!r} is not a number") from None
+
+
+def _as_range(text: str) -> str:
+    """Return the range that a text with another separator was meant to be, or an example."""
+    match = re.fullmatch(rf"[\[(]?\s*({_DIGITS})\s*(?:-|,|;|\.\.+|\bto\b|\s)\s*({_DIGITS})\s*[\])]?", text)
+    return f"{match[1]}:{match[2]}" if match else "0:100"
+
+
+def _parameter_option(section: ParameterSection) -> str:
+    if section.range is not None:
+        return ":".join(f"{v:.17g}" for v in section.range)
+    return section.value if isinstance(section.value, str) else f"{section.value:.17g}"
+
+
+def _input_option(name: str, section: InputSection) -> str:
+    if section.value is not None:
+        return f"{name}={section.value:.17g}"
+    if section.range is None:
+        return name
+    said = [f"{v:.17g}" for v in section.range]
+    if section.control_points is not None:
+        said.append(str(section.control_points))
+        if section.interpolation is not None:
+            said.append(section.interpolation)
+    return f"{name}={':'.join(said)}"

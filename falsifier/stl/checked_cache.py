@@ -1,0 +1,71 @@
+"""Numba's cache files, checked: machine code that is damaged or older than its sources is compiled again."""
+
+import pickle
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import IndexDataCacheFile
+
+_SUM_LENGTH = sha256().digest_size
+
+
+class _CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
+    """Index and data of one function's cache; what cannot be read is as if it were not there."""
+
+    def save(self, key: Any, data: Any) -> None:
+        with suppress(OSError):  # a full disk: compiled again by the next process
+            super().save(key, data)
+
+    def _dump(self, content: Any) -> bytes:
+        dumped: bytes = super()._dump(content)
+        return dumped + sha256(dumped).digest()
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            with Path(self._index_path).open("rb") as file:
+                pickle.load(file)  # numba's version
+                _check(file.read())
+            index: dict[Any, str] = super()._load_index()
+        except Exception:  # unpickling damaged bytes may raise anything
+            return {}
+        return index
+
+    def _load_data(self, name: str) -> Any:
+        _check(Path(self._data_path(name)).read_bytes())
+        return super()._load_data(name)
+
+
+# Sources of the compiled functions of each module, with those of the compiled functions that it imports.
+_SOURCES: dict[str, frozenset[str]] = {}
+
+
+def check_cache(function: Any) -> None:
+    """Let a compiled function's cache notice damage, and changes in what the function calls.
+
+    Numba looks at the function's own file, but the machine code contains functions and constants of others.
+    """
+    file: Any = getattr(getattr(function, "_cache", None), "_cache_file", None)
+    sources = _sources(function.py_func)
+    if type(file) is IndexDataCacheFile:
+        file.__class__ = _CheckedFile
+        file._source_stamp = (file._source_stamp, *sorted(_stamp(Path(source)) for source in sources))
+
+
+def _sources(function: Any) -> frozenset[str]:
+    """Return the files of a function's module and of the modules with compiled functions that it imports."""
+    used = {getattr(value, "__module__", None) for value in function.__globals__.values()}
+    imported = (_SOURCES[module] for module in used - {function.__module__} if module in _SOURCES)
+    _SOURCES[function.__module__] = frozenset({function.__code__.co_filename}).union(*imported)
+    return _SOURCES[function.__module__]
+
+
+def _stamp(source: Path) -> tuple[str, float, int]:
+    found = source.stat()
+    return source.name, found.st_mtime, found.st_size
+
+
+def _check(content: bytes) -> None:
+    if sha256(content[:-_SUM_LENGTH]).digest() != content[-_SUM_LENGTH:]:
+        raise OSError("damaged")  # which numba takes for a file that is gone

@@ -1,0 +1,50 @@
+"""Numba's decorator, with an on-disk cache that works even if the package folder is read-only."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
+    """Compile a function at its first call and cache the machine code for later processes.
+
+    Numba writes the cache next to the source or to the user's cache folder. If both are read-only (for
+    example in a container without a home directory), a temporary folder is used; if that belongs to another
+    user, nothing is cached. A damaged cache is written again.
+
+    Args:
+        function: the function to compile.
+        forceinline: whether to inline its machine code at every call.
+    """
+    import numba
+
+    from falsifier.stl.checked_cache import check_cache
+
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": forceinline}
+
+    try:
+        result: _Function = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # numba found no writable cache folder
+        folder = _own_temporary_folder()
+        if folder is not None:
+            numba.config.CACHE_DIR = str(folder)
+        result = numba.njit(cache=folder is not None, **options)(function)
+    check_cache(result)
+    return result
+
+
+def _own_temporary_folder() -> Path | None:
+    """Return a temporary folder that no other user can write to, because machine code is loaded from it."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"falsifier-numba-{user}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.stat()
+    except OSError:
+        return None
+    is_own = not hasattr(os, "getuid") or (found.st_uid == user and found.st_mode & 0o022 == 0)
+    return folder if is_own and os.access(folder, os.W_OK) else None

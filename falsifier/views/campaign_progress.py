@@ -1,0 +1,132 @@
+"""The display of a running campaign on stderr: a live table on a terminal, plain lines otherwise."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from falsifier.campaigns import Progress, RunProgress
+from falsifier.core.literals import one_line
+from falsifier.core.words import counted
+from falsifier.views.terminal import error_console, moving, unbroken
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+Show = Callable[[Progress], None]
+
+# Time in s over which simulations per second are averaged.
+_RATE_WINDOW = 10.0
+# Minimum time in s between two plain lines with the overall progress.
+_LINE_PERIOD = 30.0
+
+
+@contextmanager
+def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
+    """Show a campaign's progress while the context lasts."""
+    if quiet:
+        yield lambda progress: None
+        return
+    console = error_console()
+    if not console.is_terminal:
+        board = PlainScoreboard(
+            lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+        )
+        yield unbroken(board)
+        return
+    from rich.live import Live
+
+    rate = Rate()
+    live = Live(console=console, refresh_per_second=4, transient=True)
+    with moving(live):
+        yield unbroken(lambda progress: live.update(_fitting(progress, rate(progress), console)))
+
+
+class Rate:
+    """Simulations per second, averaged over the last few seconds."""
+
+    def __init__(self) -> None:
+        self._seen: list[tuple[float, int]] = []
+
+    def __call__(self, progress: Progress, now: float | None = None) -> float | None:
+        """Return the current rate in 1/s; None at the first call."""
+        time = monotonic() if now is None else now
+        self._seen.append((time, progress.spent.simulations))
+        while self._seen[0][0] < time - _RATE_WINDOW:
+            self._seen.pop(0)
+        (begin, before), (end, after) = self._seen[0], self._seen[-1]
+        return (after - before) / (end - begin) if end > begin else None
+
+
+class PlainScoreboard:
+    """Writes one line per run that ends, and now and then one line with the overall progress."""
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        self._write = write
+        self._ended: dict[str, str] = {}
+        self._begun = False
+        self._rate = Rate()
+        self._written = 0.0
+
+    def __call__(self, progress: Progress) -> None:
+        """Write a line per run that ended since the last call."""
+        ended = {r.name: str(r.status) for r in progress.runs if r.status not in ("waiting", "running")}
+        if not self._begun:  # runs that ended before this start get no line
+            self._begun, self._ended = True, ended
+            self._write(f"{counted(len(progress.runs), 'run')}, {progress.finished} already finished")
+        for run in progress.runs:
+            if run.name in ended and self._ended.get(run.name) != run.status:
+                self._ended[run.name] = run.status
+                self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run_line(run)}")
+        rate = self._rate(progress)
+        if monotonic() - self._written > _LINE_PERIOD:
+            self._written = monotonic()
+            self._write(overall_line(progress, rate))
+
+
+def run_line(run: RunProgress) -> str:
+    """Describe an ended run in one line."""
+    best = "" if run.best is None else f", best robustness {run.best:+.4g}"
+    count = run.spent.simulations_text
+    reason = f": {run.reason}" if run.status == "failed" else ""
+    return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
+
+
+def overall_line(progress: Progress, rate: float | None, *, stopped: bool = False) -> str:
+    """Describe a campaign's progress in one line; stopped: no process works on it any more."""
+    counts, spent = progress.counts, progress.spent
+    parts = [
+        f"{progress.finished}/{counted(len(progress.runs), 'run')} finished",
+        f"{counts['falsified']} falsified",
+        *([f"{counts['failed']} failed"] if counts["failed"] else []),
+        *([] if stopped else [f"{counts['running']} running"]),
+        spent.simulations_text + ("" if rate is None else f" ({rate:.0f}/s)"),
+    ]
+    if spent.calls:
+        cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
+        parts.append(f"{spent.tokens} tokens, {cost}")
+    return ", ".join(parts)
+
+
+def _fitting(progress: Progress, rate: float | None, console: "Console") -> "RenderableType":
+    """The live table: as many requirements as fit on the terminal, preferring those that are running."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, caption=overall_line(progress, rate), caption_justify="left")
+    for name in ("requirement", "runs", "falsified", "simulations", "best robustness", "cost"):
+        table.add_column(name, justify="left" if name == "requirement" else "right")
+    groups = progress.by_requirement()
+    order = sorted(groups, key=lambda name: -groups[name].counts["running"])
+    for name in sorted(order[: max(console.height - 5, 3)], key=list(groups).index):
+        part = groups[name]
+        cost = part.spent.cost
+        table.add_row(
+            escape(one_line(name)),
+            f"{part.finished}/{len(part.runs)}",
+            str(part.counts["falsified"]),
+            str(part.spent.simulations),
+            "" if part.best is None else f"{part.best:+.4g}",
+            "?" if cost is None else f"{cost:.4f}" if part.spent.calls else "",
+        )
+    return table

@@ -1,0 +1,70 @@
+"""What goes to stderr: plain text only, and a terminal or pipe that is gone never ends a run."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from falsifier.core.literals import plain
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+T = TypeVar("T")
+
+
+class Live(Protocol):
+    """A moving display of rich."""
+
+    def start(self) -> None:
+        """Begin to draw."""
+        ...
+
+    def stop(self) -> None:
+        """Draw for the last time."""
+        ...
+
+
+def warn(text: str) -> None:
+    """Print a message for people on stderr, if that can be written to."""
+    with suppress(OSError):
+        print(plain(text), file=sys.stderr, flush=True)
+
+
+def error_console() -> "Console":
+    """Return rich's console on stderr."""
+    from rich.console import Console
+
+    class ErrorConsole(Console):
+        def on_broken_pipe(self) -> None:
+            raise  # rich itself would end the program with 1, the code of a falsification
+
+    return ErrorConsole(stderr=True)
+
+
+def unbroken(show: Callable[[T], None]) -> Callable[[T], None]:
+    """Return a display that falls silent when its stream can no longer be written to."""
+    silent = False
+
+    def show_if_possible(shown: T) -> None:
+        nonlocal silent
+        if silent:
+            return
+        try:
+            show(shown)
+        except OSError:
+            silent = True
+
+    return show_if_possible
+
+
+@contextmanager
+def moving(live: Live) -> Iterator[None]:
+    """Keep a display moving for as long as the context lasts."""
+    with suppress(OSError):
+        live.start()
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            live.stop()

@@ -1,0 +1,68 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.campaigns.analysis import Score, read_published
+from falsifier.campaigns.analysis.published_scores import is_tied, rank
+from falsifier.errors import SpecError
+
+BEST, LLM = Score(10, 10, 1.3, "FReaK"), Score(10, 10, 2.3)
+
+
+@pytest.mark.parametrize(
+    ("score", "place"),
+    [
+        (Score(10, 10, 1.0), 1),
+        (Score(10, 10, 1.34), 1),  # equal to a published 1.3: the first place is shared
+        (Score(10, 10, 1.4), 2),
+        (Score(10, 10, 50.0), 3),
+        (Score(9, 10, 1.0), 3),  # more falsified runs go before fewer simulations
+        (Score(3, 3, 1.0), 1),
+        (Score(0, 10, None), None),
+    ],
+)
+def test_rank_is_by_falsified_runs_then_by_simulations(score: Score, place: int | None) -> None:
+    assert rank(score, [BEST, LLM, Score(0, 10, None)]) == place
+
+
+def test_the_bundled_table_has_all_columns() -> None:
+    published = read_published()
+    assert set(published.columns) == {"best", "llm_falsifier", "uniform"}
+    assert {len(column) for column in published.columns.values()} == {21}
+    assert published.scores("AT1")["best"] == Score(10, 10, 4.8, "FReaK")
+    assert published.scores("AT1")["uniform"] == Score(0, 10, None)
+    assert set(published.ablation) == {"MP1", "MP2", "MP3", "MP4"}
+    assert published.llms["gpt-5-mini-high"]["NN"] == Score(1, 10, 97.0)
+    assert published.scores("my own") == {}
+
+
+def test_the_published_ranks_follow_from_the_published_numbers() -> None:
+    """Where the published table gives its first place, our rule gives it too."""
+    published = read_published()
+    first = [
+        r for r, s in published.columns["llm_falsifier"].items() if rank(s, published.scores(r).values()) == 1
+    ]
+    assert len(first) == 14
+
+
+def test_every_published_tool_counts_once_and_ties_are_known() -> None:
+    published = read_published()
+    # LLM-Falsifier falsified CC4 in 5 of 10 runs: behind the best tool and behind FalCAuN, as published.
+    llm = published.columns["llm_falsifier"]["CC4"]
+    assert rank(llm, published.competitors("CC4")) == 3
+    assert rank(llm, published.scores("CC4").values()) == 2
+    assert len(published.competitors("AT1")) == 4
+    assert "FalCAuN" in published.sources
+    again = replace(published, tools={"FReaK": {"AT1": Score(10, 10, 4.8)}})
+    assert len(again.competitors("AT1")) == 3
+    assert is_tied(Score(10, 10, 1.34), [BEST, LLM])
+    assert not is_tied(Score(10, 10, 1.4), [BEST, LLM])
+    assert not is_tied(Score(0, 10, None), [Score(0, 10, None)])
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text("runs = 10\n")
+    with pytest.raises(SpecError, match="not a table of published results"):
+        read_published(path)

@@ -1,0 +1,23 @@
+from falsifier.fmu.archive import library_file
+from falsifier.fmu.libraries import find_libraries
+
+EXPECTED = library_file("2.0", "model")
+
+
+def test_the_library_named_like_the_identifier_is_used() -> None:
+    names = [EXPECTED.as_posix(), EXPECTED.with_name(f"helper{EXPECTED.suffix}").as_posix()]
+    assert find_libraries(names, "2.0", {"co-simulation": "model"}) == ({"co-simulation": EXPECTED}, ())
+
+
+def test_the_only_other_library_is_used_and_told_once() -> None:
+    other = EXPECTED.with_name(f"other{EXPECTED.suffix}")
+    identifiers = {"co-simulation": "model", "model-exchange": "model"}
+    found, said = find_libraries([other.as_posix()], "2.0", identifiers)  # type: ignore[arg-type]
+    assert set(found.values()) == {other}
+    (text,) = said
+    assert text.startswith(f"its library is called {other.name}, not {EXPECTED.name}; ")
+
+
+def test_of_several_others_none_is_guessed() -> None:
+    names = [EXPECTED.with_name(f"{name}{EXPECTED.suffix}").as_posix() for name in ("a", "b")]
+    assert find_libraries(names, "2.0", {"co-simulation": "model"}) == ({}, ())

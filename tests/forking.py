@@ -1,0 +1,156 @@
+"""A process that has imported what is slow to import, and forks a copy of itself for each command.
+
+Most of the time that a command takes is spent on imports. The copy is a process like any other, with an
+environment, a folder, standard streams and an exit code of its own.
+"""
+
+import atexit
+import gc
+import importlib
+import json
+import os
+import select
+import socket
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from pkgutil import walk_packages
+from typing import IO, Any, NoReturn
+
+import numpy as np
+
+from tests.patience import HANG
+
+# Imported by commands when they need them.
+_SLOW = (
+    "fmpy",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.figure",
+    "matplotlib.font_manager",
+    "numba",
+    "rtamt",
+    "scipy.interpolate",
+    "scipy.optimize",
+    "scipy.stats",
+)
+# Packages of which commands import many modules one by one.
+_LARGE = ("falsifier", "openai.resources")
+# What runs when it is imported, and engines whose libraries are not installed.
+_NEVER = ("falsifier.__main__", "falsifier.engines.botorch_gp")
+_PROGRAM = """
+import sys
+from tests.forking import serve
+serve(int(sys.argv.pop()))
+"""
+_REQUEST_BYTES = 1_000_000
+
+
+class Forker:
+    """The process that forks; one command at a time."""
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        self.lock = threading.Lock()
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _PROGRAM, str(theirs.fileno())],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+            )
+
+    def run(
+        self, arguments: Sequence[str], folder: Path, environment: Mapping[str, str], *streams: IO[Any]
+    ) -> int:
+        """Run a command with these three standard streams; return its exit code."""
+        request = {"arguments": arguments, "folder": str(folder), "environment": dict(environment)}
+        socket.send_fds(self._socket, [json.dumps(request).encode()], [s.fileno() for s in streams])
+        pid = self._receive()
+        try:
+            return self._receive()
+        except TimeoutError:
+            os.kill(pid, 9)
+            raise
+
+    def _receive(self) -> int:
+        if not select.select([self._socket], [], [], HANG)[0]:
+            raise TimeoutError("the command does not end")
+        return int(self._socket.recv(100))
+
+
+@cache
+def forker() -> Forker:
+    """The one of this process, started when it is first needed; it ends with this process."""
+    clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
+    return Forker(clean | {"PYTHONPATH": os.pathsep.join(sys.path)})
+
+
+def serve(descriptor: int) -> None:
+    """Fork for each request; the copies run it and end."""
+    importlib.import_module("falsifier.llm.litellm_import").load_litellm()
+    large = [importlib.import_module(name) for name in _LARGE]
+    parts = [m.name for package in large for m in walk_packages(package.__path__, f"{package.__name__}.")]
+    for name in (*_SLOW, *parts):
+        if name not in _NEVER:
+            importlib.import_module(name)
+    _load_monitor()
+    gc.freeze()
+    requests = socket.socket(fileno=descriptor)
+    while True:
+        data, streams, _, _ = socket.recv_fds(requests, _REQUEST_BYTES, 3)
+        if not data:
+            sys.exit()
+        pid = os.fork()
+        if not pid:
+            requests.close()
+            _become(json.loads(data), streams)
+            _run_and_end()
+        for stream in streams:
+            os.close(stream)
+        requests.send(str(pid).encode())
+        _, status = os.waitpid(pid, 0)
+        requests.send(str(os.waitstatus_to_exitcode(status)).encode())
+
+
+def _load_monitor() -> None:
+    """Load the compiled monitor from its cache, or compile it."""
+    from falsifier.core.trajectory import Trajectory
+    from falsifier.stl import Monitor, parse
+
+    times = np.linspace(0.0, 1.0, 11)
+    Monitor(parse("G[0,1] (x < 1)"), step=0.1, samples=11).evaluate(Trajectory(times, {"x": times}))
+
+
+def _become(request: dict[str, Any], streams: list[int]) -> None:
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+        os.close(stream)
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    sys.argv[1:] = request["arguments"]
+
+
+def _run_and_end() -> NoReturn:
+    """Run the command and end as an interpreter does, except that it does not take all modules apart."""
+    from falsifier.cli import main
+
+    code = 0
+    try:
+        main()
+    except SystemExit as ending:
+        code = ending.code if isinstance(ending.code, int) else int(ending.code is not None)
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)

@@ -1,0 +1,238 @@
+"""Damage to any file of a run ends in the outcome of the undamaged run or in one clear line.
+
+The damage is random with fixed seeds: flipped bits, cuts, deletions and doublings in every kind of file.
+"""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+from click.testing import CliRunner
+
+from falsifier.campaigns import resume_campaign, run_campaign
+from falsifier.campaigns.analysis import load as load_runs
+from falsifier.cli import cli
+from falsifier.counterexamples.store import FILE_NAME, save, to_store
+from falsifier.counterexamples.store import load as load_counterexample
+from falsifier.errors import FalsifierError, JournalError, SpecError
+from falsifier.llm.messages import ChatRequest
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.search.repair import repair
+from falsifier.search.result import Result
+from falsifier.search.run import falsify, resume
+from falsifier.testing import lag_problem
+from tests.campaigns.support import outcomes, request, work_in_threads
+from tests.hostile.damage import DAMAGES, blank, cut, double_line, flip, lose_line
+from tests.problems import hard, impossible
+
+
+def answer(asked: ChatRequest) -> str:
+    """Reply to a prompt in the same way whenever it is asked."""
+    random = Random("".join(message.content for message in asked.messages))
+    values = [round(random.uniform(-1, 0.5), 3) for _ in range(4)]
+    return json.dumps({"rationale": "so", "signals": [{"name": "u", "values": values}]})
+
+
+class Numeric:
+    """Runs of an engine that draws at random; one of them finds a counterexample."""
+
+    problem = staticmethod(hard)
+
+    def run(self, directory: Path) -> Result:
+        result = falsify(self.problem(), "uniform", seed=3, budget=25, directory=directory)
+        assert result.counterexample is not None
+        assert len(result.evaluations) > 3
+        save(to_store(result.counterexample), directory / FILE_NAME)
+        return result
+
+    def resume(self, directory: Path) -> Result:
+        return resume(directory, problems=[self.problem()])[0]
+
+
+class Standing(Numeric):
+    """Runs that find nothing."""
+
+    problem = staticmethod(impossible)
+
+    def run(self, directory: Path) -> Result:
+        return falsify(self.problem(), "corners", budget=8, directory=directory)
+
+
+class Led(Numeric):
+    """Runs that a language model leads."""
+
+    problem = staticmethod(lag_problem)
+
+    def run(self, directory: Path) -> Result:
+        return falsify(self.problem(), llm=ScriptedChat(answer), budget=6, directory=directory)
+
+    def resume(self, directory: Path) -> Result:
+        return resume(directory, problems=[self.problem()], chat=ScriptedChat(answer))[0]
+
+
+def outcome(result: Result) -> tuple[object, ...]:
+    """What damage must not change: everything but times."""
+    seen = [(e.candidate.key, e.status, e.robustness, e.verdict) for e in result.evaluations]
+    found = result.counterexample
+    return result.status, result.reason, seen, found and (found.outcome, found.robustness, found.reference)
+
+
+def damaged(whole: Path, place: Path, random: Random) -> str:
+    """Copy a run directory and damage one file of the copy; say what was done."""
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(whole, place)
+    files = sorted(p for p in place.rglob("*") if p.is_file() and p.stat().st_size)
+    journal = place / "journal.jsonl"
+    path = journal if random.random() < 0.6 else random.choice(files)
+    if random.random() < 0.05:
+        path.unlink()
+        return f"{path.name} deleted"
+    damage = random.choice(DAMAGES)
+    for _ in range(random.choice((1, 1, 3))):
+        path.write_bytes(damage(path.read_bytes() or b"\0", random))
+    return f"{path.name}: {damage.__name__}"
+
+
+def one_line_of(error: FalsifierError) -> str:
+    """The message, which must be one line."""
+    text = str(error)
+    assert text and "\n" not in text and len(text) < 1000, text
+    return text
+
+
+@pytest.mark.parametrize("kind", [Numeric(), Standing(), Led()], ids=lambda kind: type(kind).__name__)
+@pytest.mark.parametrize("seed", range(4))
+def test_damage_ends_in_the_same_outcome_or_in_one_line(kind: Numeric, seed: int, tmp_path: Path) -> None:
+    whole, place = tmp_path / "whole", tmp_path / "damaged"
+    wanted = outcome(kind.run(whole))
+    random = Random(seed)
+    refused = 0
+    for _ in range(25):
+        what = damaged(whole, place, random)
+        try:
+            assert outcome(kind.resume(place)) == wanted, what
+            continue
+        except JournalError as error:
+            one_line_of(error)
+            refused += 1
+        try:
+            repair(place)
+        except JournalError as error:
+            assert "manifest" in one_line_of(error), what
+            continue
+        assert outcome(kind.resume(place)) == wanted, f"{what}, repaired"
+        assert load_runs(place)[0].robustness.tolist() == load_runs(whole)[0].robustness.tolist(), what
+        assert repair(place) == [], "once repaired, nothing is left to repair"
+    assert refused > 3
+
+
+def test_a_damaged_counterexample_file_is_never_another_counterexample(tmp_path: Path) -> None:
+    Numeric().run(tmp_path / "run")
+    path = tmp_path / "run" / FILE_NAME
+    whole, content = load_counterexample(path), path.read_bytes()
+    random = Random(5)
+    for _ in range(300):
+        path.write_bytes(random.choice((flip, cut, lose_line, double_line, blank))(content, random))
+        try:
+            assert load_counterexample(path) == whole
+        except SpecError as error:
+            one_line_of(error)
+
+
+def test_a_doubled_and_a_lost_line_shift_no_verdict(tmp_path: Path) -> None:
+    Standing().run(tmp_path)
+    path = tmp_path / "journal.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    for wrong in ([*lines[:4], lines[3], *lines[4:]], [*lines[:3], *lines[4:]]):
+        path.write_bytes(b"".join(wrong))
+        with pytest.raises(JournalError, match="lines are missing or doubled"):
+            Standing().resume(tmp_path)
+
+
+def test_a_damaged_trajectory_counts_as_missing(tmp_path: Path) -> None:
+    wanted = outcome(Standing().run(tmp_path))
+    paths = sorted((tmp_path / "trajectories").iterdir())
+    assert len(paths) == 8
+    for path in paths:
+        path.write_bytes(flip(path.read_bytes(), Random(1)))
+    assert outcome(Standing().resume(tmp_path)) == wanted
+    assert len(repair(tmp_path)) == 8
+    assert not list((tmp_path / "trajectories").glob("*.npz"))
+
+
+def test_a_journal_without_its_manifest_is_refused(tmp_path: Path) -> None:
+    Standing().run(tmp_path)
+    (tmp_path / "manifest.json").unlink()
+    with pytest.raises(JournalError, match=r"contains no manifest\.json"):
+        Standing().resume(tmp_path)
+    with pytest.raises(JournalError, match="a journal without its manifest"):
+        Standing().run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"[]", b"{}", b"\xff\xfe", b"null", b"[" * 100_000, b'{"a": ' + b"9" * 5000 + b"}"]
+)
+def test_a_manifest_that_is_none_gives_one_line(content: bytes, tmp_path: Path) -> None:
+    Standing().run(tmp_path)
+    (tmp_path / "manifest.json").write_bytes(content)
+    attempts: tuple[Callable[[Path], object], ...] = (Standing().resume, load_runs, repair)
+    for attempt in attempts:
+        with pytest.raises(JournalError, match=r"manifest\.json is damaged") as error:
+            attempt(tmp_path)
+        one_line_of(error.value)
+
+
+def test_a_damaged_run_costs_itself_and_not_its_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work_in_threads(monkeypatch)
+    wanted = request("hard", "impossible", seeds=2, budget=10)
+    run_campaign(wanted, tmp_path / "whole")
+    random = Random(11)
+    runs = sorted((tmp_path / "whole" / "runs").iterdir())
+    for name in ("manifest.json", "journal.jsonl"):
+        shutil.rmtree(tmp_path / "c", ignore_errors=True)
+        shutil.copytree(tmp_path / "whole", tmp_path / "c")
+        path = tmp_path / "c" / "runs" / runs[0].name / name
+        path.write_bytes(flip(path.read_bytes()[:-3], random) + path.read_bytes()[-3:])
+        with pytest.raises(JournalError):
+            load_runs(tmp_path / "c")
+        done = CliRunner().invoke(cli, ["repair", str(tmp_path / "c")])
+        assert done.exit_code == 0, done.output
+        resume_campaign(tmp_path / "c")
+        assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
+
+
+def test_a_dropped_evaluation_of_a_finished_run_is_repeated_by_its_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work_in_threads(monkeypatch)
+    run_campaign(request("hard", seeds=1, budget=40), tmp_path)
+    (run,) = (tmp_path / "runs").iterdir()
+    wanted = outcomes(tmp_path)
+    assert wanted[0][1] == "falsified"
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    first = next(i for i, line in enumerate(lines) if b'"kind":"evaluated"' in line)
+    lines[first] = flip(lines[first][60:-2], Random(1)).join([lines[first][:60], lines[first][-2:]])
+    (run / "journal.jsonl").write_bytes(b"".join(lines))
+    repair(run)
+    assert outcomes(tmp_path) != wanted
+    resume_campaign(tmp_path)
+    assert outcomes(tmp_path) == wanted
+
+
+def test_a_damaged_campaign_file_gives_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    work_in_threads(monkeypatch)
+    run_campaign(request("impossible", seeds=1, budget=2), tmp_path)
+    path = tmp_path / "campaign.json"
+    content = path.read_bytes()
+    for seed in range(30):
+        path.write_bytes(Random(seed).choice((flip, cut, lose_line, blank))(content, Random(seed)))
+        if path.read_bytes().split() == content.split():
+            continue
+        with pytest.raises(JournalError, match=r"campaign\.json") as error:
+            load_runs(tmp_path)
+        one_line_of(error.value)

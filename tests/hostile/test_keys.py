@@ -1,0 +1,98 @@
+"""Keys stay where they belong: whatever repeats them, neither records nor terminal nor FMUs see them."""
+
+import json
+import string
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from falsifier.core.secrets import redact, redact_held
+from falsifier.fmu.environment import worker_environment
+from tests.command import Done, falsifier
+from tests.hostile.servers import Behaviour, answers, completion, misbehaving, response, sends
+
+KEY = "an-ordinary-looking-key"
+OTHER = "another-plain-value"
+LETTERS = string.ascii_letters + string.digits
+PREFIXES = ["sk-", "hf_", "gsk_", "xai-", "nvapi-", "pplx-", "github_pat_", "ghp_", "glpat-", "xoxb-"]
+KEYS = st.tuples(st.sampled_from(PREFIXES), st.text(LETTERS, min_size=20, max_size=60)).map("".join)
+NAMES = st.tuples(
+    st.sampled_from(["", "MY_", "my", "A_B_"]),
+    st.sampled_from(
+        ["API_KEY", "TOKEN", "SECRET", "PASSWORD", "PASS", "PASSPHRASE", "JWT", "CREDENTIALS", "ACCESS_KEY"]
+    ),
+    st.sampled_from(["", "_1", "S"]),
+).map("".join)
+TEXTS = st.text(st.sampled_from(" .,;:'\"()\n=äx"), max_size=5)
+
+
+@given(NAMES, st.text(LETTERS, min_size=1))
+def test_no_variable_with_the_name_of_a_secret_reaches_an_fmu(name: str, value: str) -> None:
+    assert name not in worker_environment({name: value})
+
+
+@given(KEYS)
+def test_no_variable_with_the_value_of_a_key_reaches_an_fmu(key: str) -> None:
+    assert "PLAIN" not in worker_environment({"PLAIN": key, "ADDRESS": f"https://me:{key}@host"})
+
+
+@given(KEYS, TEXTS, TEXTS)
+def test_well_known_keys_are_removed_from_any_message(key: str, before: str, after: str) -> None:
+    assert key not in redact(f"{before} {key} {after}")
+
+
+@given(st.text(LETTERS + "-_+/=. ", min_size=6, max_size=60), TEXTS)
+def test_a_given_secret_is_removed_from_any_text(secret: str, around: str) -> None:
+    if len(secret.strip()) >= 6:
+        assert secret.strip() not in redact_held(f"{around}{secret}{around}", [secret]).replace(
+            "[redacted]", ""
+        )
+
+
+def run(behaviour: Behaviour, folder: Path) -> Done:
+    """A run with an LLM whose server does this, with keys in the environment."""
+    with misbehaving(behaviour) as server:
+        return falsifier(
+            *("run", "AT1", "--llm", "openai/m", "--api-base", server.url, "--variant", "MP4"),
+            *("--budget", "2", "--out", "run", "--no-cache"),
+            cwd=folder,
+            env={"OPENAI_API_KEY": KEY, "MY_PASSWORD": OTHER},
+        )
+
+
+def recorded(folder: Path) -> str:
+    return "".join(p.read_text("utf-8", "replace") for p in folder.rglob("*.json*"))
+
+
+SIGNALS = [{"name": "throttle", "values": [1] * 7}, {"name": "brake", "values": [1] * 3}]
+REPEATS: dict[str, Behaviour] = {
+    "a rationale": answers(json.dumps({"rationale": f"{KEY}, {OTHER}", "signals": SIGNALS})),
+    "a rejected reply": answers(f"your key is {KEY} and your password is {OTHER}"),
+    "a refusal": sends(
+        response(json.dumps({"error": {"message": f"bad {KEY} {OTHER}"}}).encode(), status="401 X")
+    ),
+    "an error": sends(response(f"<html>{KEY} {OTHER}".encode(), status="418 X")),
+    "a name": sends(response(completion("").replace(b'"m"', f'"{KEY}{OTHER}"'.encode()))),
+    "a redirect": sends(response(b"", status="302 X", headers=f"location: http://{KEY}.{OTHER}/\r\n")),
+}
+
+
+@pytest.mark.parametrize("where", REPEATS)
+def test_a_key_that_is_repeated_is_neither_recorded_nor_shown(tmp_path: Path, where: str) -> None:
+    done = run(REPEATS[where], tmp_path)
+    seen = done.out + done.err + recorded(tmp_path)
+    assert "openai/m" in seen
+    assert KEY not in seen and OTHER not in seen
+    if where == "a rationale":
+        assert "[redacted], [redacted]" in recorded(tmp_path)
+
+
+def test_what_a_model_says_cannot_act_on_the_terminal(tmp_path: Path) -> None:
+    reply = json.dumps({"rationale": "\x1b]0;owned\x07\x1b[2Jplain\u202e", "signals": SIGNALS})
+    done = run(answers(reply), tmp_path)
+    assert '"rationale":"plain"' in recorded(tmp_path).replace('": "', '":"')
+    seen = done.out + done.err
+    assert "samples" in seen or "simulation" in seen
+    assert "owned" not in seen and "\x1b[2J" not in seen and "\u202e" not in seen

@@ -1,0 +1,159 @@
+"""Prices, counts and dates that cannot be true: no limit of a run is lifted by them."""
+
+import math
+from datetime import UTC, datetime, timedelta
+from email.utils import format_datetime
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from falsifier.engines.llm import make_llm_engine
+from falsifier.errors import SpecError
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.failures import TransientChatError, classify
+from falsifier.llm.messages import ChatRequest, Message
+from falsifier.llm.usage import Price, usage_of
+from falsifier.search.budget import Budget
+from falsifier.search.request import LLMSettings
+from falsifier.search.result import Result
+from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
+from tests.command import falsifier
+from tests.hostile.servers import Behaviour, answers, misbehaving
+
+REQUEST = ChatRequest(messages=(Message(role="user", content="a question of some words"),))
+WRONG_PRICES = ["nan:nan", "nan:1", "1:inf", "-1:2", "0.25:-2", "-inf:0"]
+WRONG_COUNTS = [-1, -(10**9), 10**15, 0.5, math.nan, math.inf, True, "100", [], {}]
+ANYTHING = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=4),
+    st.lists(st.integers(), max_size=2),
+)
+
+
+@pytest.mark.parametrize("price", WRONG_PRICES)
+def test_a_price_that_lifts_the_limit_on_the_cost_is_refused(price: str, tmp_path: Path) -> None:
+    sent, received = map(float, price.split(":"))
+    with pytest.raises(SpecError, match="finite, non-negative"):
+        Price(sent, received)
+    with pytest.raises(ValidationError):
+        LLMSettings(name="openai/m", price=(sent, received))
+    result = falsifier("run", "AT1", "--llm", "openai/m", "--budget", "1", "--price", price, cwd=tmp_path)
+    assert result.code == 2
+    assert f"--price {price}: prices must be finite and not negative" in result.err
+
+
+@given(st.sampled_from(["seconds", "cost"]), st.floats())
+def test_a_limit_is_positive_and_finite_or_refused(name: str, limit: float) -> None:
+    if 0 < limit < math.inf:
+        Budget(**{name: limit})  # type: ignore[arg-type]
+    else:
+        with pytest.raises(SpecError, match=f"budget: {name}: expected a (positive|finite) number, got"):
+            Budget(**{name: limit})  # type: ignore[arg-type]
+
+
+@given(st.sampled_from(["simulations", "tokens"]), st.one_of(st.integers(), st.floats()))
+def test_a_number_of_things_is_whole_and_positive_or_refused(name: str, limit: float) -> None:
+    if isinstance(limit, int) and limit >= 1:
+        Budget(**{name: limit})
+    else:
+        with pytest.raises(SpecError, match=f"budget: {name}: expected a whole number, at least 1, got"):
+            Budget(**{name: limit})  # type: ignore[arg-type]
+
+
+@given(ANYTHING, ANYTHING, ANYTHING, ANYTHING)
+def test_whatever_is_reported_the_usage_is_possible(
+    sent: Any, received: Any, reasoning: Any, cost: Any
+) -> None:
+    reported = SimpleNamespace(
+        prompt_tokens=sent,
+        completion_tokens=received,
+        completion_tokens_details=SimpleNamespace(reasoning_tokens=reasoning),
+    )
+    usage = usage_of(reported, request=REQUEST, text="a reply", price=None, reported_cost=cost)
+    assert usage.prompt_tokens >= 0 and usage.completion_tokens >= 0
+    assert usage.prompt_tokens + usage.completion_tokens > 0
+    assert 0 <= usage.reasoning_tokens <= usage.completion_tokens
+    assert usage.cost is None or 0 <= usage.cost < math.inf
+
+
+@pytest.mark.parametrize("count", WRONG_COUNTS)
+def test_a_count_that_cannot_be_true_is_estimated(count: Any) -> None:
+    reported = SimpleNamespace(prompt_tokens=count, completion_tokens=count)
+    usage = usage_of(reported, request=REQUEST, text="x" * 40, price=Price(1.0, 1.0), reported_cost=None)
+    assert (usage.prompt_tokens, usage.completion_tokens, usage.estimated) == (6, 10, True)
+    assert usage.cost == pytest.approx(0.016)
+
+
+def run(behaviour: Behaviour, **budget: Any) -> tuple[Result, int]:
+    """Outcome of a run and the number of requests that it made."""
+    problem = lag_problem()
+    with misbehaving(behaviour) as server:
+        chat = LiteLLMChat("openai/m", api_base=server.url, price=Price(1.0, 1.0))
+        result = falsify(problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(**budget))
+        return result, len(server.requests)
+
+
+def test_nothing_is_asked_again_beyond_the_limit_on_the_tokens() -> None:
+    result, requests = run(answers("no candidate"), tokens=130)
+    assert (result.status, requests) == ("not falsified", 1)
+    assert "130 tokens" in result.reason
+
+
+def test_nothing_is_asked_again_beyond_the_limit_on_the_cost() -> None:
+    result, requests = run(answers("no candidate"), cost=0.13)
+    assert (result.status, requests) == ("not falsified", 1)
+
+
+def test_negative_counts_of_a_server_do_not_extend_a_run() -> None:
+    result, requests = run(
+        answers("no candidate", prompt_tokens=-1000, completion_tokens=-1000, total_tokens=-2000), tokens=1
+    )
+    assert (result.status, requests) == ("not falsified", 1)
+    assert result.spent.tokens > 0
+
+
+def stated(value: str, **headers: str) -> float | None:
+    """Seconds that are waited after a refusal with this Retry-After."""
+    error = ConnectionError("busy")
+    error.headers = {"retry-after": value, **headers}  # type: ignore[attr-defined]
+    found = classify(error, llm="openai/m", api_base=None, key_variables=(), secrets=())
+    assert isinstance(found, TransientChatError)
+    return found.retry_after
+
+
+NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
+
+
+def test_a_date_is_when_to_ask_again_by_the_servers_clock() -> None:
+    later = format_datetime(NOW + timedelta(seconds=70), usegmt=True)
+    assert stated(later, date=format_datetime(NOW, usegmt=True)) == 70.0
+
+
+def test_a_date_without_the_servers_clock_is_compared_with_this_machines() -> None:
+    later = format_datetime(datetime.now(UTC) + timedelta(hours=10), usegmt=True)
+    found = stated(later)
+    assert found is not None and 9 * 3600 < found <= 10 * 3600
+
+
+def test_a_date_in_the_past_is_now() -> None:
+    assert stated(format_datetime(NOW, usegmt=True)) == 0.0
+
+
+@pytest.mark.parametrize(("value", "seconds"), [("7", 7.0), ("-5", 0.0), ("nan", None), ("inf", None)])
+def test_a_number_is_taken_if_it_is_one(value: str, seconds: float | None) -> None:
+    assert stated(value) == seconds
+
+
+@given(st.text(max_size=40), st.text(max_size=40))
+def test_any_text_is_a_time_to_wait_or_none(value: str, date: str) -> None:
+    found = stated(value, date=date)
+    assert found is None or 0 <= found < math.inf

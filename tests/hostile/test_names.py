@@ -1,0 +1,244 @@
+"""Names come from files that others wrote: no writer turns one into a path, code, a formula or markup."""
+
+import ast
+import csv
+import json
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from falsifier.campaigns.analysis import load, read_published
+from falsifier.campaigns.analysis.tables import TABLES
+from falsifier.campaigns.archcomp import export as arch_comp
+from falsifier.campaigns.plan import run_name
+from falsifier.core.candidate import Candidate
+from falsifier.core.files import file_name
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.signals import Signal
+from falsifier.counterexamples.export import export_counterexample
+from falsifier.counterexamples.export.tables import matlab_names
+from falsifier.counterexamples.store import Database, file_of, to_store
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
+from falsifier.problem.starter import starter_spec
+from falsifier.search.request import RunRequest
+from falsifier.search.result import Result
+from falsifier.search.run import falsify
+from falsifier.stl import parse
+from falsifier.stl.names import name_text
+from falsifier.testing import lag_problem
+from falsifier.views.plotting import plot_evaluation, save_figure
+from falsifier.views.report import html_report, junit_report, markdown_report
+from falsifier.views.text import result_json, result_text, results_text
+from tests.counterexamples.export.support import confirmed
+from tests.hostile.names import HOSTILE, names
+
+PLAIN = "plain"
+hostile = pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))
+
+
+# -- one function per language ----------------------------------------------------------------------------
+
+
+@given(names)
+def test_file_names_are_one_component(name: str) -> None:
+    made = file_name(name)
+    assert made not in ("", ".", "..") and len(made.encode()) < 200
+    assert Path(made).name == made and not re.search(r'[\\/:*?"<>|\0-\x1f]', made)
+    assert not made.startswith("-")
+    assert file_name(made) == made or made != name
+
+
+@given(st.lists(names, unique=True))
+def test_different_names_are_different_files(several: list[str]) -> None:
+    assert len({file_name(name) for name in several}) == len(several)
+    assert len(set(matlab_names(several).values())) == len(several)
+    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name) for name in matlab_names(several).values())
+
+
+@given(names)
+def test_formulas_name_signals_of_any_name(name: str) -> None:
+    if not name or "\0" in name:
+        return
+    assert set(parse(f"{name_text(name)} <= 1").signals) == {name}
+
+
+# -- what a run writes ------------------------------------------------------------------------------------
+
+
+def named(name: str, stl: str = "G[0,10] (x <= 0.9)") -> Problem:
+    return lag_problem(stl, name=name)
+
+
+def written(directory: Path) -> set[str]:
+    return {p.relative_to(directory).as_posix() for p in directory.rglob("*")}
+
+
+@hostile
+def test_runs_stay_in_their_directory(name: str, tmp_path: Path) -> None:
+    if "\ud800" in name:
+        pytest.skip("no spec file can contain it")
+    place = tmp_path / "here" / "out"
+    other = replace(named("other"), experiment=replace(named("other").experiment, tolerance=1e-3))
+    several = falsify([named(name), other], "corners", budget=1, directory=place)
+    assert written(tmp_path / "here").isdisjoint(HOSTILE)
+    assert {p.name for p in tmp_path.iterdir()} == {"here"}
+    assert {p.name for p in (tmp_path / "here").iterdir()} == {"out"}
+    assert all(r.directory is not None and r.directory.parent == place for r in several)
+    found = several[0].counterexample
+    assert found is not None
+    stored = Database(place / "store").save(named(name), to_store(found))
+    assert stored.parent.parent == place / "store"
+    assert Path(file_of(name)).name == file_of(name)
+    source = ProblemSource(target=f"specs/AT.toml:{name}")
+    assert Path(run_name(RunRequest(problems=(source,)))).name == run_name(RunRequest(problems=(source,)))
+
+
+def recorded(name: str, directory: Path) -> Result:
+    return falsify(named(name), "corners", budget=3, directory=directory)
+
+
+class _Tags(HTMLParser):
+    """Elements and the names of their attributes, in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[tuple[str, tuple[str, ...]]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, tuple(key for key, _ in attrs)))
+
+
+def tags(page: str) -> list[tuple[str, tuple[str, ...]]]:
+    parser = _Tags()
+    parser.feed(page)
+    return parser.seen
+
+
+@pytest.fixture(scope="module")
+def plain_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("plain") / "run"
+    recorded(PLAIN, directory)
+    return directory
+
+
+@hostile
+def test_reports_show_names_as_text(name: str, tmp_path: Path, plain_run: Path) -> None:
+    if "\ud800" in name:
+        pytest.skip("no spec file can contain it")
+    directory = tmp_path / "run"
+    result = recorded(name, directory)
+    assert tags(html_report(directory)) == tags(html_report(plain_run))
+    assert len(markdown_report(directory).splitlines()) == len(markdown_report(plain_run).splitlines())
+    junit = ElementTree.fromstring(junit_report(directory))
+    assert [e.tag for e in junit.iter()] == ["testsuites", "testsuite", "testcase", "failure"]
+    for make in TABLES.values():
+        table = make(load(directory), read_published())
+        cells = [cell for row in csv.reader(table.csv().splitlines()) for cell in row]
+        assert not [cell for cell in cells if re.match(r"[=+@]|-[^\d.]", cell)]
+        plain_table = make(load(plain_run), read_published())
+        assert len(table.text().splitlines()) == len(plain_table.text().splitlines())
+        assert len(table.markdown().splitlines()) == len(plain_table.markdown().splitlines())
+    rows = list(csv.reader(arch_comp(directory).splitlines()))
+    assert len(rows) == 2 and not re.match("[=+@]", rows[1][1])
+    for text in (result_text(result), results_text([result, result])):
+        assert not re.search("[\0-\x08\x0b-\x1f\x7f]", text)
+    plain_result = falsify(named(PLAIN), "corners", budget=3)
+    assert len(result_text(replace(result, directory=None)).splitlines()) == len(
+        result_text(plain_result).splitlines()
+    )
+    assert json.loads(json.dumps(result_json(result)))["requirement"] == name
+
+
+@pytest.mark.parametrize("name", ["$\\frac{a}{b$", "x" * 5000, "a\nb\x1b[2J", "漢字\u202e"])
+def test_pictures_are_drawn_whatever_the_name(name: str, tmp_path: Path) -> None:
+    found = falsify(named(name), "corners", budget=3).counterexample
+    assert found is not None
+    save_figure(plot_evaluation(found.problem, found.evaluation), tmp_path / "x.png")
+    assert (tmp_path / "x.png").stat().st_size > 1000
+
+
+# -- scripts for other tools ------------------------------------------------------------------------------
+
+
+def shape(script: str) -> list[str]:
+    """A Python script without the content of its strings and without the names of its functions."""
+    tree = ast.parse(script)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            node.value = ""
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            node.name = "test_"
+    return ast.dump(tree).split()
+
+
+def statements(script: str) -> str:
+    """An OpenModelica script without comments and the content of its strings."""
+    lines = [line for line in script.splitlines() if not line.startswith("//")]
+    return re.sub(r'"(?:[^"\\]|\\.)*"', '""', "\n".join(lines))
+
+
+@pytest.fixture(scope="module")
+def transmission() -> Iterator[tuple[Problem, Evaluation]]:
+    problem = load_problem("AT1")
+    inputs = {"throttle": Signal((0.0,), (100.0,)), "brake": Signal((0.0,), (0.0,))}
+    yield problem, evaluate(problem, Candidate(inputs))
+    problem.model.close()
+
+
+def exported(name: str, given: tuple[Problem, Evaluation], directory: Path) -> dict[str, str]:
+    problem = replace(given[0], requirement=replace(given[0].requirement, name=name))
+    stored = to_store(confirmed(problem, given[1])).model_copy(
+        update={"problem": ProblemSource(target=f"AT.toml:{name}")}
+    )
+    files = export_counterexample(problem, stored, given[1], directory)
+    assert {p.parent for p in files} == {directory}
+    return {p.name: p.read_text(encoding="utf-8") for p in files if p.suffix in (".py", ".mos")}
+
+
+@pytest.mark.parametrize("name", [n for n in HOSTILE if "\ud800" not in n])
+def test_exported_scripts_contain_names_as_text(
+    name: str, transmission: tuple[Problem, Evaluation], tmp_path: Path
+) -> None:
+    scripts = exported(name, transmission, tmp_path / "hostile")
+    plain = exported(PLAIN, transmission, tmp_path / "plain")
+    assert len(scripts) == len(plain) == 3
+    for ours, theirs in zip(sorted(scripts.items()), sorted(plain.items()), strict=True):
+        if ours[0].endswith(".py"):
+            assert shape(ours[1]) == shape(theirs[1])
+        else:
+            assert statements(ours[1]) == statements(theirs[1])
+
+
+@given(names, names, names)
+def test_starter_specs_of_any_fmu_are_toml(name: str, text: str, unit: str) -> None:
+    if not name or re.search("[\0\ud800-\udfff]", name):
+        return
+    variables = (
+        Variable(name, causality="input", unit=unit, description=text),
+        Variable(f"{name}y", causality="output", description=text),
+        Variable(f"{name}p", causality="parameter", start=1.0, unit=unit, settable=True),
+    )
+    info = ModelInfo(name, text, variables=variables, interfaces=("co-simulation",))
+    spec = tomllib.loads(starter_spec(Path("some.fmu"), info))
+    assert set(spec["inputs"]) == {name}
+    assert set(spec) <= {"model", "inputs", "parameters", "requirements"}
+
+
+@given(names)
+def test_shell_commands_are_one_word_per_argument(name: str) -> None:
+    from falsifier.views.report.content import run_command
+
+    request = RunRequest(problems=(ProblemSource(target=f"AT.toml:{name}"),))
+    assert f"AT.toml:{name}" in shlex.split(run_command(request))

@@ -1,0 +1,178 @@
+"""Replies that an LLM should not send: rejected with a reason, in a time proportional to their length."""
+
+import json
+import time
+from collections.abc import Callable
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
+from falsifier.llm.incoming import LONGEST_REPLY
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.replies import ReplyForm
+from falsifier.llm.scripted import ScriptedChat
+
+FREE = Freedom(max_control_points=50, min_interval=0.1)
+SPACE = SearchSpace(
+    (InputRange("u", -1.0, 1.0, control_points=3, interpolation="linear", hold=None, free=FREE),),
+    (ParameterRange("k", 0.0, 2.0),),
+    10.0,
+)
+FORM = ReplyForm(SPACE, free=True)
+QUESTION = ChatRequest(messages=(Message(role="user", content="?"),), reply_schema=FORM.schema())
+# Reading a megabyte takes well under a second; with a time that grows with the square of the length, hours.
+CPU_SECONDS = 60.0
+
+
+def filled(unit: str) -> Callable[[int], str]:
+    return lambda size: unit * (size // len(unit))
+
+
+def inside(before: str, unit: str, after: str) -> Callable[[int], str]:
+    return lambda size: before + unit * ((size - len(before) - len(after)) // len(unit)) + after
+
+
+VALUES = '{"rationale": "", "signals": [{"name": "u", "values": [%s]}], "parameters": []}'
+NUMBER = VALUES.split("%s")
+LONG = {
+    "thoughts that begin": filled("<think>"),
+    "thoughts that end": filled("</think>"),
+    "thoughts": filled("<think></think>"),
+    "points that begin": filled("<point>"),
+    "points that end": filled("</point>"),
+    "points": filled("<point>1</point>"),
+    "empty points": filled("<point></point>"),
+    "objects that begin": filled('{"'),
+    "objects in objects": filled('{"a":'),
+    "objects that break": filled('{"a" '),
+    "objects of lines": filled('{"\n'),
+    "lists in lists": inside('{"signals":', "[", ""),
+    "empty objects": filled("{}"),
+    "candidates": inside('{"candidates":[', '{"point":[1,2]},', '{"point":[1]}]}'),
+    "wrong candidates": inside('{"candidates":[', '{"signals":7},', "{}]}"),
+    "braces": filled("{"),
+    "spaces after braces": inside("{", " ", "x"),
+    "quotes": filled('"'),
+    "digits in a string": inside(f'{NUMBER[0]}"', "1", f'x"{NUMBER[1]}'),
+    "a run of digits": inside(f'{NUMBER[0]}"1 x ', "1", f'"{NUMBER[1]}'),
+    "spaces in a run": inside(f'{NUMBER[0]}"1', " ", f'x"{NUMBER[1]}'),
+    "an integer": inside(NUMBER[0], "9", NUMBER[1]),
+    "a fraction": inside(f"{NUMBER[0]}0.", "9", NUMBER[1]),
+    "an exponent": inside(f"{NUMBER[0]}1e", "9", NUMBER[1]),
+    "numbers": inside(NUMBER[0], "1,", f"1{NUMBER[1]}"),
+    "runs": inside(NUMBER[0], '"1 x 99999",', f"1{NUMBER[1]}"),
+    "strings": inside(NUMBER[0], '"no",', f"1{NUMBER[1]}"),
+    "a point of digits": inside("<point>", "1", "</point>"),
+    "a point of numbers": inside("<point>", "1 ", "</point>"),
+    "a point of brackets": inside("<point>", "[", "</point>"),
+    "signals": inside('{"signals":[', '{"name":"u","values":[1]},', '{"name":"v","values":[]}]}'),
+    "parameters": inside('{"parameters":[', '{"name":"k","value":1},', '{"name":"k","value":"x"}]}'),
+    "names": inside('{"signals":[{"name":"', "u", '","values":[1]}]}'),
+    "rationale": inside('{"rationale":"', "\\u001b[31m", '"}'),
+    "unknown keys": lambda size: json.dumps({str(i): i for i in range(size // 16)} | {"signals": 1}),
+    "escapes": inside('{"', "\\u0000", '":1,"signals":[]}'),
+    "emptiness": filled(" \n"),
+}
+
+
+@pytest.mark.parametrize("reply", LONG)
+@pytest.mark.parametrize("size", [100_000, LONGEST_REPLY - 1])
+def test_the_time_to_read_a_reply_grows_with_its_length(reply: str, size: int) -> None:
+    text = LONG[reply](size)
+    started = time.thread_time()
+    try:
+        found = FORM.read_each(text)
+    except RejectedReplyError as rejection:
+        found = [rejection]
+    assert time.thread_time() - started < CPU_SECONDS
+    assert all(len(str(one)) < 1000 for one in found if isinstance(one, RejectedReplyError))
+
+
+NUMBERS = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True).map(repr),
+    st.integers().map(str),
+    st.integers(4000, 6000).map(lambda n: "9" * n),
+    st.integers(300, 5000).map(lambda n: f"1e{'9' * (n // 100)}"),
+    st.sampled_from(
+        ["-0", "1e999", "NaN", "-Infinity", "null", "true", '"1"', '"0 x 3"', '"1 x -1"', "[1, 2]"]
+    ),
+    st.integers(1, 6000).map(lambda n: f'"1 x {"1" * n}"'),
+    st.integers(1, 6000).map(lambda n: f'"{"1" * n} x 2"'),
+    st.text(max_size=5).map(json.dumps),
+)
+LISTS = st.lists(NUMBERS, max_size=5).map(lambda found: f"[{', '.join(found)}]")
+NAMES = st.one_of(
+    st.sampled_from(['"u"', '"k"', '""', "1", "null", "[]", "{}"]), st.text(max_size=4).map(json.dumps)
+)
+SIGNALS = st.one_of(
+    st.tuples(NAMES, LISTS).map(lambda s: f'{{"name": {s[0]}, "values": {s[1]}}}'),
+    st.tuples(LISTS, LISTS).map(lambda s: f'{{"name": "u", "times": {s[0]}, "values": {s[1]}}}'),
+    st.tuples(NAMES, LISTS).map(lambda s: f'{{"name": "u", "interpolation": {s[0]}, "values": {s[1]}}}'),
+    NUMBERS,
+    LISTS,
+)
+CANDIDATES = st.one_of(
+    st.lists(SIGNALS, max_size=3).map(lambda found: f'{{"signals": [{", ".join(found)}]}}'),
+    LISTS.map(lambda values: f'{{"signals": {{"u": {values}}}, "parameters": {{"k": 1}}}}'),
+    NUMBERS.map(
+        lambda value: f'{{"signals": [{{"name": "u", "values": [0]}}], "parameters": {{"k": {value}}}}}'
+    ),
+    LISTS.map(lambda values: f'{{"point": {values}}}'),
+    st.tuples(NUMBERS, LISTS).map(lambda two: f'{{"rationale": {two[0]}, "signals": {two[1]}}}'),
+)
+PIECES = st.one_of(
+    CANDIDATES,
+    st.lists(CANDIDATES, max_size=3).map(lambda found: f'{{"candidates": [{", ".join(found)}]}}'),
+    st.sampled_from(
+        ["<think>", "</think>", "<point>", "</point>", "{", "}", "[", "]", '"', "\\", "```json\n"]
+    ),
+    st.integers(1, 3000).map(lambda n: '{"signals": ' + "[" * n),
+    NUMBERS,
+    st.text(st.characters(codec=None), max_size=10),
+)
+REPLIES = st.lists(PIECES, max_size=6).map(" ".join)
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
+@given(REPLIES)
+def test_any_reply_is_read_or_rejected_and_recorded(text: str) -> None:
+    exchanges: list[Exchange] = []
+    chat = ScriptedChat([ChatReply(text=text)] * 3)
+    try:
+        found = converse(chat, QUESTION, FORM.read, exchanges.append)
+    except NoValidReplyError:
+        assert len(exchanges) == 3
+        assert all(exchange.problem for exchange in exchanges)
+    else:
+        assert len(exchanges) == 1
+        assert found and all(isinstance(one, Candidate) for one in found)
+        assert all(abs(value) <= 1.0 for one in found for value in one.signals["u"].values)
+    for exchange in exchanges:
+        exchange.model_dump_json()
+
+
+def test_a_reply_longer_than_the_limit_is_rejected_and_not_recorded_in_full() -> None:
+    exchanges: list[Exchange] = []
+    good = '{"signals": [{"name": "u", "values": [0, 0, 0]}], "parameters": [{"name": "k", "value": 1}]}'
+    chat = ScriptedChat([ChatReply(text=good + " " * 10 * LONGEST_REPLY), ChatReply(text=good)])
+    converse(chat, QUESTION, FORM.read, exchanges.append)
+    assert exchanges[0].problem == f"the reply is too long, {LONGEST_REPLY} characters or more"
+    assert len(exchanges[0].model_dump_json()) < 2 * LONGEST_REPLY
+    assert len(exchanges[1].messages[-1].content) + len(exchanges[1].messages[-2].content) < 10_000
+
+
+def test_a_reply_that_breaks_the_reader_is_recorded_all_the_same() -> None:
+    exchanges: list[Exchange] = []
+
+    def read(text: str) -> None:
+        raise ZeroDivisionError("a defect")
+
+    with pytest.raises(ZeroDivisionError):
+        converse(ScriptedChat(["paid for"]), QUESTION, read, exchanges.append)
+    (recorded,) = exchanges
+    assert recorded.reply is not None
+    assert (recorded.reply.text, recorded.problem) == ("paid for", "ZeroDivisionError: a defect")

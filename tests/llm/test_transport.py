@@ -1,0 +1,78 @@
+import threading
+from contextvars import ContextVar
+
+import httpx
+import pytest
+
+from falsifier.llm.transport import RefusedReplyError, within
+from tests.hostile.servers import hangs, misbehaving, response, sends
+from tests.patience import HANG
+
+PLACE: ContextVar[str] = ContextVar("PLACE", default="nowhere")
+
+
+def test_it_returns_what_the_action_returns() -> None:
+    assert within(HANG, lambda: 7) == 7
+
+
+def test_it_raises_what_the_action_raises() -> None:
+    with pytest.raises(ZeroDivisionError):
+        within(HANG, lambda: 1 // 0)
+
+
+def test_the_action_sees_the_callers_context() -> None:
+    token = PLACE.set("here")
+    try:
+        assert within(HANG, PLACE.get) == "here"
+    finally:
+        PLACE.reset(token)
+
+
+def test_an_action_that_does_not_return_is_given_up() -> None:
+    done = threading.Event()
+    try:
+        with pytest.raises(TimeoutError, match=r"no complete reply within 0\.05 s"):
+            within(0.05, done.wait)
+    finally:
+        done.set()
+
+
+def test_connections_are_cut_when_the_call_is_given_up() -> None:
+    with misbehaving(hangs()) as server:
+        with pytest.raises(TimeoutError):
+            within(0.5, lambda: httpx.Client(timeout=None).get(server.root))
+        assert server.gone.wait(HANG)
+
+
+def test_a_request_after_the_end_is_refused() -> None:
+    given_up, outcome = threading.Event(), list[object]()
+
+    def late() -> None:
+        given_up.wait(HANG)
+        try:
+            outcome.append(httpx.Client().get(server.root))
+        except httpx.HTTPError as error:
+            outcome.append(error)
+
+    with misbehaving(sends(response(b"{}"))) as server:
+        with pytest.raises(TimeoutError):
+            within(0.05, late)
+        given_up.set()
+        waiting = threading.Event()
+        while not outcome:
+            waiting.wait(0.01)
+        assert not server.requests
+    assert "the call has ended" in str(outcome[0])
+
+
+def test_a_length_above_the_limit_is_refused_before_it_is_read() -> None:
+    head = b"HTTP/1.1 200 OK\r\ncontent-length: 99999999999\r\n\r\n"
+    with misbehaving(hangs(head)) as server, pytest.raises(RefusedReplyError, match="more than 16 MiB"):
+        within(HANG, lambda: httpx.get(server.root, timeout=HANG))
+
+
+def test_requests_of_others_are_left_alone() -> None:
+    within(HANG, lambda: None)  # the transport is guarded from now on
+    with misbehaving(sends(response(b"{}"))) as server:
+        assert httpx.get(server.root).status_code == 200
+    assert b"identity" not in server.requests[0]

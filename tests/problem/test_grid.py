@@ -1,0 +1,74 @@
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.problem.grid import choose_grid, exact, formula_times
+from falsifier.problem.problem import Problem
+from tests.fmu.fixtures import path as fmu_path
+
+
+@pytest.mark.parametrize(
+    ("stop", "times", "fmu_step", "interval"),
+    [
+        (3.0, [1.0], None, 0.002),  # not 0.003 s, of which 1 s is no multiple
+        (50.0, [20.0], 0.01, 0.01),
+        (10.0, [0.25], 0.1, 0.05),
+        (10.0, [2.0], 0.0125, 0.0125),
+        (1.0, [1 / 3], None, 1 / 1002),
+        (0.7, [], 0.2, 0.1),
+        (15.0, [], 1 / 30, 1 / 30),  # divides it but for rounding
+        (10.0, [], 20.0, 0.01),  # longer than the simulation
+        (50.0, [], 0.0, 0.05),
+        (100.0, [200.0], None, 0.1),  # a time after the end is an error of the formula, not of the grid
+    ],
+)
+def test_the_grid_divides_all_times(
+    stop: float, times: list[float], fmu_step: float | None, interval: float
+) -> None:
+    grid = choose_grid(stop, times=times, fmu_step=fmu_step)
+    assert grid.interval == pytest.approx(interval, rel=1e-12)
+    for time in (stop, *(t for t in times if t <= stop)):
+        assert (
+            exact(time) % exact(grid.interval) == 0
+            or abs(time / grid.interval - round(time / grid.interval)) < 1e-9
+        )
+
+
+def test_the_grid_is_a_multiple_of_a_stated_step() -> None:
+    assert choose_grid(3.0, times=[1.0], step_size=0.001).interval == 0.002
+
+
+def test_the_reason_names_what_did_not_fit() -> None:
+    assert choose_grid(10.0, fmu_step=0.1).reason == "the FMU's step"
+    assert choose_grid(10.0, times=[0.25], fmu_step=0.1).reason == (
+        "the FMU's step 0.1 s does not divide the stop time 10 s and the formula's times 0.25 s; this does"
+    )
+
+
+def test_times_that_fit_no_reasonable_grid_are_an_error() -> None:
+    with pytest.raises(SpecError, match=r"no grid of at most 100000 intervals .* round these times"):
+        choose_grid(10.0, times=[3.14159265, 2.71828183])
+
+
+def test_times_are_those_that_were_meant() -> None:
+    assert exact(0.1) == Fraction(1, 10)
+    assert exact(1 / 3) == Fraction(1, 3)
+    assert formula_times(["G[0,1] (F[0.5,2] (x > 0))", "not a formula ("]) == [0.0, 1.0, 0.5, 2.0]
+
+
+def test_a_formula_fits_an_fmu_without_a_step() -> None:
+    problem = Problem.from_fmu(fmu_path("HugeLimits_2"), "G[0,1] (y <= 10)", inputs={"u": (-1.0, 1.0)})
+    assert problem.experiment.output_interval == pytest.approx(0.002)
+    assert any(
+        note.startswith("time grid of 0.002 s") and "the FMU specifies no step" in note
+        for note in problem.notes
+    )
+
+
+def test_a_stated_interval_that_does_not_fit_names_one_that_does(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"output_interval = 0\.25 fits all times"):
+        Problem.from_fmu(
+            fmu_path("Lag_2"), "G[0,0.75] (y <= 10)", inputs={"u": (-1.0, 1.0)}, output_interval=0.5
+        )

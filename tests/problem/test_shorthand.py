@@ -1,0 +1,84 @@
+from typing import Any
+
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.problem.shorthand import changes_from, changes_from_options, options_from
+from falsifier.problem.spec import InputSection
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("throttle=", "expected NAME="),
+        ("=0:1", "expected NAME="),
+        ("throttle=0:x", "'x' is not a number"),
+        ("throttle=0:1:many", "not a number of control points"),
+        ("throttle=0:1:3:cubic", "Known: pchip, linear, constant"),
+        ("throttle=1:0:3", "low < high"),
+    ],
+)
+def test_options_that_cannot_be_read_are_named(option: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        changes_from_options(inputs=[option])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"inputs": ["u=0:1:3"], "stop_time": 5.0},
+        {"inputs": ["u=-0.1:0.3:3:linear", "v=0.25", "w"], "parameters": ["p=1e-07", "q=0:0.1"]},
+        {"interface": "model-exchange", "output_interval": 0.01},
+        {},
+    ],
+)
+def test_changes_can_be_said_as_options_again(options: dict[str, Any]) -> None:
+    changes = changes_from_options(**options)
+    said: dict[str, Any] = {}
+    for name, value in options_from(changes):
+        key = {"--input": "inputs", "--param": "parameters"}.get(
+            name, name.removeprefix("--").replace("-", "_")
+        )
+        if key in ("inputs", "parameters"):
+            said.setdefault(key, []).append(value)
+        else:
+            said[key] = value
+    assert changes_from_options(**said) == changes
+
+
+def test_values_of_python_mean_the_same_as_options() -> None:
+    values = changes_from(
+        inputs={"a": 1, "b": (0, 2), "c": (0, 2, 7, "linear"), "d": None}, parameters={"p": 3, "q": (0, 1)}
+    )
+    options = changes_from_options(
+        inputs=["a=1", "b=0:2", "c=0:2:7:linear", "d"], parameters=["p=3", "q=0:1"]
+    )
+    assert values == options
+
+
+def test_a_section_says_all_that_a_spec_can() -> None:
+    section = InputSection(control_points=3, hold=0.05)
+    assert changes_from(inputs={"u": section}, parameters={}).inputs["u"] == section
+
+
+@pytest.mark.parametrize("value", ["1", (1,), (0, 1, 2, "linear", 4)])
+def test_values_that_mean_nothing_are_named(value: object) -> None:
+    with pytest.raises(SpecError, match=r"inputs\.u"):
+        changes_from(inputs={"u": value}, parameters={})  # type: ignore[dict-item]
+    if isinstance(value, str):
+        assert changes_from(inputs={}, parameters={"p": value}).parameters["p"].value == value  # a string
+        return
+    with pytest.raises(SpecError, match=r"parameters\.p"):
+        changes_from(inputs={}, parameters={"p": value})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"inputs": ["u=0:1:3", "v", "u"]}, "--input u: given twice"),
+        ({"parameters": ["p=1", "p=0:1"]}, "--param p: given twice"),
+    ],
+)
+def test_a_name_is_given_once(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        changes_from_options(**options)

@@ -1,0 +1,64 @@
+import io
+
+from rich.console import Console
+
+from falsifier.campaigns import Method, Progress, RunProgress
+from falsifier.search.budget import Spent
+from falsifier.views.campaign_progress import PlainScoreboard, Rate, _fitting, overall_line
+
+
+def run(name: str, seed: int, status: str, simulations: int = 0, best: float | None = None) -> RunProgress:
+    spent = Spent(simulations=simulations, calls=1, prompt_tokens=90, completion_tokens=10, cost=0.25)
+    return RunProgress(
+        name=f"{name}-{seed}",
+        requirement=name,
+        method=Method("uniform"),
+        seed=seed,
+        status=status,  # type: ignore[arg-type]
+        reason="",
+        best=best,
+        spent=spent,
+    )
+
+
+BEFORE = Progress((run("A", 0, "running", 3, 0.5), run("A", 1, "waiting"), run("B", 0, "waiting")))
+AFTER = Progress(
+    (run("A", 0, "falsified", 7, -0.5), run("A", 1, "running", 2, 0.1), run("B", 0, "failed", 1))
+)
+
+
+def test_plain_lines_say_each_end_once() -> None:
+    lines: list[str] = []
+    board = PlainScoreboard(lines.append)
+    for progress in (BEFORE, AFTER, AFTER):
+        board(progress)
+    assert lines == [
+        "3 runs, 0 already finished",
+        overall_line(BEFORE, None),
+        "[1/3] A uniform seed 0: falsified after 7 simulations, best robustness -0.5",
+        "[2/3] B uniform seed 0: failed after 1 simulation: ",
+    ]
+
+
+def test_the_overall_line_counts_everything() -> None:
+    assert overall_line(AFTER, 12.4) == (
+        "1/3 runs finished, 1 falsified, 1 failed, 1 running, 10 simulations (12/s), 300 tokens, "
+        "0.7500 US dollars"
+    )
+
+
+def test_the_rate_is_over_the_last_looks() -> None:
+    rate = Rate()
+    assert rate(BEFORE, 0.0) is None
+    assert rate(AFTER, 2.0) == 7 / 2.0
+    assert rate(AFTER, 30.0) is None, "what is long past does not count"
+
+
+def test_the_live_table_fits_the_terminal_and_keeps_what_runs() -> None:
+    runs = [run(f"R{i}", 0, "running" if i == 17 else "waiting", i, 1.0) for i in range(21)]
+    console = Console(file=io.StringIO(), width=100, height=10, force_terminal=True, color_system=None)
+    console.print(_fitting(Progress(tuple(runs)), 3.0, console))
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "R17" in shown
+    assert len(shown.splitlines()) <= 10
+    assert "0/21 runs finished" in shown
