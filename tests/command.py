@@ -47,11 +47,8 @@ def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None, fre
     """
     clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
     environment = clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "160"} | (env or {})
-    if not fresh and forker().lock.acquire(blocking=False):
-        try:
-            return _forked(arguments, cwd, environment)
-        finally:
-            forker().lock.release()
+    if not fresh:
+        return forked(["falsifier", *arguments], cwd, environment)
     done = subprocess.run(
         [sys.executable, "-c", "from falsifier.cli import main; main()", *arguments],
         cwd=cwd,
@@ -64,9 +61,11 @@ def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None, fre
     return Done(done.returncode, done.stdout, done.stderr)
 
 
-def _forked(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Done:
+def forked(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Done:
+    """Run ``falsifier`` or ``pytest`` in a copy of a process that has imported what is slow to import."""
     with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open() as nothing:
-        code = forker().run(arguments, folder, environment, nothing, out, err)
+        with forker().lock:
+            code = forker().run(command, folder, environment, nothing, out, err)
         texts = []
         for stream in (out, err):
             stream.seek(0)

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -33,6 +33,7 @@ _SLOW = (
     "matplotlib.figure",
     "matplotlib.font_manager",
     "numba",
+    "pytest",
     "rtamt",
     "scipy.interpolate",
     "scipy.optimize",
@@ -65,10 +66,10 @@ class Forker:
             )
 
     def run(
-        self, arguments: Sequence[str], folder: Path, environment: Mapping[str, str], *streams: IO[Any]
+        self, command: Sequence[str], folder: Path, environment: Mapping[str, str], *streams: IO[Any]
     ) -> int:
-        """Run a command with these three standard streams; return its exit code."""
-        request = {"arguments": arguments, "folder": str(folder), "environment": dict(environment)}
+        """Run ``falsifier`` or ``pytest`` with these three standard streams; return its exit code."""
+        request = {"command": command, "folder": str(folder), "environment": dict(environment)}
         socket.send_fds(self._socket, [json.dumps(request).encode()], [s.fileno() for s in streams])
         pid = self._receive()
         try:
@@ -133,16 +134,30 @@ def _become(request: dict[str, Any], streams: list[int]) -> None:
     os.chdir(request["folder"])
     os.environ.clear()
     os.environ.update(request["environment"])
-    sys.argv[1:] = request["arguments"]
+    sys.argv = request["command"]
+
+
+def _falsifier() -> NoReturn:
+    from falsifier.cli import main
+
+    main()
+    sys.exit()
+
+
+def _pytest() -> NoReturn:
+    import pytest
+
+    sys.exit(pytest.main())
+
+
+_PROGRAMS: dict[str, Callable[[], NoReturn]] = {"falsifier": _falsifier, "pytest": _pytest}
 
 
 def _run_and_end() -> NoReturn:
     """Run the command and end as an interpreter does, except that it does not take all modules apart."""
-    from falsifier.cli import main
-
     code = 0
     try:
-        main()
+        _PROGRAMS[sys.argv[0]]()
     except SystemExit as ending:
         code = ending.code if isinstance(ending.code, int) else int(ending.code is not None)
     except BaseException:

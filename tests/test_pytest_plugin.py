@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from tests.command import ROOT
-from tests.patience import HANG
+from tests.command import ROOT, Done, forked
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
 SPEC = """
@@ -32,19 +31,12 @@ formula = "G[0,20] (speed <= 500)"
 """
 
 
-def run_pytest(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def run_pytest(folder: Path, *arguments: str) -> Done:
     # Where the package is installed pytest finds the plugin itself, and must not be given it twice.
     installed = any(point.value == "pytest_falsifier" for point in entry_points(group="pytest11"))
     plugin = [] if installed else ["-p", "pytest_falsifier"]
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", *plugin, *arguments],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"},
-        capture_output=True,
-        text=True,
-        timeout=HANG,
-        check=False,
-    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    return forked(["pytest", *plugin, *arguments], folder, environment)
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +55,8 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     repository: Path,
 ) -> None:
     first = run_pytest(repository, "--falsifier", "specs", "-rA")
-    assert first.returncode == 1, first.stdout + first.stderr
-    assert "1 failed, 1 passed" in first.stdout
+    assert first.code == 1, first.out + first.err
+    assert "1 failed, 1 passed" in first.out
     for part in (
         "fast is violated by a counterexample found by a search",
         "throttle [%] constant 100",
@@ -72,33 +64,33 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
         "Throttle is necessary",
         "replay with    falsifier replay counterexamples/car.fast/",
     ):
-        assert part in first.stdout
-    pictures = [line.split()[-1] for line in first.stdout.splitlines() if line.startswith("  picture ")]
+        assert part in first.out
+    pictures = [line.split()[-1] for line in first.out.splitlines() if line.startswith("  picture ")]
     assert {OUTPUT, INPUT, CRITICAL} <= colours(repository / pictures[0])
     stored = list((repository / "counterexamples").rglob("*.json"))
     assert [p.parent.name for p in stored] == ["car.fast"]
     assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
     second = run_pytest(repository, "--falsifier", "specs", "-k", "fast")
-    assert "fast is violated by a stored counterexample" in second.stdout
-    assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").returncode == 5
+    assert "fast is violated by a stored counterexample" in second.out
+    assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").code == 5
 
 
 def test_distributed_tests_give_the_same(repository: Path) -> None:
     done = run_pytest(repository, "--falsifier", "specs", "-n", "2")
-    assert "1 failed, 1 passed" in done.stdout, done.stdout
+    assert "1 failed, 1 passed" in done.out, done.out
 
 
 def test_without_the_option_specs_are_no_tests(repository: Path) -> None:
-    assert run_pytest(repository, "specs").returncode == 5
+    assert run_pytest(repository, "specs").code == 5
 
 
 def test_a_broken_spec_is_an_error_that_names_the_key(repository: Path) -> None:
     broken = repository / "broken.toml"
     broken.write_text(SPEC.replace("control_points = 2", "control_pionts = 2"))
     done = run_pytest(repository, "--falsifier", "broken.toml")
-    assert done.returncode == 2
-    assert "inputs.throttle.control_pionts: unknown key; did you mean 'control_points'" in done.stdout
-    assert "Traceback" not in done.stdout
+    assert done.code == 2
+    assert "inputs.throttle.control_pionts: unknown key; did you mean 'control_points'" in done.out
+    assert "Traceback" not in done.out
 
 
 def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
@@ -127,10 +119,10 @@ def test_typo(falsifier_check):
 """
     )
     done = run_pytest(repository, "tests")
-    assert "1 failed, 4 passed" in done.stdout, done.stdout
-    assert "LAG is violated by a counterexample found by a search" in done.stdout
-    assert "replay with    pytest 'tests/test_lag.py::test_violated'" in done.stdout
-    assert "pytest_falsifier.py" not in done.stdout
+    assert "1 failed, 4 passed" in done.out, done.out
+    assert "LAG is violated by a counterexample found by a search" in done.out
+    assert "replay with    pytest 'tests/test_lag.py::test_violated'" in done.out
+    assert "pytest_falsifier.py" not in done.out
 
 
 def test_importing_the_plugin_loads_nothing_else() -> None:
@@ -172,7 +164,7 @@ def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None
     done = run_pytest(
         tmp_path, "--falsifier", "--falsifier-budget", "1", "--falsifier-engine", "corners", "-q"
     )
-    assert done.returncode == 1
-    assert "1 failed" in done.stdout
-    assert "\x1b" not in done.stdout and "Traceback" not in done.stdout
-    assert "the FMU's process crashed" in done.stdout
+    assert done.code == 1
+    assert "1 failed" in done.out
+    assert "\x1b" not in done.out and "Traceback" not in done.out
+    assert "the FMU's process crashed" in done.out
