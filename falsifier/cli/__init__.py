@@ -40,6 +40,7 @@ _EXHAUSTED = frozenset(
 # name: (module, summary in --help)
 _COMMANDS = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
+    "simulate": ("falsifier.cli.simulate", "Simulate your own inputs and judge the requirement."),
     "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
     "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
     "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),
