@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
     from falsifier.search import events
+    from falsifier.search.assurance import Assurance, Splitting, assess
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.events import Event, Listener
     from falsifier.search.request import LLMSettings
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
 
 _EXPORTS = {
     "AsksLLM": "falsifier.engines.protocol",
+    "Assurance": "falsifier.search.assurance",
     "Budget": "falsifier.search.budget",
     "CampaignRequest": "falsifier.campaigns",
     "Candidate": "falsifier.core.candidate",
@@ -122,11 +124,13 @@ _EXPORTS = {
     "Shrunk": "falsifier.counterexamples.shrink",
     "Signal": "falsifier.core.signals",
     "Spent": "falsifier.search.budget",
+    "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
     "Verdict": "falsifier.stl",
+    "assess": "falsifier.search.assurance",
     "confirm": "falsifier.evaluation.confirm",
     "connect": "falsifier.llm.connect",
     "cross": "falsifier.campaigns",
@@ -164,6 +168,7 @@ __all__ = [
     "ENGINES",
     "VARIANTS",
     "AsksLLM",
+    "Assurance",
     "Budget",
     "CampaignRequest",
     "Candidate",
@@ -201,12 +206,14 @@ __all__ = [
     "Shrunk",
     "Signal",
     "Spent",
+    "Splitting",
     "StoredCounterexample",
     "Trajectory",
     "Variable",
     "Verdict",
     "__version__",
     "analysis",
+    "assess",
     "confirm",
     "connect",
     "cross",

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search import manifest
+from falsifier.search.assurance import Assurance
 from falsifier.search.budget import Spent
 from falsifier.search.result import Result
 
@@ -116,6 +118,23 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "shortest_dwell": {
             name: signal.shortest_dwell for name, signal in evaluation.candidate.signals.items()
         },
+    }
+
+
+def assurance_json(found: Assurance) -> dict[str, Any]:
+    """Convert what random simulations say to a value that can be dumped as one JSON object."""
+    return {
+        "requirement": found.problem.name,
+        "formula": str(found.problem.requirement.formula),
+        "distribution": found.distribution,
+        "confidence": found.confidence,
+        "drawn": found.drawn,
+        "violations": found.violations,
+        "failures": found.failures,
+        "upper_bound": found.bound,
+        "interval": found.interval,
+        "smallest": evaluation_json(found.smallest),
+        "estimate": found.splitting and asdict(found.splitting),
     }
 
 
