@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from falsifier.search.assurance import Assurance, Splitting, assess
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.events import Event, Listener
+    from falsifier.search.margin import Margin, margin
     from falsifier.search.request import LLMSettings
     from falsifier.search.result import Result
     from falsifier.search.run import falsify, resume
@@ -107,6 +108,7 @@ _EXPORTS = {
     "InputRange": "falsifier.core.space",
     "LLMSettings": "falsifier.search.request",
     "Listener": "falsifier.search.events",
+    "Margin": "falsifier.search.margin",
     "Method": "falsifier.campaigns",
     "Model": "falsifier.core.model",
     "ModelInfo": "falsifier.core.model",
@@ -142,6 +144,7 @@ _EXPORTS = {
     "load_problems": "falsifier.problem.loading",
     "make_engine": "falsifier.engines",
     "make_llm_engine": "falsifier.engines.llm",
+    "margin": "falsifier.search.margin",
     "monitor_for": "falsifier.evaluation.evaluate",
     "parse": "falsifier.stl",
     "plot": "falsifier.views.plotting",
@@ -189,6 +192,7 @@ __all__ = [
     "InputRange",
     "LLMSettings",
     "Listener",
+    "Margin",
     "Method",
     "Model",
     "ModelInfo",
@@ -226,6 +230,7 @@ __all__ = [
     "load_problems",
     "make_engine",
     "make_llm_engine",
+    "margin",
     "monitor_for",
     "parse",
     "plot",

@@ -27,3 +27,17 @@ def test_violations_are_counted_and_decide_the_exit_code(tmp_path: Path) -> None
     low, high = done.json["interval"]
     assert low < done.json["violations"] / 100 < high
     assert "simulation 100 of at most 100" in done.err
+
+
+def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
+    vary = ["--vary", "G[0,10] (x <= {limit})", "--between", "0:3", "--engine", "corners"]
+    done = falsifier("margin", NEVER, *vary, "--budget", "40", "--json", cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert 0.95 < done.json["falsified"] < done.json["unfalsified"] < 1.05
+    assert "3: not falsified" in done.err
+
+
+def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
+    for wrong in (["--between", "100"], ["--between", "0:3", "--stl", "x <= 1"]):
+        done = falsifier("margin", NEVER, "--vary", "G[0,10] (x <= {limit})", *wrong, cwd=tmp_path)
+        assert done.code == 2 and ("--between 100" in done.err or "drop --stl" in done.err)
