@@ -70,8 +70,10 @@ if TYPE_CHECKING:
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
     from falsifier.search import events
+    from falsifier.search.assurance import Assurance, Splitting, assess
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.events import Event, Listener
+    from falsifier.search.margin import Margin, margin
     from falsifier.search.request import LLMSettings
     from falsifier.search.result import Result
     from falsifier.search.run import falsify, resume
@@ -83,6 +85,7 @@ if TYPE_CHECKING:
 
 _EXPORTS = {
     "AsksLLM": "falsifier.engines.protocol",
+    "Assurance": "falsifier.search.assurance",
     "Budget": "falsifier.search.budget",
     "CampaignRequest": "falsifier.campaigns",
     "Candidate": "falsifier.core.candidate",
@@ -105,6 +108,7 @@ _EXPORTS = {
     "InputRange": "falsifier.core.space",
     "LLMSettings": "falsifier.search.request",
     "Listener": "falsifier.search.events",
+    "Margin": "falsifier.search.margin",
     "Method": "falsifier.campaigns",
     "Model": "falsifier.core.model",
     "ModelInfo": "falsifier.core.model",
@@ -122,11 +126,13 @@ _EXPORTS = {
     "Shrunk": "falsifier.counterexamples.shrink",
     "Signal": "falsifier.core.signals",
     "Spent": "falsifier.search.budget",
+    "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
     "Verdict": "falsifier.stl",
+    "assess": "falsifier.search.assurance",
     "confirm": "falsifier.evaluation.confirm",
     "connect": "falsifier.llm.connect",
     "cross": "falsifier.campaigns",
@@ -138,6 +144,7 @@ _EXPORTS = {
     "load_problems": "falsifier.problem.loading",
     "make_engine": "falsifier.engines",
     "make_llm_engine": "falsifier.engines.llm",
+    "margin": "falsifier.search.margin",
     "monitor_for": "falsifier.evaluation.evaluate",
     "parse": "falsifier.stl",
     "plot": "falsifier.views.plotting",
@@ -164,6 +171,7 @@ __all__ = [
     "ENGINES",
     "VARIANTS",
     "AsksLLM",
+    "Assurance",
     "Budget",
     "CampaignRequest",
     "Candidate",
@@ -184,6 +192,7 @@ __all__ = [
     "InputRange",
     "LLMSettings",
     "Listener",
+    "Margin",
     "Method",
     "Model",
     "ModelInfo",
@@ -201,12 +210,14 @@ __all__ = [
     "Shrunk",
     "Signal",
     "Spent",
+    "Splitting",
     "StoredCounterexample",
     "Trajectory",
     "Variable",
     "Verdict",
     "__version__",
     "analysis",
+    "assess",
     "confirm",
     "connect",
     "cross",
@@ -219,6 +230,7 @@ __all__ = [
     "load_problems",
     "make_engine",
     "make_llm_engine",
+    "margin",
     "monitor_for",
     "parse",
     "plot",

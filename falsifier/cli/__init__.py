@@ -41,6 +41,9 @@ _EXHAUSTED = frozenset(
 # name: (module, summary in --help)
 _COMMANDS = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
+    "simulate": ("falsifier.cli.simulate", "Simulate your own inputs and judge the requirement."),
+    "assess": ("falsifier.cli.assess", "Bound the probability of a violation."),
+    "margin": ("falsifier.cli.assess", "Find the threshold at which violations begin."),
     "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
     "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
     "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),

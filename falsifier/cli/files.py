@@ -5,6 +5,8 @@ from pathlib import Path
 from falsifier.core.literals import one_line
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
 from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
 from falsifier.views.terminal import warn
 
 
@@ -24,14 +26,15 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
     data = save(to_store(confirmation), directory / name)
     picture = data.with_suffix(".png")
     try:
-        _draw(confirmation, picture)
+        draw_evaluation(confirmation.problem, confirmation.evaluation, picture)
     except Exception as error:  # whatever a drawing library thinks of values and names that others chose
         warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
         return [data]
     return [data, picture]
 
 
-def _draw(confirmation: Confirmation, picture: Path) -> None:
+def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> None:
+    """Write the picture of an evaluation with its trajectory."""
     from falsifier.views.plotting import plot_evaluation, save_figure
 
-    save_figure(plot_evaluation(confirmation.problem, confirmation.evaluation), picture)
+    save_figure(plot_evaluation(problem, evaluation), picture)

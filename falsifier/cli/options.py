@@ -324,6 +324,17 @@ def executor_option(command: Function) -> Function:
     )(command)
 
 
+def start_from_option(command: Function) -> Function:
+    return click.option(
+        "--start-from",
+        type=click.Path(path_type=Path),
+        multiple=True,
+        metavar="u.csv|counterexample.json|RUN",
+        help="Known inputs to simulate first: a CSV file, a counterexample, or the best sample of a run. "
+        "They count in the budget, and the engine learns from them. Repeatable.",
+    )(command)
+
+
 def run_argument(command: Function) -> Function:
     return click.argument("run", metavar="RUN", type=click.Path(path_type=Path))(command)
 

@@ -1,6 +1,7 @@
 """``falsifier run`` and ``falsifier resume``."""
 
 import json
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NoReturn
@@ -26,12 +27,16 @@ from falsifier.cli.options import (
     quiet_option,
     refuse_limits_without_llm,
     seed_option,
+    start_from_option,
     total_options,
 )
 from falsifier.cli.output import conclude
+from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled, file_name
+from falsifier.counterexamples.known_inputs import known_inputs
 from falsifier.errors import FalsifierError, JournalError, SpecError
-from falsifier.problem.loading import find_spec, sources_of
+from falsifier.problem.loading import find_spec, load_source, sources_of
+from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
@@ -71,6 +76,7 @@ class _OneTarget(click.Command):
 @seed_option()
 @jobs_option("simulations")
 @click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
+@start_from_option
 @quiet_option
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @click.option(
@@ -90,6 +96,7 @@ def run(
     seed: int,
     jobs: int,
     together: bool,
+    start_from: tuple[Path, ...],
     quiet: bool,
     out: Path | None,
     fmu_log: Path | None,
@@ -111,15 +118,21 @@ def run(
     if llm is None:
         refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     sources = _all_of(source) if together else (source,)
+    searched: Sequence[ProblemSource | Problem] = sources
+    known = []
+    if start_from:
+        searched = loaded = [load_source(each) for each in sources]
+        known = [_known(place, loaded[0]) for place in start_from]
     with make_display(quiet=quiet) as display:
         results = falsify(
-            sources,
+            searched,
             engine,
             llm=llm,
             seed=seed,
             budget=Budget(budget, seconds, max_tokens, max_cost),
             jobs=jobs,
             directory=out or _new_directory(source.name),
+            start_from=known,
             listeners=[display, *logs],
         )
     _finish(results, as_json=as_json)
@@ -167,6 +180,14 @@ def resume(
     if not results:
         raise JournalError(f"{directory}: none of these {len(places)} runs can be continued here")
     _finish(results, as_json=as_json)
+
+
+def _known(place: Path, problem: Problem) -> Candidate:
+    """Read known inputs, and say on stderr what was changed to fit them to the search space."""
+    fitted = known_inputs(place, problem)
+    for note in fitted.notes:
+        warn(f"{place}: {note}")
+    return fitted.candidate
 
 
 def _finish(results: list[Result], *, as_json: bool) -> NoReturn:

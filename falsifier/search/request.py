@@ -1,6 +1,6 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
@@ -60,6 +60,9 @@ class RunRequest(_Strict):
     budget: Budget = Budget()
     jobs: int = Field(default=1, ge=1)
     keep: Keep = "history"
+    start_from: tuple[dict[str, Any], ...] = Field(
+        default=(), description="Known candidates, simulated before those of the engine."
+    )
 
     @property
     def source(self) -> ProblemSource | None:

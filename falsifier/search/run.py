@@ -1,14 +1,18 @@
 """The entry points of the search: ``falsify`` starts a run, ``resume`` continues one."""
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import overload
 
 from falsifier.core.arguments import whole
+from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
+from falsifier.core.fitting import fit
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import Engine
+from falsifier.engines.starting import Starting
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
@@ -40,6 +44,7 @@ def falsify(
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
+    start_from: Iterable[Candidate] = ...,
     listeners: Iterable[Listener] = ...,
 ) -> Result: ...
 
@@ -54,6 +59,7 @@ def falsify(
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
+    start_from: Iterable[Candidate] = ...,
     listeners: Iterable[Listener] = ...,
 ) -> list[Result]: ...
 
@@ -69,6 +75,7 @@ def falsify(
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
+    start_from: Iterable[Candidate] = ...,
     listeners: Iterable[Listener] = ...,
 ) -> list[Result]: ...
 
@@ -82,6 +89,7 @@ def falsify(
     seed: int = 0,
     directory: Path | str | None = None,
     jobs: int = 1,
+    start_from: Iterable[Candidate] = (),
     listeners: Iterable[Listener] = (),
 ) -> Result | list[Result]:
     """Search for inputs that violate one requirement, or several.
@@ -99,6 +107,8 @@ def falsify(
         seed: seed of an engine given by name.
         directory: where to record the run, so that it can be resumed; None: no record.
         jobs: number of simulations at a time.
+        start_from: known candidates, which are simulated first and count in the budget; they are fitted to
+            the search space.
         listeners: called with every event.
 
     Returns:
@@ -107,7 +117,8 @@ def falsify(
     Raises:
         SpecError: if a problem, an engine, a language model or a number is not valid, or two problems have
             the same name.
-        CandidateError: if an engine made in Python returns a candidate outside the search space.
+        CandidateError: if an engine made in Python returns a candidate outside the search space, or one to
+            start from does not fit it.
         ModelError: if the FMU cannot be used.
         ChatError: if the language model cannot be asked; raised before the first simulation.
         JournalError: if the directory already contains a run.
@@ -119,7 +130,7 @@ def falsify(
     problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
     check_names(problems)
     seed, jobs, limits = whole("seed", seed, least=0), whole("jobs", jobs, least=1), _budget(budget)
-    groups = alike(problems)
+    groups, known = alike(problems), list(start_from)
     chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
     results: dict[str, Result] = {}
     for group in groups:
@@ -130,6 +141,7 @@ def falsify(
             seed=seed,
             budget=limits,
             jobs=jobs,
+            start_from=tuple(fit(group[0].space, each).candidate.to_json() for each in known),
         )
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
@@ -237,7 +249,9 @@ def carry_out(
                 "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
-        engines = [engine] if engine is not None else make_engines(request, problems, chat)
+        made = [engine] if engine is not None else make_engines(request, problems, chat)
+        known = deque(map(Candidate.from_json, request.start_from))
+        engines: list[Engine] = [Starting(each, known) for each in made] if known else made
         live = Live(stack.enter_context(local_executor(request.jobs)))
         steps: Steps = live
         all_listeners = tuple(listeners)

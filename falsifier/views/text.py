@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,9 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
 from falsifier.search import manifest
+from falsifier.search.assurance import Assurance
 from falsifier.search.budget import Spent
 from falsifier.search.result import Result
 
@@ -25,7 +28,7 @@ def result_text(result: Result) -> str:
         lines.append(f"  reason         {result.reason}")
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
-        lines += _evaluation_lines(result, shown)
+        lines += evaluation_lines(result.problem, shown)
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     if result.spent.calls:
@@ -74,20 +77,21 @@ def result_json(result: Result) -> dict[str, Any]:
         "formula": str(result.problem.requirement.formula),
         "status": result.status,
         "reason": result.reason,
-        "counterexample": result.counterexample and _evaluation_json(result.counterexample.evaluation),
-        "best": result.best and _evaluation_json(result.best),
-        "fragile": [_evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
+        "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
+        "best": result.best and evaluation_json(result.best),
+        "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "not_confirmed": [c.reason for c in result.refuted],
         "spent": spent,
         "directory": result.directory and str(result.directory),
     }
 
 
-def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
+def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
+    """Say what decided an evaluation, and what was simulated."""
     verdict = evaluation.verdict
     lines = []
     if verdict is not None:
-        info = result.problem.info
+        info = problem.info
         values = ", ".join(
             f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
             for name, value in verdict.values.items()
@@ -95,13 +99,14 @@ def _evaluation_lines(result: Result, evaluation: Evaluation) -> list[str]:
         lines.append(f"  robustness     {verdict.robustness:+.6g}")
         lines.append(f"  critical time  {verdict.critical_time:.6g} s, decided by {verdict.predicate}")
         lines.append(f"  values then    {values}")
-    lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, result.problem.space)]
+    lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]
     if evaluation.candidate.rationale:
         lines.append(f"  rationale      {evaluation.candidate.rationale}")
     return lines
 
 
-def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
+def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
+    """Convert an evaluation to a value that can be dumped as JSON."""
     verdict = evaluation.verdict
     return {
         **evaluation.candidate.to_json(),
@@ -113,6 +118,23 @@ def _evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "shortest_dwell": {
             name: signal.shortest_dwell for name, signal in evaluation.candidate.signals.items()
         },
+    }
+
+
+def assurance_json(found: Assurance) -> dict[str, Any]:
+    """Convert what random simulations say to a value that can be dumped as one JSON object."""
+    return {
+        "requirement": found.problem.name,
+        "formula": str(found.problem.requirement.formula),
+        "distribution": found.distribution,
+        "confidence": found.confidence,
+        "drawn": found.drawn,
+        "violations": found.violations,
+        "failures": found.failures,
+        "upper_bound": found.bound,
+        "interval": found.interval,
+        "smallest": evaluation_json(found.smallest),
+        "estimate": found.splitting and asdict(found.splitting),
     }
 
 

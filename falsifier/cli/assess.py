@@ -1,0 +1,155 @@
+"""``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from falsifier.cli.options import (
+    budget_option,
+    json_option,
+    out_option,
+    problem_options,
+    problem_source,
+    quiet_option,
+    seed_option,
+)
+from falsifier.cli.output import conclude
+from falsifier.core.files import write_whole
+from falsifier.core.literals import one_line
+from falsifier.engines import DEFAULT_ENGINE
+from falsifier.problem.loading import load_source
+from falsifier.problem.source import Target
+from falsifier.views.terminal import warn
+from falsifier.views.text import assurance_json
+
+_ASSESS_BUDGET = 300
+# Progress is said after this many simulations.
+_SAID_EVERY = 100
+
+
+@click.command()
+@problem_options
+@budget_option(_ASSESS_BUDGET)
+@click.option(
+    "--splitting",
+    type=int,
+    metavar="N",
+    help="Simulations of the budget for an estimate by multilevel splitting; default: half of a budget that "
+    "is large enough, otherwise 0.",
+)
+@click.option(
+    "--confidence", type=float, default=0.95, show_default=True, help="Confidence of bound and intervals."
+)
+@seed_option()
+@quiet_option
+@out_option("Directory for assurance.json.", metavar="DIR")
+@json_option
+def assess(
+    *,
+    budget: int,
+    splitting: int | None,
+    confidence: float,
+    seed: int,
+    quiet: bool,
+    out: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Bound the probability of a violation by simulating at random.
+
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Every
+    control point and every parameter is drawn uniformly from its range, as by the engine uniform. The upper
+    bound is exact (Clopper and Pearson); what splitting adds is an estimate.
+
+    Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
+    failed.
+    """
+    from falsifier.search.assurance import assess as assess_problem
+
+    def said(count: int) -> None:
+        if not quiet and count % _SAID_EVERY == 0:
+            warn(f"simulation {count} of at most {budget}")
+
+    problem = load_source(problem_source(options))
+    try:
+        found = assess_problem(
+            problem, budget=budget, seed=seed, confidence=confidence, splitting=splitting, progress=said
+        )
+    finally:
+        problem.model.close()
+    content = json.dumps(assurance_json(found) | {"budget": budget, "seed": seed}, indent=2)
+    file = write_whole(out / "assurance.json", content) if out else None
+    lines = [
+        f"{problem.name}: {problem.requirement.formula}",
+        *(f"  {line}" for line in found.text.splitlines()),
+    ]
+    lines += [f"  file: {file}"] if file else []
+    conclude(content if as_json else "\n".join(map(one_line, lines)), 1 if found.violations else 0)
+
+
+@click.command()
+@problem_options
+@click.option(
+    "--vary", required=True, metavar="FORMULA", help="Formula with {limit} in place of a threshold."
+)
+@click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
+@click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
+@budget_option(note=" of all searches together")
+@seed_option()
+@quiet_option
+@json_option
+def margin(
+    *,
+    vary: str,
+    between: str,
+    engine: str,
+    budget: int,
+    seed: int,
+    quiet: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Find the threshold at which a search starts to find violations.
+
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU. The formula replaces
+    its requirement. Every simulation is judged for all thresholds.
+
+    Exit codes: 0 not falsified at any threshold, 1 falsified at one, 2 wrong usage or spec, 3 the simulations
+    failed.
+    """
+    from falsifier.search.margin import PLACE
+    from falsifier.search.margin import margin as find_margin
+
+    low, high = _between(between)
+    if options["stl"] is not None:
+        raise click.UsageError("--stl: --vary states the formula; drop --stl")
+    # So that the signals of the formula are recorded; problems made in Python take no formula.
+    if Target.parse(options["target"]).kind != "python":
+        options["stl"] = vary.replace(PLACE, f"{low:.12g}")
+
+    def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
+        if not quiet:
+            found = "falsified" if falsified else "not falsified"
+            warn(f"{threshold:.6g}: {found} ({count} of at most {budget} simulations used)")
+
+    problem = load_source(problem_source(options))
+    try:
+        found = find_margin(
+            problem, vary, (low, high), engine=engine, budget=budget, seed=seed, searched=said
+        )
+    finally:
+        problem.model.close()
+    content = {"vary": vary, "between": [low, high], **asdict(found)}
+    text = json.dumps(content, indent=2) if as_json else one_line(f"{vary}: {found.text}")
+    conclude(text, 0 if found.falsified is None else 1)
+
+
+def _between(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise click.UsageError(f"--between {text}: expected LOW:HIGH, for example 100:160") from None
+    return low, high

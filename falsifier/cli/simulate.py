@@ -1,0 +1,200 @@
+"""``falsifier simulate``: the user's own inputs, judged and drawn."""
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from io import StringIO
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import click
+
+from falsifier.cli.files import draw_evaluation
+from falsifier.cli.options import json_option, out_option, problem_options, problem_source
+from falsifier.cli.output import conclude
+from falsifier.core.files import write_whole
+from falsifier.core.literals import csv_cell, one_line
+from falsifier.core.model import Variable
+from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import SimulationError
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import simulate as simulate_inputs
+from falsifier.evaluation.input_file import read_inputs
+from falsifier.fmu import read_info
+from falsifier.problem.loading import load_source
+from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
+from falsifier.problem.spec import InputSection
+from falsifier.views.terminal import warn
+from falsifier.views.text import evaluation_json, evaluation_lines
+
+
+@click.command()
+@problem_options
+@click.option(
+    "--input-file",
+    type=click.Path(path_type=Path),
+    metavar="u.csv",
+    help="CSV file of inputs: the first column is the time in s, each further column an input. The "
+    "input.csv of an exported counterexample is one.",
+)
+@click.option(
+    "--set",
+    "values",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Keep an input constant, or set a parameter or start value. Repeatable.",
+)
+@out_option("Directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
+@json_option
+def simulate(
+    *, input_file: Path | None, values: tuple[str, ...], out: Path | None, as_json: bool, **options: Any
+) -> None:
+    """Simulate your own inputs and judge the requirement; ranges of the search do not apply.
+
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Inputs that
+    are not given keep the problem's fixed values or the model's start values.
+
+    Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
+    """
+    source, given = problem_source(options), dict(map(_value, values))
+    problem = _loaded(source, input_file, given)
+    try:
+        known = [v.name for v in problem.info.inputs]
+        signals = {name: _constant(value) for name, value in given.items() if name in known}
+        parameters = {name: value for name, value in given.items() if name not in known}
+        evaluation = simulate_inputs(problem, _read(input_file, problem) | signals, parameters)
+    finally:
+        problem.model.close()
+    if evaluation.trajectory is None or evaluation.verdict is None:
+        raise SimulationError(f"{problem.name}: the simulation {_ended(evaluation)}")
+    files = _written(problem, evaluation, evaluation.trajectory, out) if out else []
+    conclude(
+        json.dumps(_as_json(problem, evaluation, files), indent=2)
+        if as_json
+        else _as_text(problem, evaluation, files),
+        1 if evaluation.violated else 0,
+    )
+
+
+def _value(option: str) -> tuple[str, float]:
+    name, equals, text = option.partition("=")
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not equals or not name.strip() or not isfinite(value):
+        raise click.UsageError(f"--set {option}: expected NAME=VALUE with a number, for example throttle=50")
+    return name.strip(), value
+
+
+def _constant(value: float) -> Signal:
+    return Signal((0.0,), (value,), "constant")
+
+
+def _read(file: Path | None, problem: Problem) -> dict[str, Signal]:
+    """Read the file of inputs; say on stderr what of it is not used."""
+    if file is None:
+        return {}
+    found = read_inputs(file, problem.info)
+    stop_time = problem.experiment.stop_time
+    if found.unused:
+        warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
+    if found.end > stop_time:
+        warn(f"{file}: ends at {found.end:g} s; the simulation at {stop_time:g} s: --stop-time changes it")
+    if found.end < stop_time and any(len(s.times) > 1 for s in found.signals.values()):
+        warn(f"{file}: ends at {found.end:g} s; the last values are kept until {stop_time:g} s")
+    return dict(found.signals)
+
+
+def _loaded(source: ProblemSource, file: Path | None, given: Mapping[str, float]) -> Problem:
+    """Load the problem; the inputs themselves give the ranges that an FMU without a spec needs."""
+    if source.parts.kind != "fmu" or source.stl is None or not Path(source.parts.file).is_file():
+        return load_source(source)
+    info = read_info(Path(source.parts.file))
+    signals = dict(read_inputs(file, info).signals) if file else {}
+    signals |= {v.name: _constant(given[v.name]) for v in info.inputs if v.name in given}
+    own = {name: InputSection(range=_range(info[name], signal)) for name, signal in signals.items()}
+    changes = source.changes.model_copy(update={"inputs": own | source.changes.inputs})
+    return load_source(source.model_copy(update={"changes": changes}))
+
+
+def _range(variable: Variable, signal: Signal) -> tuple[float, float]:
+    """Return a range around a signal: the model's own, otherwise the signal's, wider if it is constant."""
+    lowest, highest = min(signal.values), max(signal.values)
+    wider = 1.0 if lowest == highest else 0.0
+    low, high = variable.limits
+    return lowest - wider if low is None else low, highest + wider if high is None else high
+
+
+def _ended(evaluation: Evaluation) -> str:
+    how = "timed out" if evaluation.status == "timeout" else evaluation.status
+    return f"{how}: {evaluation.reason}"
+
+
+def _written(problem: Problem, evaluation: Evaluation, trajectory: Trajectory, out: Path) -> list[Path]:
+    from falsifier.counterexamples.export.inputs import input_table
+    from falsifier.counterexamples.export.tables import write_csv
+
+    files = [write_whole(out / "trajectory.csv", _table(trajectory))]
+    files.append(write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model))
+    picture = out / "trajectory.png"
+    try:
+        draw_evaluation(_drawn(problem, evaluation), evaluation, picture)
+    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
+        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
+        return files
+    return [*files, picture]
+
+
+def _table(trajectory: Trajectory) -> str:
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time", *map(csv_cell, trajectory.names)])
+    columns = [trajectory.times, *trajectory.columns.values()]
+    writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    return text.getvalue()
+
+
+def _drawn(problem: Problem, evaluation: Evaluation) -> Problem:
+    """Return the problem with the given inputs instead of the searched ones, for the picture."""
+    searched = {r.name: r for r in problem.space.inputs}
+    inputs = tuple(
+        _covering(searched[name], signal) if name in searched else _input_range(problem.info[name], signal)
+        for name, signal in evaluation.candidate.signals.items()
+    )
+    return replace(problem, space=SearchSpace(inputs, (), problem.space.stop_time))
+
+
+def _input_range(variable: Variable, signal: Signal) -> InputRange:
+    return InputRange(variable.name, *_range(variable, signal), unit=variable.unit)
+
+
+def _covering(searched: InputRange, signal: Signal) -> InputRange:
+    low, high = min(searched.low, *signal.values), max(searched.high, *signal.values)
+    return replace(searched, low=low, high=high)
+
+
+def _as_text(problem: Problem, evaluation: Evaluation, files: list[Path]) -> str:
+    shown = _drawn(problem, evaluation)
+    verdict = "violated" if evaluation.violated else "not violated"
+    lines = [f"{problem.name}: {verdict} by these inputs ({evaluation.seconds:.2f} s)"]
+    lines.append(f"  requirement    {problem.requirement.formula}")
+    lines += evaluation_lines(shown, evaluation)
+    if files:
+        lines.append(f"  files          {', '.join(map(str, files))}")
+    return "\n".join(map(one_line, lines))
+
+
+def _as_json(problem: Problem, evaluation: Evaluation, files: list[Path]) -> dict[str, Any]:
+    return {
+        "requirement": problem.name,
+        "formula": str(problem.requirement.formula),
+        "violated": evaluation.violated,
+        **evaluation_json(evaluation),
+        "files": list(map(str, files)),
+    }

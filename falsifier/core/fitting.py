@@ -1,0 +1,91 @@
+"""Candidates from elsewhere, made to fit a search space."""
+
+from dataclasses import dataclass, replace
+from math import floor
+
+import numpy as np
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Interpolation, Signal, even_times
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.errors import CandidateError
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A candidate of a search space, made from one that may not have fitted.
+
+    Attributes:
+        candidate: the candidate as it will be simulated.
+        notes: what was changed, in words; empty if nothing was.
+    """
+
+    candidate: Candidate
+    notes: tuple[str, ...]
+
+
+def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
+    """Fit a candidate to a search space.
+
+    Signals whose control points the space does not allow are sampled at as many evenly spaced ones as it
+    allows. Inputs that are not searched are left out, and parameters that are not given have their nominal
+    value.
+
+    Raises:
+        CandidateError: naming the searched input that is missing, the value outside its range, or the
+            parameter without a value.
+    """
+    notes = [
+        f"{name} is not searched: its values are not used"
+        for name in (*candidate.signals, *candidate.parameters)
+        if name not in space.names
+    ]
+    signals = {}
+    for r in space.inputs:
+        if r.name not in candidate.signals:
+            raise CandidateError(f"input {r.name!r} is searched and missing: give it, or keep it constant")
+        signals[r.name], changed = _fitted_signal(space, r, candidate.signals[r.name])
+        notes += changed
+    parameters = {}
+    for p in space.parameters:
+        if p.name not in candidate.parameters:
+            notes.append(f"{p.name} is not given: {_nominal(p):g}, its value if it is not searched")
+        parameters[p.name] = candidate.parameters.get(p.name, p.nominal or 0.0)
+    return Fitted(
+        space.admit(replace(candidate, signals=signals, parameters=parameters)), tuple(dict.fromkeys(notes))
+    )
+
+
+def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[Signal, list[str]]:
+    alone = SearchSpace((r,), (), space.stop_time)
+    try:
+        return alone.admit(Candidate({r.name: signal})).signals[r.name], []
+    except CandidateError as error:
+        reason = str(error)
+    for time, value in zip(signal.times, signal.values, strict=True):
+        if time <= space.stop_time and not r.low <= value <= r.high:
+            raise CandidateError(
+                f"input {r.name!r} at t = {time:g} s: {value:g} is outside its range [{r.low:g}, {r.high:g}]"
+            )
+    times, interpolation = _allowed(r, signal, space)
+    values = signal.held(None).sample(np.asarray(times))
+    sampled = Signal(times, tuple(float(v) for v in values), interpolation, r.hold)
+    note = f"{r.name} is sampled at {len(times)} control points with {interpolation} interpolation ({reason})"
+    return sampled, [note]
+
+
+def _allowed(r: InputRange, signal: Signal, space: SearchSpace) -> tuple[tuple[float, ...], Interpolation]:
+    """Return the finest evenly spaced control points that the space allows for an input."""
+    if r.free is None:
+        return space.fixed_times(r), r.interpolation
+    is_held = r.kind != "real" or signal.interpolation == "constant"
+    interpolation: Interpolation = "constant" if is_held else "linear"
+    pieces = max(1, floor(space.stop_time / r.free.min_interval * (1 + 1e-9)))
+    count = min(r.free.max_control_points, pieces if is_held else pieces + 1)
+    return even_times(count, stop_time=space.stop_time, interpolation=interpolation), interpolation
+
+
+def _nominal(p: ParameterRange) -> float:
+    if p.nominal is None:
+        raise CandidateError(f"parameter {p.name!r} is searched and missing: give it, or keep it constant")
+    return p.nominal

@@ -1,0 +1,61 @@
+"""Known inputs to start a search from: measured, of a counterexample, or the best of an earlier run."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.fitting import Fitted, fit
+from falsifier.counterexamples.store import load
+from falsifier.errors import CandidateError, SpecError
+from falsifier.evaluation.input_file import read_inputs
+from falsifier.problem.problem import Problem
+from falsifier.search import manifest
+from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
+
+ORIGIN = "known"
+
+
+def known_inputs(place: Path, problem: Problem) -> Fitted:
+    """Read known inputs, and fit them to a problem's search space.
+
+    Args:
+        place: a CSV file of inputs, a counterexample file, or a run directory, of which the evaluation with
+            the smallest robustness is taken.
+        problem: the problem that is to be searched.
+
+    Raises:
+        SpecError: if the place is none of these, or the run simulated nothing with success.
+        CandidateError: naming the place and what does not fit the search space.
+    """
+    found = replace(_contained(place, problem), origin=ORIGIN, rationale=f"from {place}")
+    try:
+        return fit(problem.space, found)
+    except CandidateError as error:
+        raise CandidateError(f"{place}: {error}") from None
+
+
+def best_of_run(directory: Path, requirement: str | None = None) -> Candidate:
+    """Return the candidate with the smallest robustness in a run.
+
+    Args:
+        directory: run directory.
+        requirement: the requirement that it is judged by; None: the run's first.
+
+    Raises:
+        SpecError: if every simulation failed, or there was none.
+    """
+    names = manifest.read(directory).names
+    judged_by = requirement if requirement in names else names[0]
+    evaluations = recorded_evaluations(directory, read_journal(directory), judged_by).values()
+    judged = [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
+    if not judged:
+        raise SpecError(f"{directory}: no simulation of this run has a verdict; choose another run")
+    return min(judged, key=lambda pair: pair[0])[1]
+
+
+def _contained(place: Path, problem: Problem) -> Candidate:
+    if holds_run(place):
+        return best_of_run(place, problem.name)
+    if place.suffix.lower() == ".csv":
+        return Candidate(read_inputs(place, problem.info).signals)
+    return Candidate.from_json(load(place).candidate)

@@ -1,0 +1,44 @@
+"""An engine that proposes known candidates before those of another engine."""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines.protocol import AsksLLM, Engine
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.conversation import OnExchange
+from falsifier.llm.messages import Chat
+
+
+class Starting:
+    """Proposes known candidates first, then what another engine suggests, which learns from all of them.
+
+    Args:
+        engine: the other engine.
+        known: the candidates that are left; engines that search together share it, so that each candidate is
+            proposed once.
+    """
+
+    def __init__(self, engine: Engine, known: deque[Candidate]) -> None:
+        self.engine = engine
+        self.known = known
+
+    @property
+    def name(self) -> str:
+        """Name of the other engine."""
+        return self.engine.name
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """Return known candidates as long as there are any, then those of the other engine."""
+        if self.known:
+            return [self.known.popleft() for _ in range(min(max(n, 1), len(self.known)))]
+        return self.engine.ask(n)
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Tell the other engine."""
+        self.engine.tell(evaluations)
+
+    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
+        """Connect the other engine to a run if it asks a language model."""
+        if isinstance(self.engine, AsksLLM):
+            self.engine.attach(on_exchange, wrap)

@@ -1,0 +1,142 @@
+"""Input signals from a CSV file: a test from the field, or the input.csv of an exported counterexample."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+from pathlib import Path
+
+from falsifier.core.literals import csv_cell
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.signals import Signal
+from falsifier.errors import SpecError, did_you_mean
+
+# Signals have one value per time. A step between two slopes becomes a ramp this long in s, which ends at the
+# time of the step: shorter than any communication step, so that no simulation sees it.
+_STEP_RAMP = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class InputFile:
+    """The inputs in a file.
+
+    Attributes:
+        signals: input signals by name.
+        unused: columns that are variables of the model, but not inputs.
+        end: time of the last row in s; after it, inputs keep their last values.
+    """
+
+    signals: Mapping[str, Signal]
+    unused: tuple[str, ...]
+    end: float
+
+
+def read_inputs(path: Path, info: ModelInfo) -> InputFile:
+    """Read input signals from a CSV file.
+
+    The first row has the names. The first column is the time in s, from 0 on; a repeated time is a step. Each
+    further column is one input, linear between two rows; inputs that are not real hold their values. An array
+    may be one column, with spaces between its elements.
+
+    Args:
+        path: the file.
+        info: the model whose inputs they are.
+
+    Raises:
+        SpecError: naming the file, the row or column and what is wrong.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if any(c.strip() for c in row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "expected a CSV file in UTF-8"
+        raise SpecError(f"cannot be read: {reason}", file=str(path)) from None
+    if len(rows) < 2:
+        raise SpecError("expected a row of names and one or more rows of numbers", file=str(path))
+    header = [cell.strip() for cell in rows[0][1]]
+    columns = [_inputs_of(name, info, path) for name in header[1:]]
+    times: list[float] = []
+    values: dict[str, list[float]] = {v.name: [] for column in columns for v in column}
+    for line, row in rows[1:]:
+        if len(row) != len(header):
+            raise SpecError(f"row {line}: {len(row)} cells, expected {len(header)}", file=str(path))
+        times.append(_time(row[0], times, line, path))
+        for name, cell, column in zip(header[1:], row[1:], columns, strict=True):
+            if column:
+                _append(values, column, cell, f"row {line}, column {name}", path)
+    if not values:
+        known = did_you_mean("", (v.name for v in info.inputs))
+        raise SpecError(f"no column is an input of the model; {known}", file=str(path))
+    signals = {name: _signal(times, column, info[name]) for name, column in values.items()}
+    unused = tuple(name for name, column in zip(header[1:], columns, strict=True) if not column)
+    return InputFile(signals, unused, times[-1])
+
+
+def _inputs_of(column: str, info: ModelInfo, path: Path) -> list[Variable]:
+    """Return the inputs that a column stands for: one, the elements of an array, or none."""
+    # A spreadsheet-safe file has an apostrophe before some names.
+    exact = [v for v in info.inputs if column in (v.name, csv_cell(v.name))]
+    found = exact or [v for v in info.inputs if v.name.startswith(f"{column}[")]
+    if found or column in info:
+        return found
+    near = did_you_mean(column, (v.name for v in info.inputs))
+    raise SpecError(f"column {column!r}: the model has no such input; {near}", file=str(path))
+
+
+def _time(cell: str, before: Sequence[float], line: int, path: Path) -> float:
+    time = _number(cell, f"row {line}: time", path)
+    if not before and time != 0.0:
+        raise SpecError(f"row {line}: the first time must be 0 s, got {time:g} s: shift it", file=str(path))
+    if before and time < before[-1]:
+        raise SpecError(
+            f"row {line}: time {time:g} s is before {before[-1]:g} s: sort the rows by time", file=str(path)
+        )
+    return time
+
+
+def _append(
+    values: Mapping[str, list[float]], column: Sequence[Variable], cell: str, what: str, path: Path
+) -> None:
+    parts = cell.split()
+    if len(parts) != len(column):
+        raise SpecError(f"{what}: {len(parts)} numbers, expected {len(column)}", file=str(path))
+    for variable, part in zip(column, parts, strict=True):
+        values[variable.name].append(_number(part, what, path))
+
+
+def _number(text: str, what: str, path: Path) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise SpecError(f"{what}: expected a number, got {text!r}", file=str(path))
+    return number
+
+
+def _signal(times: Sequence[float], values: Sequence[float], variable: Variable) -> Signal:
+    """Return the signal through the rows, without rows that change nothing."""
+    points = list(zip(times, values, strict=True))
+    flat = all(b[1] == a[1] or b[0] == a[0] for a, b in pairwise(points))
+    if flat or variable.kind != "real":
+        last = list(dict(points).items())  # of several values at one time the last one counts
+        changes = [last[0], *(b for a, b in pairwise(last) if b[1] != a[1])]
+        return Signal(tuple(t for t, _ in changes), tuple(v for _, v in changes), "constant")
+    return _sloped(points)
+
+
+def _sloped(points: Sequence[tuple[float, float]]) -> Signal:
+    """Return a piecewise linear signal whose steps are steep ramps."""
+    kept: list[tuple[float, float]] = []
+    for time, value in points:
+        if kept and kept[-1][0] == time:
+            before = kept.pop()
+            start = time - _STEP_RAMP
+            if before[1] != value and kept and kept[-1][0] < start:
+                kept.append((start, before[1]))
+        # On a straight line through the last two points, the middle one changes nothing.
+        if len(kept) > 1 and kept[-2][1] == kept[-1][1] == value:
+            kept.pop()
+        kept.append((time, value))
+    return Signal(tuple(t for t, _ in kept), tuple(v for _, v in kept), "linear")

@@ -1,0 +1,6 @@
+"""What simulations that were drawn at random say about the probability of a violation."""
+
+from falsifier.search.assurance.assess import Assurance, assess
+from falsifier.search.assurance.splitting import Splitting
+
+__all__ = ["Assurance", "Splitting", "assess"]

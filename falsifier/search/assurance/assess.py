@@ -1,0 +1,184 @@
+"""What a search that found nothing cannot say: how probable a violation is, at most."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.arguments import whole
+from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
+from falsifier.engines.box import UnitBox
+from falsifier.engines.uniform import Uniform
+from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+from falsifier.search.assurance.bounds import interval, upper_bound
+from falsifier.search.assurance.distribution import distribution_text
+from falsifier.search.assurance.splitting import Splitting, least_budget, split
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Assurance:
+    """What random simulations say about the probability of a violation.
+
+    Attributes:
+        problem: what was simulated.
+        distribution: what was drawn, in words; every probability here refers to it.
+        confidence: confidence of the bound and the intervals.
+        drawn: number of simulations drawn independently.
+        violations: how many of them violate the requirement, as simulated, without confirmation.
+        failures: how many of them failed; the bounds count them as violations where that is worse.
+        bound: upper confidence bound on the probability of a violation, exact.
+        interval: exact two-sided confidence interval of that probability; None without violations.
+        smallest: the drawn evaluation with the smallest robustness, without its trajectory.
+        splitting: estimate of the probability by splitting; None if it was not asked for.
+    """
+
+    problem: Problem
+    distribution: str
+    confidence: float
+    drawn: int
+    violations: int
+    failures: int
+    bound: float
+    interval: tuple[float, float] | None
+    smallest: Evaluation
+    splitting: Splitting | None
+
+    @property
+    def text(self) -> str:
+        """The result in sentences."""
+        share = f"{self.confidence * 100:g} %"
+        lines = [
+            f"{self.violations} of {counted(self.drawn, 'random simulation')} violate the requirement.",
+            f"With {share} confidence, the probability of a violation is at most {self.bound:.3g}.",
+        ]
+        if self.interval is not None:
+            low, high = self.interval
+            lines.append(f"With {share} confidence, it is between {low:.3g} and {high:.3g}.")
+        if self.failures:
+            lines.append(
+                f"{counted(self.failures, 'simulation')} failed; the bound counts them as violations."
+            )
+        lines.append(f"The smallest robustness was {self.smallest.robustness:+.6g}.")
+        if self.splitting is not None:
+            lines.append(_splitting_text(self.splitting, share))
+        lines.append(f"Probability means a share of what was drawn: {self.distribution}.")
+        return "\n".join(lines)
+
+
+def assess(
+    problem: Problem,
+    *,
+    budget: int,
+    seed: int = 0,
+    confidence: float = 0.95,
+    splitting: int | None = None,
+    progress: Progress | None = None,
+) -> Assurance:
+    """Bound the probability of a violation by random simulations.
+
+    The bound is exact whatever the system is, as long as inputs are drawn as stated. The estimate by
+    splitting is not: it is for probabilities too small to be seen in the draws.
+
+    Args:
+        problem: what to simulate; inputs are drawn as the engine ``uniform`` does.
+        budget: maximum number of simulations.
+        seed: seed of the random numbers.
+        confidence: confidence of the bound and the intervals, between 0 and 1.
+        splitting: how many simulations of the budget are for splitting; default: half, if that is enough for
+            an estimate, otherwise none.
+        progress: called with the number of simulations so far.
+
+    Raises:
+        SpecError: if a number is out of range, or there is nothing to vary.
+        SimulationError: if every simulation failed.
+        ModelError: if the model cannot be used at all.
+    """
+    budget, seed = whole("budget", budget, least=1), whole("seed", seed, least=0)
+    if not 0.0 < confidence < 1.0:
+        raise SpecError(f"confidence: expected a number between 0 and 1, got {confidence!r}")
+    if not problem.space.names:
+        raise SpecError("nothing to vary; give at least one input or parameter a range")
+    rest = _for_splitting(budget, splitting)
+    count = _Counted(problem, progress or (lambda _: None))
+    engine = Uniform(problem, seed=seed)
+    drawn = [count(engine.ask()[0]) for _ in range(budget - rest)]
+    judged = [e for e in drawn if e.robustness is not None]
+    if not judged:
+        raise SimulationError(f"{problem.name}: every simulation failed; the last error: {drawn[-1].reason}")
+    violations, failures = sum(e.violated for e in drawn), len(drawn) - len(judged)
+    low, _ = interval(violations, len(drawn), confidence)
+    _, high = interval(violations + failures, len(drawn), confidence)
+    return Assurance(
+        problem=problem,
+        distribution=distribution_text(problem.space),
+        confidence=confidence,
+        drawn=len(drawn),
+        violations=violations,
+        failures=failures,
+        bound=upper_bound(violations + failures, len(drawn), confidence),
+        interval=(low, high) if violations else None,
+        smallest=min(judged, key=_robustness),
+        splitting=_split(problem, count, rest, seed=seed, confidence=confidence) if rest else None,
+    )
+
+
+@dataclass(slots=True)
+class _Counted:
+    """Evaluates candidates without keeping trajectories, and counts them."""
+
+    problem: Problem
+    progress: Progress
+    count: int = 0
+
+    def __call__(self, candidate: Candidate) -> Evaluation:
+        evaluation = replace(evaluate(self.problem, candidate), trajectory=None)
+        self.count += 1
+        self.progress(self.count)
+        return evaluation
+
+
+def _for_splitting(budget: int, wanted: int | None) -> int:
+    if wanted is None:
+        return budget // 2 if budget // 2 >= least_budget() else 0
+    wanted = whole("splitting", wanted, least=0)
+    if wanted >= budget:
+        raise SpecError(
+            f"splitting: expected fewer simulations than the budget of {budget}, got {wanted}: the bound "
+            "needs some, too"
+        )
+    if 0 < wanted < least_budget():
+        raise SpecError(f"splitting: expected 0, or at least {least_budget()} simulations, got {wanted}")
+    return wanted
+
+
+def _split(problem: Problem, count: _Counted, budget: int, *, seed: int, confidence: float) -> Splitting:
+    box = UnitBox(problem.space)
+
+    def cost(point: NDArray[np.float64]) -> float:
+        return _robustness(count(box.candidate(point, origin="splitting", rationale="moved at random")))
+
+    return split(cost, box.dimension, budget=budget, seed=seed, confidence=confidence)
+
+
+def _robustness(evaluation: Evaluation) -> float:
+    return inf if evaluation.robustness is None else evaluation.robustness
+
+
+def _splitting_text(found: Splitting, share: str) -> str:
+    effort = f"multilevel splitting, {counted(found.simulations, 'simulation')}"
+    if found.probability is None:
+        return (
+            f"Estimate, not a bound ({effort}): it reached a robustness of {found.reached:+.6g} and no "
+            f"violation; smaller values have a probability below {found.high:.2g}."
+        )
+    return (
+        f"Estimate, not a bound ({effort}): probability {found.probability:.2g}, {share} confidence interval "
+        f"{found.low:.2g} to {found.high:.2g}."
+    )

@@ -1,0 +1,210 @@
+"""Where a requirement starts to be violated: the threshold between what was falsified and what was not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import ceil, log2
+
+from falsifier.core.arguments import finite, whole
+from falsifier.core.words import counted
+from falsifier.engines import DEFAULT_ENGINE, make_engine
+from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.confirm import confirm
+from falsifier.evaluation.evaluate import Evaluation, judge
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.search.budget import Budget
+from falsifier.search.events import Evaluated, Event
+from falsifier.search.loop import search
+
+PLACE = "{limit}"
+# The search ends when the threshold is known to this share of the range.
+RESOLUTION = 0.01
+# Steps of the bisection over what is simulated already: more than a threshold has significant digits.
+_JUDGED_STEPS = 20
+
+Searched = Callable[[float, bool, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """Between which thresholds a requirement starts to be violated.
+
+    Attributes:
+        falsified: threshold nearest to the other one with a confirmed violation; None if there was none.
+        unfalsified: threshold nearest to it at which a search found nothing; None if all were falsified.
+        simulations: number of simulations of all searches together, without confirmations.
+        searches: the thresholds that were searched, in order, and whether a violation was confirmed.
+        complete: whether the two are close enough; False: the budget was used up before.
+    """
+
+    falsified: float | None
+    unfalsified: float | None
+    simulations: int
+    searches: tuple[tuple[float, bool], ...]
+    complete: bool
+
+    @property
+    def text(self) -> str:
+        """The result in one sentence."""
+        count = len(self.searches)
+        effort = (
+            f"{counted(self.simulations, 'simulation')}, {count} {'search' if count == 1 else 'searches'}"
+        )
+        if self.unfalsified is None:
+            found = f"falsified in the whole range, up to {self.falsified:.6g}"
+        elif self.falsified is None:
+            found = f"not falsified in the whole range, not even at {self.unfalsified:.6g}"
+        else:
+            found = f"falsified at {self.falsified:.6g}, not falsified at {self.unfalsified:.6g}"
+        more = "" if self.complete else "; a larger budget narrows it"
+        return f"{found} ({effort}){more}"
+
+
+def margin(
+    problem: Problem,
+    vary: str,
+    between: tuple[float, float],
+    *,
+    engine: str = DEFAULT_ENGINE,
+    budget: int = 300,
+    seed: int = 0,
+    searched: Searched | None = None,
+) -> Margin:
+    """Find the threshold at which a search starts to find violations, by bisection.
+
+    Robustness must change in one direction with the threshold. All searches share their simulations: each is
+    judged for every threshold.
+
+    Args:
+        problem: the model and what may be varied; its requirement is replaced.
+        vary: formula with ``{limit}`` in place of the threshold.
+        between: smallest and largest threshold.
+        engine: name of the engine.
+        budget: maximum number of simulations of all searches together.
+        seed: seed of the engines.
+        searched: called after each search with the threshold, whether it was falsified, and the number of
+            simulations so far.
+
+    Raises:
+        SpecError: if the formula, the range or a number is not valid, or the threshold changes nothing.
+        SimulationError: if most simulations failed.
+    """
+    low, high = finite("between", between[0]), finite("between", between[1])
+    if PLACE not in vary:
+        raise SpecError(f"vary: expected {PLACE} in place of the threshold, got {vary!r}")
+    if low >= high:
+        raise SpecError(f"between: expected LOW < HIGH, got {low:g}:{high:g}")
+    budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
+    bisection = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None))
+    easy, hard = bisection.directed(low, high)
+    return bisection.run(easy, hard)
+
+
+def at_threshold(problem: Problem, vary: str, threshold: float) -> Problem:
+    """Return the problem with a formula in which the threshold has this value."""
+    text = vary.replace(PLACE, f"{threshold:.12g}")
+    formula = parse_requirement(text, problem.info, problem.experiment)
+    return replace(problem, requirement=Requirement(problem.name, formula), source=None)
+
+
+@dataclass(slots=True)
+class _Bisection:
+    """The state of a search for a threshold: everything that was simulated so far."""
+
+    problem: Problem
+    vary: str
+    engine: str
+    budget: int
+    seed: int
+    searched: Searched
+    history: list[Evaluation] = field(default_factory=list)
+    searches: list[tuple[float, bool]] = field(default_factory=list)
+
+    def directed(self, low: float, high: float) -> tuple[float, float]:
+        """Return the threshold that is easier to violate, then the other one, judged by one simulation."""
+        self._search(high, 1)
+        values = [e.robustness for x in (low, high) for e in self._judged(x) if e.robustness is not None]
+        self.searches.clear()
+        if len(values) < 2:
+            raise SimulationError(f"{self.problem.name}: the simulation failed: {self.history[0].reason}")
+        if values[0] == values[-1]:
+            raise SpecError(f"vary: the robustness is the same for {PLACE} = {low:g} and {high:g}")
+        return (low, high) if values[0] < values[-1] else (high, low)
+
+    def run(self, easy: float, hard: float) -> Margin:
+        """Search at both ends, then between the hardest falsified threshold and the easiest other one."""
+        width = abs(hard - easy)
+        steps = 2 + ceil(log2(1 / RESOLUTION))
+        if self._falsified(hard, steps):
+            return self._ended(hard, None, complete=True)
+        falsified, unfalsified = self._confirmed(easy, hard), hard
+        if falsified is None:
+            if not self._falsified(easy, steps - 1):
+                return self._ended(None, easy, complete=True)
+            falsified = self._confirmed(easy, hard) or easy
+        while abs(unfalsified - falsified) > RESOLUTION * width and self._left > 0:
+            remaining = ceil(log2(abs(unfalsified - falsified) / (RESOLUTION * width)))
+            middle = (falsified + unfalsified) / 2
+            if self._falsified(middle, remaining):
+                falsified = self._confirmed(middle, unfalsified) or middle
+            else:
+                unfalsified = middle
+        return self._ended(
+            falsified, unfalsified, complete=abs(unfalsified - falsified) <= RESOLUTION * width
+        )
+
+    @property
+    def _left(self) -> int:
+        return self.budget - len(self.history)
+
+    def _falsified(self, threshold: float, searches: int) -> bool:
+        """Search at a threshold with its share of what is left of the budget."""
+        found = self._search(threshold, max(1, self._left // max(searches, 1))) if self._left > 0 else False
+        self.searched(threshold, found, len(self.history))
+        return found
+
+    def _search(self, threshold: float, budget: int) -> bool:
+        problem = at_threshold(self.problem, self.vary, threshold)
+        engine = make_engine(self.engine, problem, seed=self.seed + len(self.searches))
+        if self.history:
+            engine.tell(self._judged(threshold))
+        (result,) = search([problem], [engine], Budget(budget), listeners=[self._remember])
+        if result.status == "interrupted":
+            raise KeyboardInterrupt
+        if result.status == "failed":
+            raise SimulationError(f"{problem.name}: {result.reason}")
+        self.searches.append((threshold, result.falsified))
+        return result.falsified
+
+    def _remember(self, event: Event) -> None:
+        if isinstance(event, Evaluated):
+            self.history.append(event.evaluation)
+
+    def _judged(self, threshold: float) -> list[Evaluation]:
+        problem = at_threshold(self.problem, self.vary, threshold)
+        return [judge(problem, evaluation) for evaluation in self.history]
+
+    def _confirmed(self, easy: float, hard: float) -> float | None:
+        """Return the hardest threshold that something simulated already violates, if that is confirmed."""
+        found: tuple[float, Evaluation] | None = None
+        for step in range(_JUDGED_STEPS + 1):
+            threshold = easy if step == 0 else (easy + hard) / 2
+            violating = [e for e in self._judged(threshold) if e.violated]
+            if violating:
+                easy, found = threshold, (threshold, min(violating, key=_robustness))
+            elif step == 0:
+                return None
+            else:
+                hard = threshold
+        if found is None:
+            return None
+        problem = at_threshold(self.problem, self.vary, found[0])
+        return found[0] if confirm(problem, found[1]).outcome == "confirmed" else None
+
+    def _ended(self, falsified: float | None, unfalsified: float | None, *, complete: bool) -> Margin:
+        return Margin(falsified, unfalsified, len(self.history), tuple(self.searches), complete)
+
+
+def _robustness(evaluation: Evaluation) -> float:
+    assert evaluation.robustness is not None, "only violations are compared"
+    return evaluation.robustness

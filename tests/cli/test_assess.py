@@ -1,0 +1,43 @@
+import json
+from pathlib import Path
+
+from tests.command import falsifier
+
+HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"
+
+
+def test_a_system_without_violations_gets_a_bound(tmp_path: Path) -> None:
+    done = falsifier("assess", NEVER, "--budget", "60", "--out", "o", cwd=tmp_path)
+    assert done.code == 0, done.err
+    for part in (
+        "NEVER: ",
+        "0 of 60 random simulations",
+        "at most 0.0487",
+        "4 control points",
+        "o/assurance.json",
+    ):
+        assert part in done.out
+    recorded = json.loads((tmp_path / "o" / "assurance.json").read_text())
+    assert (recorded["drawn"], recorded["violations"], recorded["estimate"]) == (60, 0, None)
+
+
+def test_violations_are_counted_and_decide_the_exit_code(tmp_path: Path) -> None:
+    done = falsifier("assess", HARD, "--budget", "100", "--seed", "2", "--json", cwd=tmp_path)
+    assert done.code == 1, done.err
+    low, high = done.json["interval"]
+    assert low < done.json["violations"] / 100 < high
+    assert "simulation 100 of at most 100" in done.err
+
+
+def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
+    vary = ["--vary", "G[0,10] (x <= {limit})", "--between", "0:3", "--engine", "corners"]
+    done = falsifier("margin", NEVER, *vary, "--budget", "40", "--json", cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert 0.95 < done.json["falsified"] < done.json["unfalsified"] < 1.05
+    assert "3: not falsified" in done.err
+
+
+def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
+    for wrong in (["--between", "100"], ["--between", "0:3", "--stl", "x <= 1"]):
+        done = falsifier("margin", NEVER, "--vary", "G[0,10] (x <= {limit})", *wrong, cwd=tmp_path)
+        assert done.code == 2 and ("--between 100" in done.err or "drop --stl" in done.err)

@@ -1,0 +1,74 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.errors import SpecError
+from falsifier.evaluation.input_file import read_inputs
+
+INFO = ModelInfo(
+    "plant",
+    variables=(
+        Variable("u", causality="input"),
+        Variable("gear", kind="integer", causality="input"),
+        Variable("=v", causality="input"),
+        *(Variable(f"w[{i}]", causality="input") for i in (1, 2)),
+        Variable("speed", causality="output"),
+    ),
+)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "u.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_rows_are_joined_by_straight_lines_and_held_after_the_last(tmp_path: Path) -> None:
+    found = read_inputs(written(tmp_path, "time,u\n0,0\n1,0\n2,4\n4,0\n"), INFO)
+    assert found.signals["u"].sample(np.array([0.5, 1.5, 3.0, 9.0])) == pytest.approx([0, 2, 2, 0])
+    assert found.end == 4
+
+
+def test_a_repeated_time_is_a_step_with_the_later_value(tmp_path: Path) -> None:
+    flat = read_inputs(written(tmp_path, "t,u\n0,1\n2,1\n2,5\n4,5\n"), INFO).signals["u"]
+    assert (flat.times, flat.values, flat.interpolation) == ((0.0, 2.0), (1.0, 5.0), "constant")
+    sloped = read_inputs(written(tmp_path, "t,u\n0,0\n2,2\n2,9\n4,11\n"), INFO).signals["u"]
+    assert sloped.sample(np.array([1.0, 1.99, 2.0, 3.0])) == pytest.approx([1, 1.99, 9, 10])
+
+
+def test_integers_hold_their_values_between_rows(tmp_path: Path) -> None:
+    gear = read_inputs(written(tmp_path, "t,gear\n0,1\n2,2\n4,2\n"), INFO).signals["gear"]
+    assert gear.sample(np.array([1.9, 2.0, 4.0])).tolist() == [1, 2, 2]
+
+
+def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
+    found = read_inputs(written(tmp_path, '\ufefftime,"\'=v",w,speed\n0,1,2 3,70\n\n'), INFO)
+    assert {n: s.values for n, s in found.signals.items()} == {"=v": (1,), "w[1]": (2,), "w[2]": (3,)}
+    assert found.unused == ("speed",)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "a row of names"),
+        ("t,throtle\n0,1\n", "column 'throtle'"),
+        ("t,speed\n0,1\n", "no column is an input"),
+        ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2"),
+        ("t,u\n0,1\n1,high\n", "row 3, column u: expected a number, got 'high'"),
+        ("t,u\n0,nan\n", "row 2, column u"),
+        ("t,u\n3,1\n", "first time must be 0 s"),
+        ("t,u\n0,1\n2,1\n1,1\n", "row 4: time 1 s is before 2 s"),
+        ("t,w\n0,1\n", "1 numbers, expected 2"),
+    ],
+)
+def test_what_is_wrong_is_named(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=said) as raised:
+        read_inputs(written(tmp_path, text), INFO)
+    assert "u.csv" in str(raised.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"none\.csv"):
+        read_inputs(tmp_path / "none.csv", INFO)

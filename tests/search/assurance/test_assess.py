@@ -1,0 +1,81 @@
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from falsifier.errors import SimulationError, SpecError
+from falsifier.search.assurance import assess
+from falsifier.search.assurance.bounds import interval, upper_bound
+from falsifier.search.run import falsify
+from falsifier.testing import BIAS, Array, lag_problem
+from tests.problems import mostly_broken, never
+
+
+def direct(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Give the parameter itself, so that the probability of a violation is that of a uniform number."""
+    return {"x": np.full(times.shape, parameters["bias"])}
+
+
+def system(limit: float):  # type: ignore[no-untyped-def]
+    return lag_problem(f"G[0,10] (x <= {limit})", inputs=0, parameters=[BIAS], response=direct)
+
+
+def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
+    problem = system(0.8)
+    found = assess(problem, budget=60, seed=3)
+    same = falsify(system(5.0), "uniform", budget=60, seed=3).evaluations
+    expected = sum(e.candidate.parameters["bias"] > 0.8 for e in same)
+    assert (found.drawn, found.violations) == (60, expected) and expected > 0
+    assert found.bound == upper_bound(expected, 60, 0.95)
+    assert found.interval == interval(expected, 60, 0.95)
+    assert found.smallest.robustness == pytest.approx(0.8 - max(e.candidate.parameters["bias"] for e in same))
+
+
+def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
+    found = assess(system(2.0), budget=100, confidence=0.99)
+    assert found.interval is None and found.splitting is None
+    assert found.bound == pytest.approx(1 - 0.01 ** (1 / 100))
+    for part in (
+        "0 of 100 random simulations violate",
+        "With 99 % confidence, the probability of a violation is at most 0.045",
+        "smallest robustness was +1.0",
+        "bias uniform in [-1, 1]",
+    ):
+        assert part in found.text
+
+
+def test_splitting_takes_its_part_of_the_budget_and_is_marked_as_an_estimate() -> None:
+    counts: list[int] = []
+    found = assess(system(0.998), budget=3800, splitting=3750, seed=1, progress=counts.append)
+    assert found.drawn == 50 and found.splitting is not None
+    assert counts[-1] == 50 + found.splitting.simulations <= 3800
+    assert found.splitting.low <= 1e-3 <= found.splitting.high
+    assert "Estimate, not a bound" in found.text
+
+
+def test_failed_simulations_are_never_to_the_system_s_credit() -> None:
+    found = assess(lag_problem("G[0,10] (x <= 3)", response=mostly_broken), budget=50, seed=1)
+    assert found.violations == 0 and found.failures > 25
+    assert found.bound == upper_bound(found.failures, 50, 0.95)
+    assert "the bound counts them as violations" in found.text
+    with pytest.raises(SimulationError, match="out of order"):
+        assess(lag_problem(response=never), budget=3)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"budget": 0}, "budget"),
+        ({"budget": 10, "confidence": 95}, "between 0 and 1"),
+        ({"budget": 10, "splitting": 10}, "fewer simulations than the budget"),
+        ({"budget": 1000, "splitting": 20}, "expected 0, or at least"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(options: dict[str, float], said: str) -> None:
+    with pytest.raises(SpecError, match=said):
+        assess(system(0.5), **options)  # type: ignore[arg-type]
+
+
+def test_a_problem_with_nothing_to_vary_is_refused() -> None:
+    with pytest.raises(SpecError, match="nothing to vary"):
+        assess(lag_problem(inputs=0), budget=5)
