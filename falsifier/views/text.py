@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search import manifest
 from falsifier.search.budget import Spent
+from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 
 
@@ -26,6 +28,9 @@ def result_text(result: Result) -> str:
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += _evaluation_lines(result, shown)
+    if result.counterexample is None and result.searched is not None and result.searched.inputs:
+        lines.append(f"  inputs         {parameterization_note(result.searched)}")
+    lines += [f"  note           {finding.text}" for finding in result.findings]
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     if result.spent.calls:
@@ -51,6 +56,7 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{robustness}{where}"
         )
+        lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
@@ -76,6 +82,8 @@ def result_json(result: Result) -> dict[str, Any]:
         "reason": result.reason,
         "counterexample": result.counterexample and _evaluation_json(result.counterexample.evaluation),
         "best": result.best and _evaluation_json(result.best),
+        "parameterization": parameterization_of(result.searched or result.problem.space),
+        "findings": [asdict(finding) for finding in result.findings],
         "fragile": [_evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "not_confirmed": [c.reason for c in result.refuted],
         "spent": spent,
