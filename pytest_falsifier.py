@@ -5,6 +5,7 @@ use the fixture ``falsifier_check``. This module is outside the package, because
 every start and the package takes time to import.
 """
 
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
 _DEFAULT_BUDGET = 100
 _DEFAULT_DATABASE = "counterexamples"
 _OPTIONS = ("budget", "engine", "seed")
+
+
+class UntestedWarning(UserWarning):
+    """A requirement was not violated, but a part of it was not tested."""
+
+
+class UntestedError(AssertionError):
+    """The same with --falsifier-strict; reported by its message alone."""
 
 
 class FalsifiedError(AssertionError):
@@ -45,6 +54,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="DIR",
         help=f"folder of stored counterexamples, relative to rootdir (default: {_DEFAULT_DATABASE})",
     )
+    group.addoption(
+        "--falsifier-strict",
+        action="store_true",
+        default=None,
+        help="fail if a part of a requirement was not tested, such as a condition that never held",
+    )
+    parser.addini("falsifier_strict", "same as --falsifier-strict", type="bool")
     for name in (*_OPTIONS, "database"):
         parser.addini(f"falsifier_{name}", f"same as --falsifier-{name}")
 
@@ -108,7 +124,8 @@ class RequirementItem(pytest.Item):
         from falsifier.core.printable import printable
         from falsifier.errors import FalsifierError
 
-        if isinstance(excinfo.value, FalsifiedError | FalsifierError | OSError | MemoryError):
+        expected = FalsifiedError | UntestedError | FalsifierError | OSError | MemoryError
+        if isinstance(excinfo.value, expected):
             return printable(str(excinfo.value)) or "not enough memory"
         return super().repr_failure(excinfo, style)
 
@@ -165,7 +182,20 @@ def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) 
             raise FalsifiedError(_message(item, checked))
     finally:
         loaded.model.close()
+    _tell_untested(item, checked)
     return checked
+
+
+def _tell_untested(item: pytest.Item, checked: "Checked") -> None:
+    """Warn of parts of the requirement that no simulation tested; fail if --falsifier-strict is given."""
+    __tracebackhide__ = True
+    found = [f.text for f in checked.result.findings if f.vacuous] if checked.result else []
+    text = "\n".join((f"{checked.problem.name} is not violated, but not all of it was tested", *found))
+    if found and _setting(item.config, "strict"):
+        raise UntestedError(text)
+    if found:
+        _, line, _ = item.reportinfo()
+        warnings.warn_explicit(text, UntestedWarning, filename=str(item.path), lineno=(line or 0) + 1)
 
 
 def _setting(config: pytest.Config, name: str) -> Any:

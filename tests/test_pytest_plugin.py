@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
+from falsifier.counterexamples.regression import check
+from falsifier.testing import lag_problem
+from pytest_falsifier import UntestedError, UntestedWarning, _tell_untested
 from tests.command import ROOT, Done, forked
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
@@ -168,3 +171,14 @@ def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None
     assert "1 failed" in done.out
     assert "\x1b" not in done.out and "Traceback" not in done.out
     assert "the FMU's process crashed" in done.out
+
+
+def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checked = check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), engine="sobol", budget=2)
+    with pytest.warns(UntestedWarning, match="The condition x >= 2 never held in 2 simulations"):
+        _tell_untested(request.node, checked)
+    monkeypatch.setattr(request.config.option, "falsifier_strict", True)
+    with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
+        _tell_untested(request.node, checked)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,6 +11,7 @@ from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
+from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10
@@ -144,6 +145,13 @@ def method_of(request: RunRequest) -> Method:
         fallback=llm.fallback or "",
         together=len(request.problems) > 1,
     )
+
+
+def as_searched(method: Method) -> Method:
+    """Return the method with the parameterization that its engine really searches."""
+    llm = _llm_settings(method, None)
+    used = engine_parameterization(method.engine or None, llm)
+    return method if used == "free" else replace(method, parameterization="fixed")
 
 
 def run_name(request: RunRequest) -> str:

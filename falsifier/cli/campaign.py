@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from dataclasses import replace
 from datetime import datetime
 from itertools import product
 from pathlib import Path
@@ -22,6 +23,7 @@ from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
 from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.plan import as_searched
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.suites import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.cli.options import (
@@ -174,6 +176,10 @@ def bench(
     check_request(request, executor=executor)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
+    for method in methods:
+        allowed = ", if the spec allows it" if method.parameterization == "free" else ""
+        name = replace(method, parameterization="fixed").label
+        warn(f"{name}: {method.parameterization} parameterization{allowed}")
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
@@ -253,12 +259,13 @@ def _methods(
     if not llms and (variants or effort):
         raise click.UsageError("--variant and --effort require --llm NAME")
     named = [_llm(llm, effort) for llm in llms] or [("", "")]
-    return [
+    methods = [
         Method(engine, llm, level, variant, parameterization, profile, how.anonymous, how.fallback or "")
         for engine, (llm, level), variant, parameterization in product(
             engines or ("",), named, variants or ("",), parameterizations
         )
     ]
+    return list(dict.fromkeys(map(as_searched, methods)))
 
 
 def _llm(text: str, effort: str | None) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from falsifier.cli.output import say
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted
+from falsifier.core.words import parameterization_text
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
@@ -184,9 +184,6 @@ def _relative(fmu: Path, spec: Path) -> Path:
 
 def _problem_line(problem: Problem) -> str:
     space = problem.space
-    searched = [
-        f"{r.name} [{r.low:g}, {r.high:g}] ({counted(r.control_points, 'control point')}, {r.interpolation})"
-        for r in space.inputs
-    ]
+    searched = [f"{r.name} [{r.low:g}, {r.high:g}] {parameterization_text(r)}" for r in space.inputs]
     searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"

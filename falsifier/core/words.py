@@ -6,7 +6,7 @@ from typing import Literal
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import SearchSpace
+from falsifier.core.space import InputRange, SearchSpace
 
 # Maximum number of control points shown; longer signals are abbreviated in the middle.
 _SHOWN_POINTS = 12
@@ -79,6 +79,18 @@ def signal_text(signal: Signal) -> str:
     dwell = signal.shortest_dwell
     lively = "" if dwell is None else f", shortest dwell {dwell:.4g} s"
     return f"{signal.interpolation}: {', '.join(points)} ({counted(signal.switches, 'switch')}{lively})"
+
+
+def parameterization_text(r: InputRange) -> str:
+    """Return how an input may be built.
+
+    >>> parameterization_text(InputRange("u", 0.0, 1.0, control_points=5))
+    '(5 control points, pchip)'
+    """
+    if r.free is None:
+        return f"({counted(r.control_points, 'control point')}, {r.interpolation})"
+    most = counted(r.free.max_control_points, "control point")
+    return f"(free: at most {most}, at least {r.free.min_interval:g} s apart)"
 
 
 def counted(count: int, noun: str) -> str:

@@ -20,11 +20,14 @@ class Registered:
         summary: one line for ``--help``.
         extra: extra of this project that installs the package which the engine needs; it has the engine's
             name.
+        is_free: whether it chooses control points itself if the space allows it; the others search the fixed
+            parameterization.
     """
 
     target: str
     summary: str
     extra: str = ""
+    is_free: bool = False
 
     def load(self) -> Any:
         """Import the engine's class.
@@ -47,7 +50,9 @@ class Registered:
 ENGINES: Mapping[str, Registered] = MappingProxyType(
     {
         "surrogate": Registered(
-            "falsifier.engines.surrogate:Surrogate", "learns the dynamics and searches on its predictions"
+            "falsifier.engines.surrogate:Surrogate",
+            "learns the dynamics and searches on its predictions",
+            is_free=True,
         ),
         "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points"),
         "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence"),
@@ -63,7 +68,9 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
         "botorch": Registered(
             "falsifier.engines.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
         ),
-        "hybrid": Registered("falsifier.engines.hybrid:Hybrid", "a language model with the surrogate"),
+        "hybrid": Registered(
+            "falsifier.engines.hybrid:Hybrid", "a language model with the surrogate", is_free=True
+        ),
     }
 )
 

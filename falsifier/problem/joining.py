@@ -9,6 +9,7 @@ from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu import FmuModel, read_info
 from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface
+from falsifier.problem.freedom import default_freedom
 from falsifier.problem.grid import Grid, choose_grid, formula_times
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
@@ -79,6 +80,7 @@ def join(
     formulas = [r.formula for r in spec.requirements.values()] if stl is None else [stl]
     experiment, grid = _experiment(spec, layers, model.info, formulas, file)
     inputs, parameters = _merged(spec, layers)
+    inputs |= _with_points(inputs, changes, formulas, experiment)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
     check_sizes(experiment, space, file)
     strings = _strings(parameters, model.info, path.parent)
@@ -130,19 +132,20 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME
                 "interface": changes.interface or default_interface(info),
                 "stop_time": stop_time,
             },
-            "inputs": _searched_inputs(changes) if searched else _bounded_inputs(info),
             "requirements": {name: {"formula": stl}},
         },
         file=str(fmu),
     )
-    if not searched and not spec.inputs:
+    bounded = {} if searched else _bounded_inputs(info)
+    if not searched and not bounded:
         inputs = [v.name for v in info.inputs]
         why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
             f"{fmu}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
             f"{did_you_mean('', inputs)}"
         )
-    joined = join(spec, name, path=fmu, changes=changes)
+    every = changes.model_copy(update={"inputs": bounded | changes.inputs})
+    joined = join(spec, name, path=fmu, changes=every)
     unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
     if searched or not unbounded:
         return joined
@@ -255,6 +258,27 @@ def _merged(
     return inputs, parameters
 
 
+def _with_points(
+    inputs: Mapping[str, InputSection],
+    changes: ModelChanges | None,
+    formulas: Iterable[str],
+    experiment: Experiment,
+) -> dict[str, InputSection]:
+    """Return the inputs whose ranges were changed and whose control points nobody stated, free by default."""
+    free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
+
+    def completed(section: InputSection) -> InputSection:
+        chosen = section.free or (None if section.interpolation else free)
+        return section.model_copy(update={"control_points": DEFAULT_POINTS, "free": chosen})
+
+    changed = {name: inputs[name] for name in (changes.inputs if changes else ())}
+    return {
+        name: completed(section)
+        for name, section in changed.items()
+        if section.value is None and section.control_points is None
+    }
+
+
 def _space(
     inputs: Mapping[str, InputSection],
     parameters: Mapping[str, ParameterSection],
@@ -343,17 +367,9 @@ def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:
     return f"all inputs have fixed values; give one of them a range, for example --input {name}={limits}"
 
 
-def _bounded_inputs(info: ModelInfo) -> dict[str, object]:
+def _bounded_inputs(info: ModelInfo) -> dict[str, InputSection]:
     return {
-        v.name: {"control_points": DEFAULT_POINTS}
+        v.name: InputSection()
         for v in info.inputs
         if v.kind == "real" and v.low is not None and v.high is not None
-    }
-
-
-def _searched_inputs(changes: ModelChanges) -> dict[str, object]:
-    return {
-        name: {"control_points": DEFAULT_POINTS}
-        for name, section in changes.inputs.items()
-        if section.value is None
     }

@@ -10,13 +10,13 @@ from pydantic import ValidationError
 from falsifier.core.model import Interface
 from falsifier.core.signals import INTERPOLATIONS
 from falsifier.errors import SpecError, did_you_mean, rejected
-from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection
 
 _DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 
-# A constant value; (low, high), (low, high, points) or (low, high, points, interpolation) to search; None to
-# search between the FMU's min and max; or a complete section of a spec.
+# A constant value; (low, high) to search, with the spec's control points or else a free parameterization;
+# (low, high, points) or (low, high, points, interpolation) to search with these; None to search between the
+# FMU's min and max; or a complete section of a spec.
 InputChoice = (
     float
     | tuple[float, float]
@@ -60,9 +60,9 @@ def changes_from_options(
     """Return the changes for command-line options.
 
     Args:
-        inputs: ``name=low:high``, ``name=low:high:points`` or ``name=low:high:points:interpolation``
-            (searched), ``name`` (searched as in the spec, or between the FMU's min and max) or
-            ``name=value`` (kept constant).
+        inputs: ``name=low:high`` (searched with the spec's control points, or else a free parameterization),
+            ``name=low:high:points`` or ``name=low:high:points:interpolation`` (searched with these), ``name``
+            (searched as in the spec, or between the FMU's min and max) or ``name=value`` (kept constant).
         parameters: ``name=value`` (fixed), ``name=low:high`` (searched) or ``name=text`` (a string; a file is
             named relative to the current folder).
         experiment: fields of ModelChanges; None leaves a field unchanged.
@@ -114,8 +114,7 @@ def _input_section(name: str, choice: InputChoice) -> object:
         case int() | float():
             return {"value": choice}
         case (low, high, *more) if len(more) <= 2:
-            section = {"range": (low, high), "control_points": DEFAULT_POINTS}
-            return section | dict(zip(("control_points", "interpolation"), more, strict=False))
+            return {"range": (low, high)} | dict(zip(("control_points", "interpolation"), more, strict=False))
     raise SpecError(f"inputs.{name}: expected a number, (low, high[, points[, interpolation]]) or None")
 
 
@@ -153,7 +152,6 @@ def _input(option: str) -> tuple[str, dict[str, object]]:
             )
         return name, {"value": _number(parts[0], option)}
     section: dict[str, object] = {"range": (_number(parts[0], option), _number(parts[1], option))}
-    section["control_points"] = DEFAULT_POINTS
     if len(parts) > 2:
         if not parts[2].isdigit():
             raise SpecError(

@@ -12,6 +12,9 @@ from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
+from falsifier.problem.freedom import default_freedom
+from falsifier.problem.grid import choose_grid
+from falsifier.problem.spec import FreeSection
 from falsifier.stl.names import name_text
 
 # Stop time in s if the FMU specifies none.
@@ -37,8 +40,9 @@ def starter_spec(fmu: Path, info: ModelInfo) -> str:
     document.add("model", _model_table(fmu, info))
     if inputs:
         sections = tomlkit.table(is_super_table=True)
+        free = _freedom(info)
         for v in inputs:
-            sections.add(v.name, _input_table(v))
+            sections.add(v.name, _input_table(v, free))
         document.add("inputs", sections)
     if tunable:
         document.add("parameters", _parameters_table(tunable, searched=() if inputs else tunable[:1]))
@@ -68,7 +72,7 @@ def _model_table(fmu: Path, info: ModelInfo) -> Table:
     return table
 
 
-def _input_table(v: Variable) -> Table:
+def _input_table(v: Variable, free: FreeSection) -> Table:
     table = tomlkit.table()
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
     for line in (meaning, _items(v) if v.literals else ""):
@@ -84,8 +88,20 @@ def _input_table(v: Variable) -> Table:
         table.add("range", _noted(_range(v, low, high), doubt))
         table.add("control_points", DEFAULT_POINTS)
         table.add("interpolation", "pchip" if v.kind == "real" else "constant")
+        limits = tomlkit.inline_table()
+        limits.update(free.model_dump())
+        table.add(
+            "free", _noted(limits, "engines may choose the control points; delete for the fixed ones above")
+        )
     table.add(tomlkit.nl())
     return table
+
+
+def _freedom(info: ModelInfo) -> FreeSection:
+    """Return the limits that fit the placeholder requirement, whose window is the whole simulation."""
+    stop_time = info.stop_time or DEFAULT_STOP_TIME
+    step = choose_grid(stop_time, fmu_step=info.step_size).interval
+    return default_freedom((), stop_time=stop_time, step=step)
 
 
 def _guessed(v: Variable) -> tuple[float, float]:

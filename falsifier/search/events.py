@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import Exchange
@@ -20,12 +21,14 @@ class RunStarted:
         problems: what is searched; they differ only in their requirement.
         engines: name of each problem's engine.
         budget: limits of the run.
+        searched: the part of the search space that the engines use.
         replayed: number of evaluations taken from the run's journal.
     """
 
     problems: tuple[Problem, ...]
     engines: tuple[str, ...]
     budget: Budget
+    searched: SearchSpace
     replayed: int = 0
 
 

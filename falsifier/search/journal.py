@@ -42,6 +42,7 @@ from falsifier.search.records import (
     EndedRecord,
     EvaluatedRecord,
     ExchangeRecord,
+    FindingRecord,
     Record,
     VerdictRecord,
     line_of,
@@ -124,7 +125,16 @@ class Journal:
                 record = ConfirmedRecord.of(event.confirmation, index=event.index, spent=event.spent)
                 self._add(record, at_once=True)
             case RunEnded():
-                ended = EndedRecord(status=event.status, reason=event.reason, spent=asdict(event.spent))
+                ended = EndedRecord(
+                    status=event.status,
+                    reason=event.reason,
+                    spent=asdict(event.spent),
+                    findings={
+                        result.problem.name: [FindingRecord(**asdict(f)) for f in result.findings]
+                        for result in event.results
+                        if result.findings
+                    },
+                )
                 self.write(ended, at_once=True)
             case _:
                 pass

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Protocol
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import AsksLLM, Engine
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
@@ -28,8 +29,11 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
+from falsifier.search.findings import Finding
+from falsifier.search.parameterization import inexpressible
 from falsifier.search.proposals import proposals
 from falsifier.search.result import Result, ResultStatus
+from falsifier.search.vacuity import Vacuity
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
@@ -103,6 +107,7 @@ def search(
     *,
     steps: Steps | None = None,
     batch: int = 1,
+    searched: SearchSpace | None = None,
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
 ) -> list[Result]:
@@ -118,6 +123,7 @@ def search(
         budget: limits of the run.
         steps: how to ask, simulate and confirm; default: everything in this process.
         batch: number of candidates to ask for and simulate at a time.
+        searched: the part of the search space that the engines use; default: all of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
 
@@ -133,6 +139,7 @@ def search(
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     loop = _Loop(budget, steps or Live(), directory, tuple(listeners))
+    loop.searched = searched or problems[0].space
     loop.targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
     status: ResultStatus
     try:
@@ -163,9 +170,14 @@ class _Target:
     best: Evaluation | None = None
     counterexample: Confirmation | None = None
     spent: Spent | None = None
+    vacuity: Vacuity = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.vacuity = Vacuity(self.problem)
 
     def note(self, evaluation: Evaluation) -> bool:
         """Add an evaluation; return whether it is the best so far."""
+        self.vacuity.see(evaluation, len(self.evaluations))
         improved = _smaller(evaluation, self.best)
         if improved:
             self.best = evaluation
@@ -180,6 +192,7 @@ class _Loop:
         self, budget: Budget, steps: Steps, directory: Path | None, listeners: tuple[Listener, ...]
     ) -> None:
         self.targets: list[_Target] = []
+        self.searched = SearchSpace((), (), 1.0)
         self.budget = budget
         self.steps = steps
         self.directory = directory
@@ -207,6 +220,7 @@ class _Loop:
                 problems=tuple(t.problem for t in self.targets),
                 engines=tuple(t.engine.name for t in self.targets),
                 budget=self.budget,
+                searched=self.searched,
                 replayed=self.steps.replayed,
             )
         )
@@ -346,6 +360,13 @@ class _Loop:
         self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
         return [replace(result, unrecorded=self.unrecorded) for result in results]
 
+    def findings(self, target: _Target) -> tuple[Finding, ...]:
+        """Return what the search could not show about a requirement that it did not falsify."""
+        if target.best is None:
+            return ()
+        limits = inexpressible(target.problem, self.searched)
+        return (*target.vacuity.findings(), *([limits] if limits else []))
+
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample
         return Result(
@@ -358,6 +379,8 @@ class _Loop:
             refuted=tuple(c for c in target.doubtful if c.outcome == "refuted"),
             fragile=tuple(c for c in target.doubtful if c.outcome == "fragile"),
             spent=target.spent or self.clock(),
+            searched=self.searched,
+            findings=() if found is not None else self.findings(target),
             directory=self.directory,
         )
 

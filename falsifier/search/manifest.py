@@ -19,6 +19,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Parameterization
 from falsifier.search.journal import MANIFEST, read_manifest
+from falsifier.search.parameterization import parameterization_of, searched_space
 from falsifier.search.request import RunRequest
 
 _RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
@@ -69,7 +70,7 @@ class Manifest(_Strict):
     )
     model: str = Field(description="Name of the model.")
     parameterization: Parameterization = Field(
-        description="free: engines could choose the control points of at least one input."
+        description="free: the engine could choose the control points of at least one input."
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
@@ -136,7 +137,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
-        parameterization="free" if any(r.free for r in space.inputs) else "fixed",
+        parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
         stop_time=space.stop_time,

@@ -10,6 +10,7 @@ from falsifier.core.sealing import check_seal, seal
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Status
 from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.verdict import Verdict
 
 
@@ -107,6 +108,24 @@ class ConfirmedRecord(_Record):
         )
 
 
+class FindingRecord(BaseModel):
+    """One thing that the search could not show about a requirement."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: FindingKind
+    text: str
+    part: str = Field("", description="Part of the formula that it is about.")
+    margin: float | None = Field(None, allow_inf_nan=False, description="How far the part was from changing.")
+    time: float | None = Field(None, description="When it came closest, in s.")
+    simulation: int | None = Field(None, description="Index of the evaluation in which it came closest.")
+
+    @property
+    def finding(self) -> Finding:
+        """The finding that was recorded."""
+        return Finding(**self.model_dump())
+
+
 class EndedRecord(_Record):
     """The run ended or was interrupted."""
 
@@ -114,6 +133,10 @@ class EndedRecord(_Record):
     status: str
     reason: str
     spent: dict[str, float | None]
+    findings: dict[str, list[FindingRecord]] = Field(
+        default_factory=dict,
+        description="What the search could not show, by name of each requirement that was not falsified.",
+    )
 
 
 Record = AskedRecord | EvaluatedRecord | ExchangeRecord | ConfirmedRecord | EndedRecord

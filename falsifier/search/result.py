@@ -4,10 +4,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from falsifier.core.space import SearchSpace
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding
 
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
@@ -27,6 +29,8 @@ class Result:
         refuted: violations that a second simulation or the second monitor did not confirm.
         fragile: violations that disappear at half the communication step.
         spent: what the run has spent; if falsified, until the counterexample was confirmed.
+        searched: the part of the search space that the engine used; None: all of it.
+        findings: what the search could not show; empty if falsified.
         directory: the run directory, or None.
         unrecorded: why the end of the run could not be recorded, such as a full disk; empty if it was.
     """
@@ -40,6 +44,8 @@ class Result:
     refuted: tuple[Confirmation, ...] = ()
     fragile: tuple[Confirmation, ...] = ()
     spent: Spent = field(default_factory=Spent)
+    searched: SearchSpace | None = None
+    findings: tuple[Finding, ...] = ()
     directory: Path | None = None
     unrecorded: str = ""
 

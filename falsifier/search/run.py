@@ -26,6 +26,7 @@ from falsifier.search.journal import holds_lines, holds_run, open_journal, write
 from falsifier.search.leaders import make_engines
 from falsifier.search.loop import Live, Steps, search
 from falsifier.search.manifest import Manifest
+from falsifier.search.parameterization import searched_space
 from falsifier.search.replay import replayed
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
@@ -272,6 +273,7 @@ def carry_out(
             request.budget,
             steps=steps,
             batch=request.jobs,
+            searched=searched_space(problems[0].space, request.engine, request.llm),
             directory=directory,
             listeners=all_listeners,
         )

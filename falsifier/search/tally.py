@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.llm.messages import Exchange
 from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding
 from falsifier.search.journal import JournalReader
 from falsifier.search.records import (
     AskedRecord,
@@ -41,6 +42,7 @@ class Tally:
         counterexample: index of the confirmed violation, or None.
         unconfirmed: outcome and reason of violations that were not confirmed, by index.
         trajectories: file names of kept trajectories, by index.
+        findings: what the search could not show; empty before it has ended.
     """
 
     def __init__(self, requirement: str | None = None) -> None:
@@ -51,6 +53,7 @@ class Tally:
         self.counterexample: int | None = None
         self.unconfirmed: dict[int, str] = {}
         self.trajectories: dict[int, str] = {}
+        self.findings: tuple[Finding, ...] = ()
         self._requirement = requirement
         self._spent = Spent()
         self._simulation_seconds = 0.0
@@ -121,6 +124,8 @@ class Tally:
                 self.status = _ended(record.status)
                 self.reason = record.reason
                 self._spent = spent_of(record.spent)
+                own = [found for name, found in record.findings.items() if self._requirement in (None, name)]
+                self.findings = tuple(each.finding for found in own for each in found)
             case AskedRecord():
                 pass
 

@@ -13,6 +13,7 @@ from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.diagnosis import Diagnosis, diagnose
 from falsifier.stl.evaluator import fill, fill_many
+from falsifier.stl.extremes import Extremes, Watched, extremes_of, watched_parts
 from falsifier.stl.formula import Formula
 from falsifier.stl.program import Program
 from falsifier.stl.verdict import Verdict
@@ -78,6 +79,22 @@ class Monitor:
         diagnosis = diagnose(self._program.root, buffer, trajectory)
         self._spare.append(buffer)
         return diagnosis
+
+    @property
+    def watched(self) -> tuple[Watched, ...]:
+        """Parts of the formula whose extremes tell whether it was tested."""
+        return watched_parts(self._program.root)
+
+    def extremes(self, trajectory: Trajectory) -> Extremes:
+        """Return the smallest and largest robustness of each watched part.
+
+        Raises:
+            MonitorError: if the trajectory cannot be evaluated.
+        """
+        buffer = fill(self._program, trajectory, self._take_buffer())
+        found = extremes_of(self.watched, buffer, self.step)
+        self._spare.append(buffer)
+        return found
 
     def robustness(self, trajectory: Trajectory, time: float = 0.0) -> dict[Formula, float]:
         """Return the robustness of every distinct sub-formula at one time in s.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
+from falsifier.search.parameterization import parameterization_note
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
 
@@ -182,8 +183,10 @@ class NotebookLine:
 
 
 def _notes(event: RunStarted) -> list[str]:
-    """Return what was chosen or ignored when the problems were loaded; what several share, once."""
-    return list(dict.fromkeys(note for problem in event.problems for note in problem.notes))
+    """Return the parameterization, and what was chosen or ignored when the problems were loaded, once."""
+    chosen = dict.fromkeys(note for problem in event.problems for note in problem.notes)
+    parameterization = parameterization_note(event.searched)
+    return [*([parameterization] if parameterization else []), *chosen]
 
 
 def _confirmed(event: Confirmed) -> str:

@@ -14,6 +14,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search import manifest
 from falsifier.search.assurance import Assurance
 from falsifier.search.budget import Spent
+from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 
 
@@ -29,6 +30,9 @@ def result_text(result: Result) -> str:
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += evaluation_lines(result.problem, shown)
+    if result.counterexample is None and result.searched is not None and result.searched.inputs:
+        lines.append(f"  inputs         {parameterization_note(result.searched)}")
+    lines += [f"  note           {finding.text}" for finding in result.findings]
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     if result.spent.calls:
@@ -54,6 +58,7 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{robustness}{where}"
         )
+        lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
@@ -79,6 +84,8 @@ def result_json(result: Result) -> dict[str, Any]:
         "reason": result.reason,
         "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
         "best": result.best and evaluation_json(result.best),
+        "parameterization": parameterization_of(result.searched or result.problem.space),
+        "findings": [asdict(finding) for finding in result.findings],
         "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "not_confirmed": [c.reason for c in result.refuted],
         "spent": spent,

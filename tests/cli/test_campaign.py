@@ -77,13 +77,14 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
             "3",
         ),
         *("--llm", "openai/gpt-5-nano@low", "--llm", "x/y@2024", "--effort", "high", "--price", "1:2"),
-        *("--variant", "MP1", "--variant", "MP4", "--anonymous"),
+        *("--variant", "MP4", "--variant", "MP5", "--anonymous"),
         *("--parameterization", "fixed", "--parameterization", "free"),
     )
     (request,) = seen
     asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problems[0].parameterization) for r in request.runs}
-    assert len(asked) == len(request.runs) == 8
-    assert ("openai/gpt-5-nano", "low", "MP1", "free") in asked
+    # A prompt that does not offer control points to choose is searched once, with the fixed ones.
+    assert len(asked) == len(request.runs) == 6
+    assert ("openai/gpt-5-nano", "low", "MP5", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 100)}
     assert (request.limits.cost, request.calls) == (9.0, 3)
@@ -101,7 +102,7 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("falsifier.cli.campaign.run_campaign", record)
     command("bench", "--suite", "arch-comp", "--engine", "uniform")
     command("bench", "--suite", "arch-comp", "--instance", "2", "--engine", "uniform")
-    command("bench", "AT1", "--engine", "uniform")
+    command("bench", "AT1", "--engine", "surrogate")
     first, second, plain = seen
     # A suite is run as the competition does; other targets as falsifier run would.
     for request, budget, parameterization in ((first, 1500, "fixed"), (plain, 100, "free")):

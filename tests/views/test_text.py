@@ -84,10 +84,11 @@ def test_fragile_and_unconfirmed_violations_are_listed(found: Result) -> None:
     assert "vanishes" in text and "did not happen" in text
 
 
-def test_several_results_are_a_line_each(tmp_path: Path) -> None:
+def test_several_results_are_a_line_each_with_notes_below(tmp_path: Path) -> None:
     results = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path)
-    never, hard_line, last = results_text(results).splitlines()
+    never, note, hard_line, last = results_text(results).splitlines()
     assert never.startswith("NEVER  not falsified after 5")
+    assert note.strip().startswith("note: Faster inputs were not tried")
     assert hard_line.startswith("HARD   falsified after")
     assert str(tmp_path / "counterexample-HARD.png") in hard_line
     assert last.startswith("1 of 2 falsified")

@@ -17,6 +17,7 @@ from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.search import manifest as manifests
 from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding
 from falsifier.search.manifest import Manifest
 from falsifier.search.tally import RunStatus, read_tally
 from falsifier.stl.verdict import Verdict
@@ -43,6 +44,7 @@ class Run:
         unconfirmed: outcome and reason of violations that were not confirmed, by index.
         trajectories: names of kept trajectory files, by index.
         spent: what it has spent.
+        findings: what the search could not show; empty before it has ended.
     """
 
     directory: Path
@@ -58,6 +60,7 @@ class Run:
     unconfirmed: dict[int, str]
     trajectories: dict[int, str]
     spent: Spent
+    findings: tuple[Finding, ...] = ()
 
     @property
     def requirement(self) -> str:
@@ -143,6 +146,7 @@ def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
         unconfirmed=tally.unconfirmed,
         trajectories=tally.trajectories,
         spent=tally.spent,
+        findings=tally.findings,
     )
 
 

@@ -88,6 +88,15 @@ def gather(directory: Path, published: Published | None = None) -> Content:
     )
 
 
+def findings_lines(section: Section) -> list[str]:
+    """Return what the searches of a requirement could not show, one line each."""
+    return [
+        f"{run.method.label}, seed {run.seed}: {finding.text}"
+        for run in section.runs
+        for finding in run.findings
+    ]
+
+
 def replay_command(run: Run) -> str:
     """Shell command that replays a run's counterexample."""
     place = run.counterexample_file if run.shared else run.directory

@@ -4,7 +4,14 @@ from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.core.words import counted
-from falsifier.views.report.content import Content, Section, gather, replay_command, run_command
+from falsifier.views.report.content import (
+    Content,
+    Section,
+    findings_lines,
+    gather,
+    replay_command,
+    run_command,
+)
 
 
 def markdown_report(directory: Path) -> str:
@@ -16,7 +23,14 @@ def markdown_report(directory: Path) -> str:
     content = gather(directory)
     parts = [f"# Falsification report: {markdown_text(content.title)}", content.table.markdown().rstrip()]
     parts += [_section(section) for section in content.sections if any(r.falsified for r in section.runs)]
+    parts += [_unshown(section) for section in content.sections if findings_lines(section)]
     return "\n\n".join([*parts, _environment(content)]) + "\n"
+
+
+def _unshown(section: Section) -> str:
+    """What the searches of a requirement could not show."""
+    items = [f"- {markdown_text(one_line(line))}" for line in findings_lines(section)]
+    return "\n".join([f"## {markdown_text(section.name)}: what this does not show", "", *items])
 
 
 def _section(section: Section) -> str:

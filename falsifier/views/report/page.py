@@ -13,6 +13,7 @@ from falsifier.views.report.content import (
     Content,
     Section,
     Shown,
+    findings_lines,
     gather,
     replay_command,
     run_command,
@@ -119,6 +120,7 @@ def _section(section: Section) -> Html:
         *charts,
         el("h3", title),
         *(_shown(shown, opened=i == 0) for i, shown in enumerate(section.shown)),
+        _findings(section),
         _troubles(section),
         id=_anchor(section),
     )
@@ -162,6 +164,12 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
 
 def _facts(facts: list[tuple[str, str]]) -> Html:
     return el("dl", *(join(el("dt", name), el("dd", text)) for name, text in facts))
+
+
+def _findings(section: Section) -> Html:
+    """What the searches could not show."""
+    items = [el("li", line) for line in findings_lines(section)]
+    return join(el("h3", "What this does not show"), el("ul", *items)) if items else Html("")
 
 
 def _troubles(section: Section) -> Html:

@@ -7,7 +7,8 @@ def test_markdown_has_the_table_and_one_counterexample_a_requirement(campaign: P
     text = markdown_report(campaign)
     assert text.startswith("# Falsification report: nightly\n")
     assert "| HARD | uniform | 2/2 |" in text
-    assert text.count("## ") == 1
+    assert text.count("## ") == 2
+    assert "## NEVER: what this does not show" in text
     assert "## HARD: falsified" in text
     assert "`G[0,10] (x <= 0.6)`" in text
     assert "falsifier replay" in text

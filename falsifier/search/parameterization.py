@@ -1,0 +1,98 @@
+"""Which parameterization a search has, what a fixed one cannot express, and how to widen it."""
+
+from collections.abc import Sequence
+
+from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.words import counted, parameterization_text
+from falsifier.engines import DEFAULT_ENGINE, ENGINES
+from falsifier.problem.freedom import default_freedom, smallest_window
+from falsifier.problem.problem import Problem
+from falsifier.problem.source import Parameterization
+from falsifier.search.findings import Finding
+from falsifier.search.request import LLMSettings
+
+
+def engine_parameterization(engine: str | None, llm: LLMSettings | None) -> Parameterization:
+    """Return ``fixed`` if what suggests candidates never chooses control points itself.
+
+    Args:
+        engine: name of an engine; an unknown one was made in Python and may choose them.
+        llm: the language model; without an engine it leads the search.
+    """
+    if llm is None or engine == "hybrid":
+        name = engine or DEFAULT_ENGINE
+        return "fixed" if name in ENGINES and not ENGINES[name].is_free else "free"
+    from falsifier.llm.prompts.variants import variant_named
+
+    is_free = variant_named(llm.variant).has("freedom")
+    is_free |= llm.fallback is not None and engine_parameterization(llm.fallback, None) == "free"
+    return "free" if is_free else "fixed"
+
+
+def searched_space(space: SearchSpace, engine: str | None, llm: LLMSettings | None) -> SearchSpace:
+    """Return the space as it is searched: without freedom that is not used."""
+    return space if engine_parameterization(engine, llm) == "free" else space.fixed
+
+
+def parameterization_of(space: SearchSpace) -> Parameterization:
+    """Return ``free`` if the control points of at least one input may be chosen."""
+    return "free" if any(r.free for r in space.inputs) else "fixed"
+
+
+def parameterization_note(space: SearchSpace) -> str:
+    """Return in one line how the inputs are searched; empty without inputs."""
+    told = [f"{r.name} {parameterization_text(r)}" for r in space.inputs]
+    return f"{parameterization_of(space)} parameterization: {'; '.join(told)}" if told else ""
+
+
+def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
+    """Return what the fixed control points of a search could not express; None if they left nothing out."""
+    formula, experiment = problem.requirement.formula, problem.experiment
+    limits = default_freedom([str(formula)], stop_time=experiment.stop_time, step=experiment.output_interval)
+    coarse = [r for r in searched.inputs if r.free is None and r.control_points < limits.max_control_points]
+    if not coarse:
+        return None
+    slow = "; ".join(_fastest(r, searched) for r in coarse)
+    window = smallest_window([formula])
+    against = "" if window is None else f". The formula's smallest window is {window:g} s"
+    return Finding(
+        kind="parameterization",
+        text=f"Faster inputs were not tried: {slow}{against}. To try them: {_remedy(problem, coarse)}.",
+    )
+
+
+def _fastest(r: InputRange, space: SearchSpace) -> str:
+    if r.control_points == 1:
+        return f"{r.name} was constant"
+    times = space.fixed_times(r)
+    piece = times[1] - times[0]
+    if r.interpolation == "constant":
+        return f"{r.name} had {counted(r.control_points, 'held piece')} of {piece:.4g} s"
+    return (
+        f"{r.name} had {counted(r.control_points, 'control point')} ({r.interpolation}) and needed "
+        f"{piece:.4g} s from {r.low:g} to {r.high:g}"
+    )
+
+
+def _remedy(problem: Problem, coarse: Sequence[InputRange]) -> str:
+    """Say what allows faster inputs, depending on why they were not."""
+    source, own = problem.source, {r.name: r for r in problem.space.inputs}
+    if any(own[r.name].free for r in coarse):
+        return f"--engine {DEFAULT_ENGINE}, which chooses control points itself"
+    if source is not None and source.parameterization == "fixed":
+        return "--parameterization free"
+    stated = source.changes.inputs if source is not None else {}
+    open_ = [r for r in coarse if r.name in stated]
+    if open_:
+        options = " ".join(f"--input {r.name}={r.low:g}:{r.high:g}" for r in open_)
+        return f"{options}, without a number of control points"
+    limits = default_freedom(
+        [str(problem.requirement.formula)],
+        stop_time=problem.experiment.stop_time,
+        step=problem.experiment.output_interval,
+    )
+    count, shortest = limits.max_control_points, limits.min_interval
+    if source is None or source.parts.kind == "python":
+        return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
+    name = coarse[0].name
+    return f"free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in [inputs.{name}]"

@@ -1,0 +1,207 @@
+"""Which parts of a requirement a whole search did not test, collected simulation by simulation."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.words import counted, listed
+from falsifier.evaluation.evaluate import Evaluation, monitor_for
+from falsifier.problem.problem import Problem
+from falsifier.search.findings import Finding
+from falsifier.stl.expression import Number
+from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Or, Predicate, Until
+
+# A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
+_FAR = 3.0
+# Number of simulations from which on a robustness that never changes means something.
+_FEWEST = 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """When a part came closest to changing its truth, and the signals' values then."""
+
+    simulation: int
+    time: float
+    values: Mapping[str, float]
+
+
+class Vacuity:
+    """Extremes of a requirement's parts over all simulations of a search.
+
+    Args:
+        problem: what is searched.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._monitor = monitor_for(problem)
+        self._parts = self._monitor.watched
+        self._lows = np.full(len(self._parts), np.inf)
+        self._highs = np.full(len(self._parts), -np.inf)
+        self._lowest: list[_Moment | None] = [None] * len(self._parts)
+        self._highest: list[_Moment | None] = [None] * len(self._parts)
+        self._count = 0
+        self._robustness: set[float] = set()
+        self._first: dict[str, NDArray[np.float64]] = {}
+        self._moved: set[str] = set()
+
+    def see(self, evaluation: Evaluation, simulation: int) -> None:
+        """Add a simulation; one without a verdict says nothing."""
+        verdict, trajectory = evaluation.verdict, evaluation.trajectory
+        if verdict is None or trajectory is None:
+            return
+        self._count += 1
+        if len(self._robustness) <= 1:
+            self._robustness.add(verdict.robustness)
+        for name in set(self._problem.requirement.formula.signals) - self._moved:
+            first = self._first.setdefault(name, trajectory[name])
+            if not np.array_equal(first, trajectory[name]):
+                self._moved.add(name)
+        found = self._monitor.extremes(trajectory)
+        for i in np.flatnonzero(found.lows < self._lows):
+            time = float(found.lowest[i])
+            self._lowest[i] = _Moment(simulation, time, trajectory.at(time))
+        for i in np.flatnonzero(found.highs > self._highs):
+            time = float(found.highest[i])
+            self._highest[i] = _Moment(simulation, time, trajectory.at(time))
+        self._lows = np.minimum(self._lows, found.lows)
+        self._highs = np.maximum(self._highs, found.highs)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was not tested by any simulation so far; the most important first."""
+        if not self._count:
+            return ()
+        constant = tuple(self._constant())
+        conditions = [self._condition(i) for i in self._of(Implies) if self._never(i)]
+        disjuncts = [self._disjunct(i) for i in self._of(Or) if self._always(i)]
+        said = {
+            predicate
+            for i in self._of(Implies)
+            if self._never(i)
+            for predicate in self._parts[i].part.formula.predicates
+        }
+        # A requirement whose signals do not move at all has no predicate that could be nearer.
+        far = [] if constant else [self._far(i) for i in self._of(Predicate) if self._is_far(i, said)]
+        unique = {(finding.kind, finding.part): finding for finding in (*conditions, *disjuncts, *far)}
+        return (*constant, *unique.values())
+
+    def _of(self, kind: type[Formula]) -> list[int]:
+        """Return the watched parts that belong to formulas of this kind."""
+        return [i for i, watched in enumerate(self._parts) if isinstance(watched.formula, kind)]
+
+    def _alike(self, i: int) -> list[int]:
+        """Return all places at which the same part of the same formula stands."""
+        one = self._parts[i]
+        return [
+            k
+            for k, other in enumerate(self._parts)
+            if (other.formula, other.part.formula) == (one.formula, one.part.formula)
+        ]
+
+    def _never(self, i: int) -> bool:
+        return bool(max(self._highs[self._alike(i)]) < 0)
+
+    def _always(self, i: int) -> bool:
+        return bool(min(self._lows[self._alike(i)]) > 0)
+
+    def _is_far(self, i: int, said: set[Predicate]) -> bool:
+        alike, formula = self._alike(i), self._parts[i].formula
+        low, high = min(self._lows[alike]), max(self._highs[alike])
+        return formula not in said and bool(max(low, -high) > _FAR * (high - low))
+
+    def _in_all(self) -> str:
+        return f"in {counted(self._count, 'simulation')}" if self._count > 1 else "in the only simulation"
+
+    def _constant(self) -> Iterator[Finding]:
+        """Tell that the robustness never changed, unless steps of whole numbers explain that."""
+        info, signals = self._problem.info, self._problem.requirement.formula.signals
+        if self._count < _FEWEST or len(self._robustness) > 1 or not signals:
+            return
+        value = next(iter(self._robustness))
+        if not self._moved:
+            text = (
+                f"Nothing that was searched has an effect on {listed(signals)}: the same {self._in_all()}, "
+                f"with robustness {value:+.6g}. Search inputs or parameters on which "
+                f"{'it depends' if len(signals) == 1 else 'they depend'}."
+            )
+        elif all(name in info and info[name].kind == "real" for name in signals):
+            text = (
+                f"The robustness was {value:+.6g} {self._in_all()}, although {listed(sorted(self._moved))} "
+                "changed: what decides the requirement was never reached by what was searched."
+            )
+        else:
+            return
+        yield Finding(kind="constant", text=text, part=str(self._problem.requirement.formula), margin=value)
+
+    def _condition(self, i: int) -> Finding:
+        watched, moment = self._parts[i], self._highest[i]
+        assert moment is not None
+        near = _reached(watched.part.formula, moment.values) or f"it was false by {-self._highs[i]:.6g}"
+        return Finding(
+            kind="condition",
+            text=(
+                f"The condition {watched.part.formula} never held {self._in_all()}, so "
+                f"{watched.formula} was not tested. It must hold at some time; at the closest, {near} "
+                f"{_when(moment)}."
+            ),
+            part=str(watched.part.formula),
+            margin=float(-self._highs[i]),
+            time=moment.time,
+            simulation=moment.simulation,
+        )
+
+    def _disjunct(self, i: int) -> Finding:
+        watched, moment = self._parts[i], self._lowest[i]
+        assert moment is not None
+        near = _reached(watched.part.formula, moment.values) or f"it held by {self._lows[i]:.6g}"
+        return Finding(
+            kind="disjunct",
+            text=(
+                f"{watched.part.formula} always held {self._in_all()}, so the other side "
+                f"of {watched.formula} was not tested. It must fail at some time; at the closest, {near} "
+                f"{_when(moment)}."
+            ),
+            part=str(watched.part.formula),
+            margin=float(self._lows[i]),
+            time=moment.time,
+            simulation=moment.simulation,
+        )
+
+    def _far(self, i: int) -> Finding:
+        watched = self._parts[i]
+        is_held = self._lows[i] > 0
+        moment = self._lowest[i] if is_held else self._highest[i]
+        assert moment is not None
+        margin = float(self._lows[i] if is_held else -self._highs[i])
+        near = _reached(watched.part.formula, moment.values) or f"it was off by {margin:.6g}"
+        return Finding(
+            kind="threshold",
+            text=(
+                f"{watched.formula} was never near its threshold {self._in_all()}: it moved by "
+                f"{self._highs[i] - self._lows[i]:.6g} and stayed {margin:.6g} away; at the closest, {near} "
+                f"{_when(moment)}."
+            ),
+            part=str(watched.formula),
+            margin=margin,
+            time=moment.time,
+            simulation=moment.simulation,
+        )
+
+
+def _reached(formula: Formula, values: Mapping[str, float]) -> str:
+    """Return what the sides of a part's predicates were; empty if the part looks at other times too."""
+    if any(isinstance(part, Always | Eventually | Until | Next) for part in formula.walk()):
+        return ""
+    sides = dict.fromkeys(
+        side for p in formula.predicates for side in (p.left, p.right) if not isinstance(side, Number)
+    )
+    if not all(name in values for side in sides for name in side.signals):
+        return ""
+    return listed([f"{side} reached {float(side.evaluate(values)):.6g}" for side in sides]) if sides else ""
+
+
+def _when(moment: _Moment) -> str:
+    return f"(simulation {moment.simulation + 1}, {moment.time:.6g} s)"

@@ -1,0 +1,97 @@
+from dataclasses import replace
+
+import pytest
+
+from falsifier.core.space import InputRange
+from falsifier.engines import ENGINES, make_engine
+from falsifier.engines.box import BoxEngine
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.search.events import Event, RunStarted
+from falsifier.search.parameterization import (
+    engine_parameterization,
+    inexpressible,
+    parameterization_note,
+    parameterization_of,
+    searched_space,
+)
+from falsifier.search.request import LLMSettings
+from falsifier.search.run import falsify
+from falsifier.testing import FREE, lag_problem
+from tests.fmu.fixtures import path as fmu_path
+
+# Larger than what the lag can follow: only an input that falls or rises faster than the lag reaches it.
+FAST = "G[0,10] (u - x <= 1.5)"
+
+
+@pytest.mark.parametrize("name", sorted(set(ENGINES) - {"hybrid", "optuna", "botorch"}))
+def test_engines_on_the_box_are_known_to_be_fixed(name: str) -> None:
+    engine = make_engine(name, lag_problem(), seed=0)
+    assert (engine_parameterization(name, None) == "fixed") == isinstance(engine, BoxEngine)
+
+
+def test_a_language_model_chooses_control_points_if_its_prompt_offers_that() -> None:
+    assert engine_parameterization(None, LLMSettings(name="a/b")) == "free"
+    assert engine_parameterization(None, LLMSettings(name="a/b", variant="MP2")) == "fixed"
+    with_fallback = LLMSettings(name="a/b", variant="MP2", fallback="surrogate")
+    assert engine_parameterization(None, with_fallback) == "free"
+    assert engine_parameterization("hybrid", LLMSettings(name="a/b", variant="MP2")) == "free"
+    assert engine_parameterization("of my own", None) == "free"
+
+
+def test_a_search_is_not_called_free_if_its_engine_is_not() -> None:
+    space = lag_problem(free=FREE).space
+    assert parameterization_of(searched_space(space, "surrogate", None)) == "free"
+    assert parameterization_of(searched_space(space, "cma", None)) == "fixed"
+    assert parameterization_note(searched_space(space, "cma", None)) == (
+        "fixed parameterization: u (4 control points, linear)"
+    )
+
+
+def test_an_input_that_only_a_free_parameterization_has_is_found_without_further_options() -> None:
+    started: list[Event] = []
+    problem = Problem.from_fmu(fmu_path("Lag_2"), FAST, inputs={"u": (-1, 1)}, stop_time=10.0)
+    result = falsify(problem, budget=20, listeners=[started.append])
+    assert result.falsified
+    assert isinstance(started[0], RunStarted)
+    assert parameterization_of(started[0].searched) == "free"
+    five = Problem.from_fmu(fmu_path("Lag_2"), FAST, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
+    assert not falsify(five, "sobol", budget=20).falsified
+
+
+def told(problem: Problem, engine: str = "surrogate") -> str:
+    finding = inexpressible(problem, searched_space(problem.space, engine, None))
+    return finding.text if finding else ""
+
+
+def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_it() -> None:
+    formula = "G[0,9] (F[0,1] (y <= 1))"
+    stated = Problem.from_fmu(fmu_path("Lag_2"), formula, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
+    assert told(stated) == (
+        "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
+        "formula's smallest window is 1 s. To try them: --input u=-1:1, without a number of control points."
+    )
+    assert told(replace(stated, source=None)).endswith("InputRange(..., free=Freedom(200, 0.05)).")
+
+
+def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
+    free = lag_problem(free=FREE)
+    assert not told(free)
+    assert "--engine surrogate" in told(free, "cma")
+    fixed = load_problem("AT1", parameterization="fixed")
+    assert "--parameterization free" in told(fixed)
+
+
+def test_constant_and_held_inputs_are_described_as_such() -> None:
+    problem = lag_problem()
+    u = problem.space.inputs[0]
+
+    def text(changed: InputRange) -> str:
+        return told(replace(problem, space=replace(problem.space, inputs=(changed,))))
+
+    assert "u was constant" in text(replace(u, control_points=1))
+    assert "u had 4 held pieces of 2.5 s" in text(replace(u, interpolation="constant"))
+
+
+def test_as_many_control_points_as_make_sense_leave_nothing_out() -> None:
+    assert not told(lag_problem(points=100))

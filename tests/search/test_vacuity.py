@@ -1,0 +1,120 @@
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.campaigns.analysis import load_run
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.search.events import Evaluated, Event
+from falsifier.search.findings import Finding
+from falsifier.search.run import falsify, resume
+from falsifier.testing import Array, lag_problem
+from falsifier.views.report import html_report, markdown_report
+from falsifier.views.text import result_json, result_text, results_text
+
+
+def findings(problem: Problem, budget: int = 5) -> list[Finding]:
+    result = falsify(problem, "sobol", budget=budget)
+    assert not result.falsified
+    return [finding for finding in result.findings if finding.vacuous]
+
+
+def test_a_condition_that_never_held_is_told_with_how_close_it_came() -> None:
+    problem = lag_problem("G[0,10] (x >= 2 -> u <= 0)")
+    (found,) = findings(problem)
+    best = max(
+        (evaluation.trajectory["x"].max(), i)
+        for i, evaluation in enumerate(simulations(problem, 5))
+        if evaluation.trajectory is not None
+    )
+    assert found.kind == "condition"
+    assert found.part == "x >= 2"
+    assert found.margin == pytest.approx(2 - best[0])
+    assert found.simulation == best[1]
+    assert found.text.startswith(
+        "The condition x >= 2 never held in 5 simulations, so x >= 2 -> u <= 0 was not tested. "
+        f"It must hold at some time; at the closest, x reached {best[0]:.6g} (simulation {best[1] + 1}, "
+    )
+
+
+def simulations(problem: Problem, budget: int) -> list[Evaluation]:
+    seen: list[Event] = []
+    falsify(problem, "sobol", budget=budget, listeners=[seen.append])
+    return [event.evaluation for event in seen if isinstance(event, Evaluated)]
+
+
+def test_a_condition_that_held_in_one_simulation_is_no_finding() -> None:
+    assert not findings(lag_problem("G[0,10] (x >= 0.3 -> x <= 1)"), budget=20)
+
+
+def test_a_disjunct_that_always_held_is_told() -> None:
+    found = findings(lag_problem("G[0,10] (x <= 1.5 or u <= 0)"))
+    assert [(f.kind, f.part) for f in found] == [("disjunct", "x <= 1.5")]
+    assert (
+        "always held in 5 simulations, so the other side of x <= 1.5 or u <= 0 was not tested"
+        in found[0].text
+    )
+
+
+def test_a_predicate_far_from_its_threshold_is_told() -> None:
+    (found,) = findings(lag_problem("G[0,10] (x <= 50)"))
+    assert (found.kind, found.part) == ("threshold", "x <= 50")
+    assert "was never near its threshold in 5 simulations" in found.text
+    assert not findings(lag_problem("G[0,10] (x <= 1.5)"))
+
+
+def dead(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    return {"x": np.zeros_like(times)}
+
+
+def test_a_requirement_that_nothing_moves_is_told() -> None:
+    (found,) = findings(lag_problem("G[0,10] (x <= 0.1)", response=dead))
+    assert found.kind == "constant"
+    assert found.text.startswith(
+        "Nothing that was searched has an effect on x: the same in 5 simulations, with robustness +0.1."
+    )
+
+
+def test_a_robustness_that_does_not_change_is_told_although_signals_do() -> None:
+    # Decided by x(0), which no input changes.
+    found = findings(lag_problem("G[0,10] (x <= 5 or x >= 9) and G[0,0] (x <= 0.5)"))
+    assert "constant" in [f.kind for f in found]
+    assert "although x changed" in found[0].text
+
+
+def test_one_simulation_is_too_few_to_call_the_robustness_constant() -> None:
+    found = findings(lag_problem("G[0,10] (x <= 0.1)", response=dead), budget=1)
+    assert "constant" not in [f.kind for f in found]
+
+
+def test_a_falsified_requirement_has_no_findings() -> None:
+    result = falsify(lag_problem("G[0,10] ((x >= 2 -> u <= 0) and x <= 0.1)"), "corners", budget=5)
+    assert result.falsified
+    assert not result.findings
+
+
+def test_a_resumed_run_finds_the_same(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x >= 2 -> u <= 0)")
+
+    def interrupt(event: Event) -> None:
+        if isinstance(event, Evaluated) and event.index == 2:
+            raise KeyboardInterrupt
+
+    falsify(problem, "sobol", budget=5, directory=tmp_path / "a", listeners=[interrupt])
+    (resumed,) = resume(tmp_path / "a", problems=[problem])
+    assert resumed.findings == falsify(problem, "sobol", budget=5).findings
+
+
+def test_findings_are_on_the_terminal_in_json_and_in_reports(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x >= 2 -> u <= 0)")
+    result = falsify(problem, "sobol", budget=5, directory=tmp_path)
+    text = result.findings[0].text
+    assert f"  note           {text}" in result_text(result)
+    assert text in results_text([result])
+    assert result_json(result)["findings"][0]["simulation"] == result.findings[0].simulation
+    assert result_json(result)["parameterization"] == "fixed"
+    assert load_run(tmp_path).findings == result.findings
+    assert "what this does not show" in markdown_report(tmp_path)
+    assert "The condition x &gt;= 2 never held" in html_report(tmp_path)
