@@ -89,11 +89,13 @@ def shrink(
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.cli.files import write_counterexample
+    from falsifier.cli.files import check_out, write_counterexample
     from falsifier.counterexamples.shrink import shrink as shrink_violation
 
     stored = load(run)
-    file = out or _beside(run, "shrunk.json")
+    # A link is followed, not replaced.
+    file = _beside(run, "shrunk.json") if out is None else out.resolve()
+    check_out(file, beginnings=(b'{\n  "format"',), kept=counterexample_file(run))
     with _problem(stored) as problem:
         original = _simulated(stored, problem)
         shrunk = shrink_violation(

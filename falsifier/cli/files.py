@@ -4,6 +4,7 @@ from pathlib import Path
 
 from falsifier.core.literals import one_line
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
+from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -31,6 +32,29 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
         warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
         return [data]
     return [data, picture]
+
+
+def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = None) -> None:
+    """Check that writing a file destroys nothing but an earlier output of the same kind.
+
+    Args:
+        path: where to write.
+        beginnings: how outputs of this kind begin.
+        kept: a file that must stay.
+
+    Raises:
+        SpecError: if something else is there.
+    """
+    if not path.exists():
+        return
+    if not path.is_file():
+        raise SpecError(f"{path} is not a file that can be replaced: choose another --out")
+    if kept is not None and path.samefile(kept):
+        raise SpecError(f"{path} is the original, which is kept: choose another --out")
+    with path.open("rb") as file:
+        begins = file.read(max(map(len, beginnings)))
+    if begins and not begins.startswith(beginnings):
+        raise SpecError(f"{path} exists and is not such a file: choose another --out, or delete it")
 
 
 def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> None:

@@ -8,6 +8,7 @@ import click
 from falsifier.campaigns.archcomp import Finding, export, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS
+from falsifier.cli.files import check_out
 from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
@@ -41,6 +42,8 @@ def report(
         say(markdown_report(directory), nl=False)
         return
     path = out or directory / "report.html"
+    if path.is_file():
+        check_out(path, beginnings=(b"# ",) if markdown else (b"<!DOCTYPE html>",))
     path.write_text(markdown_report(directory) if markdown else html_report(directory), encoding="utf-8")
     warn(f"{path} written")
 

@@ -283,6 +283,11 @@ class FunctionModel:
             outputs = self.function(times, inputs, dict(parameters))
         except Exception as error:
             raise SimulationError(f"{self.info.name}: {type(error).__name__}: {error}") from error
+        if not isinstance(outputs, Mapping):
+            raise SimulationError(
+                f"{self.info.name}: the function returned {type(outputs).__name__}; expected a dictionary of "
+                "outputs by name"
+            )
         columns: dict[str, NDArray[np.float64]] = {}
         for name in experiment.outputs:
             if name not in outputs:
@@ -290,7 +295,12 @@ class FunctionModel:
                     f"{self.info.name}: the function did not return the output {name!r}; "
                     f"{did_you_mean(name, outputs)}"
                 )
-            columns[name] = np.array(outputs[name], dtype=np.float64)
+            try:
+                columns[name] = np.array(outputs[name]).astype(np.float64, casting="same_kind")
+            except (TypeError, ValueError):
+                raise SimulationError(
+                    f"{self.info.name}: output {name!r} is not an array of real numbers"
+                ) from None
             if columns[name].shape != times.shape:
                 raise SimulationError(
                     f"{self.info.name}: output {name!r} has shape {columns[name].shape}, "

@@ -6,7 +6,7 @@ between vectors and candidates.
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, replace
-from math import ceil, floor
+from math import ceil, floor, isfinite
 from typing import Literal, get_args
 
 import numpy as np
@@ -282,6 +282,8 @@ def _check_range(what: str, ranged: InputRange | ParameterRange) -> None:
     low, high = finite(f"{what}: low", ranged.low), finite(f"{what}: high", ranged.high)
     if low > high:
         raise SpecError(f"{what}: expected low <= high, got [{low:g}, {high:g}]")
+    if not isfinite(high - low):
+        raise SpecError(f"{what}: [{low:g}, {high:g}] is too wide to calculate with; narrow the range")
     one_of(f"{what}: kind", ranged.kind, get_args(ValueKind))
     if ranged.kind == "real":
         return

@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
+from math import inf
 from pathlib import Path
 from typing import Self
 
+from falsifier.core.arguments import finite
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
-from falsifier.core.space import SearchSpace
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
@@ -149,6 +151,20 @@ def _check_variables(problem: Problem) -> None:
         if name not in info:
             near = did_you_mean(name, (v.name for v in info.variables))
             raise SpecError(f"{problem.name}: the model has no variable {name!r}; {near}")
+    for name, value in problem.parameters.items():
+        finite(f"{problem.name}: parameter {name!r}", value)
+        if name in problem.space.names:
+            raise SpecError(f"{problem.name}: {name!r} is searched and has a fixed value; keep one of them")
+    ranges: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
+    for searched in ranges:
+        variable = info[searched.name]
+        low = -inf if variable.low is None else variable.low
+        high = inf if variable.high is None else variable.high
+        if searched.low < low or searched.high > high:
+            raise SpecError(
+                f"{problem.name}: [{searched.low:g}, {searched.high:g}] exceeds the model's limits for "
+                f"{searched.name!r}, [{low:g}, {high:g}]"
+            )
     for name in problem.requirement.formula.signals:
         if name not in (*experiment.outputs, *inputs):
             raise SpecError(

@@ -235,7 +235,7 @@ def read_manifest(directory: Path) -> dict[str, Any]:
         check_seal(content)
         manifest: dict[str, Any] = json.loads(content)
         del manifest["sum"]
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise JournalError(f"{directory}: not a run directory: it contains no {MANIFEST}") from None
     except (ValueError, OSError, RecursionError) as error:
         raise JournalError(

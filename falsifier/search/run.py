@@ -173,7 +173,7 @@ def resume(
 
     Args:
         directory: run directory, or a folder of run directories, which are continued one after the other.
-        problems: what is searched, if it was made in Python.
+        problems: what is searched, if it was made in Python: the problems of all these runs.
         engine: the engine, if it was made in Python: a new instance in its initial state.
         chat: chat with the language model, if it was made in Python.
         budget: limits of the whole run, including what is recorded; default: the original limits.
@@ -188,8 +188,12 @@ def resume(
     directory = Path(directory)
     places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
     results: list[Result] = []
-    for place in places or [directory]:
-        described = manifest.read(place)
+    described_at = {place: manifest.read(place) for place in places or [directory]}
+    searched = [name for described in described_at.values() for name in described.names]
+    for problem in problems:
+        if problem.name not in searched:
+            raise JournalError(f"{directory}: this run searched {', '.join(searched)}, not {problem.name}")
+    for place, described in described_at.items():
         request = described.request
         if budget is not None:
             request = request.model_copy(update={"budget": _budget(budget)})
@@ -201,7 +205,7 @@ def resume(
             raise JournalError(
                 f"{place}: this run's engine was made in Python: call resume() with engine=..."
             )
-        loaded = list(problems) or load_sources(request.problems)
+        loaded = _given(problems, described, place) if problems else load_sources(request.problems)
         results += carry_out(
             request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
         )
@@ -277,6 +281,15 @@ def carry_out(
             directory=directory,
             listeners=all_listeners,
         )
+
+
+def _given(problems: Sequence[Problem], described: Manifest, place: Path) -> list[Problem]:
+    """Return the problems that a run searched, in its order, from those that the user gave."""
+    by_name = {problem.name: problem for problem in problems}
+    missing = [name for name in described.names if name not in by_name]
+    if missing:
+        raise JournalError(f"{place}: this run also searched {', '.join(missing)}: add it to problems=[...]")
+    return [by_name[name] for name in described.names]
 
 
 def _problem(given: Falsifiable) -> Problem:

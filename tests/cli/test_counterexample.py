@@ -1,4 +1,5 @@
 import json
+import os
 import shutil
 import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
@@ -161,3 +162,18 @@ def test_a_lost_counterexample_is_written_from_the_journal(together: Path) -> No
     assert run(together, "replay", "run/counterexample-AT2.json").code == 1
     again = json.loads((together / "run/counterexample-AT2.json").read_text())
     assert again == json.loads(kept)
+
+
+def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
+    own = folder / "keep.fmu"
+    own.write_bytes(b"PK mine")
+    for arguments, why in (
+        (["shrink", "run", "--out", "keep.fmu"], "exists and is not such a file"),
+        (["shrink", "run", "--out", "run/counterexample.json"], "is the original, which is kept"),
+        (["shrink", "run", "--out", os.devnull], "is not a file that can be replaced"),
+        (["report", "run", "--out", "run/journal.jsonl"], "exists and is not such a file"),
+    ):
+        done = run(folder, *arguments)
+        assert (done.code, why in done.err) == (2, True), done.err
+    assert own.read_bytes() == b"PK mine"
+    assert [run(folder, "report", "run", "--out", "r.html").code for _ in range(2)] == [0, 0]

@@ -105,3 +105,19 @@ def test_an_experiment_that_cannot_be_run_is_refused_when_it_is_made(
     right: dict[str, Any] = {"stop_time": 1.0, "output_interval": 0.1, "outputs": ("x",)}
     with pytest.raises(SpecError, match=message):
         Experiment(**right | wrong)
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (None, "the function returned NoneType; expected a dictionary"),
+        ((1.0, 2.0), "the function returned tuple; expected a dictionary"),
+        ({"x": ["high"] * 11}, "output 'x' is not an array of real numbers"),
+        ({"x": [1j] * 11}, "output 'x' is not an array of real numbers"),
+    ],
+)
+def test_what_a_function_returns_by_mistake_is_a_failed_simulation(returned: Any, message: str) -> None:
+    info = ModelInfo("m", variables=(Variable("x", causality="output"),))
+    model = FunctionModel(lambda *_: returned, info)
+    with pytest.raises(SimulationError, match=message):
+        model.simulate({}, {}, Experiment(1.0, 0.1, ("x",)))

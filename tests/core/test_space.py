@@ -125,6 +125,7 @@ def test_whole_numbers_are_not_interpolated_freely() -> None:
         ({"low": 1, "high": 0}, r"input 'u': expected low <= high, got \[1, 0\]"),
         ({"low": math.nan}, "input 'u': low: expected a finite number, got nan"),
         ({"high": "5"}, "input 'u': high: expected a finite number, got '5'"),
+        ({"low": -1.7e308, "high": 1.7e308}, "too wide to calculate with"),
         ({"control_points": 0}, "input 'u': control_points: expected a whole number, at least 1, got 0"),
         ({"interpolation": "cubic"}, "interpolation: expected pchip, linear or constant, got 'cubic'"),
         ({"hold": 0.0}, "input 'u': hold: expected a positive number, got 0.0"),
