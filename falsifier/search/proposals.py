@@ -1,5 +1,7 @@
 """What an engine proposes, checked before anything is simulated."""
 
+from collections.abc import Sequence
+
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine
@@ -20,6 +22,10 @@ def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate
             range.
     """
     candidates = engine.ask(wanted)
+    if not isinstance(candidates, Sequence) or not all(isinstance(c, Candidate) for c in candidates):
+        raise SpecError(
+            f"engine {engine.name!r}: ask(n) must return a list of Candidate, got {repr(candidates)[:100]}"
+        )
     if not candidates:
         raise SpecError(f"engine {engine.name!r} returned no candidate: ask(n) must return at least one")
     if len(candidates) > wanted:

@@ -128,8 +128,11 @@ def falsify(
     'falsified'
     """
     several = not isinstance(problem, Falsifiable)
+    if several and not isinstance(problem, Iterable):
+        raise SpecError(f"expected a Problem, a target such as 'AT1' or a list, got {type(problem).__name__}")
     problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
     check_names(problems)
+    _check_engine(engine)
     seed, jobs, limits = whole("seed", seed, least=0), whole("jobs", jobs, least=1), _budget(budget)
     groups, known = alike(problems), list(start_from)
     chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
@@ -295,7 +298,20 @@ def _given(problems: Sequence[Problem], described: Manifest, place: Path) -> lis
 def _problem(given: Falsifiable) -> Problem:
     if isinstance(given, Problem):
         return given
+    if not isinstance(given, Falsifiable):
+        raise SpecError(f"expected a Problem or a target such as 'AT1', got {type(given).__name__}")
     return load_source(ProblemSource(target=given) if isinstance(given, str) else given)
+
+
+def _check_engine(engine: object) -> None:
+    """Check that an engine is a name, or has what an engine needs."""
+    is_made = (
+        hasattr(engine, "ask") and hasattr(engine, "tell") and isinstance(getattr(engine, "name", 0), str)
+    )
+    if not is_made and not isinstance(engine, str | None):
+        raise SpecError(
+            f"engine: expected a name, or an object with name, ask() and tell(), got {type(engine).__name__}"
+        )
 
 
 def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:

@@ -15,7 +15,7 @@ _SPELLINGS = {
     "always": "G", "eventually": "F", "until": "U", "next": "X",
 }  # fmt: skip
 _HINTS = {
-    "=": "equality is ==",
+    "=": "equality is ==, less or equal is <=",
     "%": "write the number without a percent sign",
     "'": "a single quote opens a Modelica name and needs a second one",
     '"': "a double quote opens a name and needs a second one",

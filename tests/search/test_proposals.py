@@ -1,6 +1,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -75,3 +77,23 @@ def test_what_is_admitted_is_simulated_recorded_and_resumed(tmp_path: Path) -> N
     assert [e.candidate.signals["u"] for e in result.evaluations] == [signal, signal]
     with pytest.raises(JournalError, match="differs from the journal"):
         resume(tmp_path, problems=[problem], engine=Mine(level(0.9)), budget=3)
+
+
+@pytest.mark.parametrize("returned", [level(1.0), (level(x) for x in (0.1, 0.2)), [5], None, "u"])
+def test_what_is_no_list_of_candidates_is_named(returned: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = Mine()
+    monkeypatch.setattr(engine, "ask", lambda n=1: returned, raising=True)
+    with pytest.raises(SpecError, match=r"engine 'mine': ask\(n\) must return a list of Candidate, got"):
+        falsify(lag_problem(), engine, budget=3)
+
+
+@pytest.mark.parametrize("given", [5, b"uniform", object(), SimpleNamespace(name=5, ask=print, tell=print)])
+def test_what_is_no_engine_is_refused(given: Any) -> None:
+    with pytest.raises(SpecError, match=r"expected a name, or an object with name, ask\(\) and tell\(\)"):
+        falsify(lag_problem(), given)
+
+
+@pytest.mark.parametrize("given", [None, 5, [[lag_problem()]], [None]])
+def test_what_is_no_problem_is_refused(given: Any) -> None:
+    with pytest.raises(SpecError, match="expected a Problem"):
+        falsify(given)
