@@ -153,8 +153,6 @@ def _check_variables(problem: Problem) -> None:
             raise SpecError(f"{problem.name}: the model has no variable {name!r}; {near}")
     for name, value in problem.parameters.items():
         finite(f"{problem.name}: parameter {name!r}", value)
-        if name in problem.space.names:
-            raise SpecError(f"{problem.name}: {name!r} is searched and has a fixed value; keep one of them")
     ranges: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
     for searched in ranges:
         variable = info[searched.name]

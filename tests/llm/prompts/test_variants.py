@@ -209,13 +209,13 @@ class TestMP5:
 
     def test_whole_numbers_are_asked_for(self) -> None:
         def asked(**changes: Any) -> str:
-            problem = lag_problem()
+            problem = lag_problem(limit=2.0)
             (u,) = problem.space.inputs
             space = replace(problem.space, inputs=(replace(u, interpolation="constant", **changes),))
             view = View.of(replace(problem, space=space))
             return render(build_prompt(view, variant_named("MP5"), []))[0].content
 
-        assert "; integers from -1 to 1; " in asked(kind="integer")
+        assert "; integers from -1 to 1; " in asked(low=-1.0, high=1.0, kind="integer")
         assert "; Boolean, 0 (false) or 1 (true); " in asked(kind="boolean", low=0.0, high=1.0)
         gears = asked(kind="enumeration", low=1.0, high=2.0, items=(("low", 1), ("top", 2), ("rear", 3)))
         assert "; one of the numbers 1 = low, 2 = top; " in gears
