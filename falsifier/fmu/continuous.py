@@ -4,6 +4,7 @@ Functions of stepping.py are compiled into these, and numba's cache does not not
 changing stepping.py, delete ``__pycache__``.
 """
 
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from falsifier.fmu.ports import Addresses, Table
+from falsifier.fmu.posix import guarded_memory
 from falsifier.fmu.stepping import (
     DONE,
     EVENT,
@@ -110,17 +112,22 @@ def make_memory(states: int, indicators: int, inputs: int) -> Memory:
         clock=np.array([0.0, 0.0, np.inf]),
         counts=np.zeros(7, dtype=np.int64),
         piece=np.zeros(inputs, dtype=np.int64),
-        x=np.zeros(states),
-        new_x=np.zeros(states),
-        stages=np.zeros((7, states)),
-        work=np.zeros((4, states)),
+        x=_written_by_fmu(states),
+        new_x=_written_by_fmu(states),
+        stages=_written_by_fmu(7, states),
+        work=_written_by_fmu(4, states),
         jacobian=np.zeros((states, states)),
         factors=np.zeros((states, states)),
         pivots=np.zeros(states, dtype=np.int64),
-        z=np.zeros(indicators),
-        new_z=np.zeros(indicators),
+        z=_written_by_fmu(indicators),
+        new_z=_written_by_fmu(indicators),
         events=np.zeros(64, dtype=np.uint8),
     )
+
+
+def _written_by_fmu(*shape: int) -> NDArray[np.float64]:
+    """Return zeros; an FMU that writes past their end crashes there, instead of damaging what lies behind."""
+    return np.ndarray(shape, np.float64, guarded_memory(8 * prod(shape)))
 
 
 @intrinsic

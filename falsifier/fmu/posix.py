@@ -7,6 +7,7 @@ functions do less, or nothing, and say so.
 import contextlib
 import ctypes
 import fcntl
+import mmap
 import os
 import resource
 import signal
@@ -49,6 +50,19 @@ def sealed_file(size: int) -> IO[bytes]:
         file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
     file.truncate(size)
     return file
+
+
+def guarded_memory(size: int) -> memoryview:
+    """Allocate zeroed bytes that end where accessible memory ends.
+
+    Native code that writes past their end stops with a signal there, before it damages anything else.
+    """
+    page = mmap.PAGESIZE
+    usable = -(-size // page) * page
+    memory = mmap.mmap(-1, usable + page)
+    guard = ctypes.addressof(ctypes.c_char.from_buffer(memory)) + usable
+    ctypes.CDLL(None).mprotect(ctypes.c_void_p(guard), ctypes.c_size_t(page), 0)
+    return memoryview(memory)[usable - size : usable]
 
 
 def lock_file(path: Path) -> int | None:

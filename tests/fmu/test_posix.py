@@ -35,6 +35,15 @@ def is_gone(pid: int) -> bool:
 
 
 @LINUX
+@pytest.mark.parametrize("size", [0, 8, 4096, 10_000])
+def test_nothing_is_written_past_the_end_of_guarded_memory(size: int) -> None:
+    room = f"view = posix.guarded_memory({size}); import ctypes; print(len(view), sum(view), flush=True); "
+    within = f"start = ctypes.addressof((ctypes.c_char * {size}).from_buffer(view)); ctypes.memset(start, 1, "
+    assert in_child(f"{room}{within}{size}); print(sum(view))") == f"{size} 0\n{size}\n"
+    assert in_child(f"{room}{within}{size + 1}); print('damage')") == f"{size} 0\n"
+
+
+@LINUX
 def test_a_sealed_file_keeps_its_size() -> None:
     with posix.sealed_file(4096) as file:
         assert os.fstat(file.fileno()).st_size == 4096
