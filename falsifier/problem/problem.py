@@ -143,31 +143,40 @@ class Problem:
 def _check_variables(problem: Problem) -> None:
     """Check that the model has all variables that are named, and that the formula's signals will be known."""
     info, experiment = problem.info, problem.experiment
+    known = {v.name for v in info.variables}
     inputs = [v.name for v in info.inputs]
     for name in (r.name for r in problem.space.inputs):
         if name not in inputs:
             raise SpecError(f"{problem.name}: the model has no input {name!r}; {did_you_mean(name, inputs)}")
     for name in (*(p.name for p in problem.space.parameters), *problem.parameters, *experiment.outputs):
-        if name not in info:
+        if name not in known:
             near = did_you_mean(name, (v.name for v in info.variables))
             raise SpecError(f"{problem.name}: the model has no variable {name!r}; {near}")
     for name, value in problem.parameters.items():
         finite(f"{problem.name}: parameter {name!r}", value)
-    ranges: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
-    for searched in ranges:
-        variable = info[searched.name]
-        low = -inf if variable.low is None else variable.low
-        high = inf if variable.high is None else variable.high
-        if searched.low < low or searched.high > high:
-            raise SpecError(
-                f"{problem.name}: [{searched.low:g}, {searched.high:g}] exceeds the model's limits for "
-                f"{searched.name!r}, [{low:g}, {high:g}]"
-            )
     for name in problem.requirement.formula.signals:
         if name not in (*experiment.outputs, *inputs):
             raise SpecError(
                 f"{problem.name}: the formula names {name!r}, which is neither an input nor recorded: add it "
                 "to the experiment's outputs"
+            )
+
+
+def check_limits(problem: Problem) -> None:
+    """Check that only values between the model's limits will be tried.
+
+    Raises:
+        SpecError: naming the range that exceeds them.
+    """
+    limits = {v.name: v.limits for v in problem.info.variables}
+    ranges: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
+    for searched in ranges:
+        low, high = limits.get(searched.name, (None, None))
+        if (low is not None and searched.low < low) or (high is not None and searched.high > high):
+            least, most = (-inf if low is None else low), (inf if high is None else high)
+            raise SpecError(
+                f"{problem.name}: [{searched.low:g}, {searched.high:g}] exceeds the model's limits for "
+                f"{searched.name!r}, [{least:g}, {most:g}]; narrow the range"
             )
 
 

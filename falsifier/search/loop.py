@@ -16,7 +16,7 @@ from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.evaluation.workers import evaluate_all
 from falsifier.llm.messages import Chat, Exchange
-from falsifier.problem.problem import Problem, check_names
+from falsifier.problem.problem import Problem, check_limits, check_names
 from falsifier.search.bounded import BoundedChat
 from falsifier.search.budget import Budget, LimitReached, Spent
 from falsifier.search.events import (
@@ -131,16 +131,16 @@ def search(
         One result per problem, in their order.
 
     Raises:
-        SpecError: if the problems differ in more than their requirement or share a name, or an engine
-            returns no candidate or too many.
+        SpecError: if the problems differ in more than their requirement or share a name, a range exceeds the
+            model's limits, or an engine returns no candidate or too many.
         CandidateError: if an engine returns a candidate outside the search space.
     """
     check_names(problems)
+    check_limits(problems[0])
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
-    loop = _Loop(budget, steps or Live(), directory, tuple(listeners))
-    loop.searched = searched or problems[0].space
-    loop.targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
+    targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
+    loop = _Loop(targets, searched or problems[0].space, budget, steps or Live(), directory, tuple(listeners))
     status: ResultStatus
     try:
         loop.attach()
@@ -189,10 +189,16 @@ class _Loop:
     """State of a running search: the imperative shell around values and pure functions."""
 
     def __init__(
-        self, budget: Budget, steps: Steps, directory: Path | None, listeners: tuple[Listener, ...]
+        self,
+        targets: list[_Target],
+        searched: SearchSpace,
+        budget: Budget,
+        steps: Steps,
+        directory: Path | None,
+        listeners: tuple[Listener, ...],
     ) -> None:
-        self.targets: list[_Target] = []
-        self.searched = SearchSpace((), (), 1.0)
+        self.targets = targets
+        self.searched = searched
         self.budget = budget
         self.steps = steps
         self.directory = directory

@@ -17,7 +17,8 @@ def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate
         wanted: number of candidates to ask for.
 
     Raises:
-        SpecError: if the engine returns no candidate, or more than it was asked for.
+        SpecError: if the engine returns something else than a list of candidates, none, or more than it was
+            asked for.
         CandidateError: naming the engine and the input or parameter that is unknown, missing or outside its
             range.
     """

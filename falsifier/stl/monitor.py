@@ -28,6 +28,7 @@ class Monitor:
         formula: the formula.
         step: sampling step of the trajectories in s.
         samples: their number of samples, including both ends.
+        watched: parts of the formula whose extremes tell whether it was tested.
 
     Raises:
         FormulaError: if a window extends past the end of the grid or a bound is not a multiple of the step.
@@ -36,6 +37,7 @@ class Monitor:
     formula: Formula
     step: float
     samples: int
+    watched: tuple[Watched, ...] = field(init=False, repr=False, compare=False)
     _program: Program = field(init=False, repr=False, compare=False)
     _spare: list[NDArray[np.float64]] = field(init=False, repr=False, compare=False)
 
@@ -46,6 +48,7 @@ class Monitor:
             )
         program = compile_formula(self.formula, step=self.step, samples=self.samples)
         object.__setattr__(self, "_program", program)
+        object.__setattr__(self, "watched", watched_parts(program.root))
         object.__setattr__(self, "_spare", [])  # buffers of earlier evaluations, for reuse
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -79,11 +82,6 @@ class Monitor:
         diagnosis = diagnose(self._program.root, buffer, trajectory)
         self._spare.append(buffer)
         return diagnosis
-
-    @property
-    def watched(self) -> tuple[Watched, ...]:
-        """Parts of the formula whose extremes tell whether it was tested."""
-        return watched_parts(self._program.root)
 
     def extremes(self, trajectory: Trajectory) -> Extremes:
         """Return the smallest and largest robustness of each watched part.

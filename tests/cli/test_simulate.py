@@ -31,6 +31,12 @@ def test_constants_and_parameters_are_set_and_the_text_says_what_decided(tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path) -> None:
+    done = falsifier("simulate", "AT1", "--set", "throttle=120", "--out", "out", cwd=tmp_path)
+    assert "constant 120" in done.out, done.err
+    assert (tmp_path / "out" / "trajectory.png").is_file()
+
+
 def test_an_fmu_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
     lag = str(fixture("Lag_2"))
     done = falsifier("simulate", lag, "--stl", "G[0,1] (y <= 5)", "--set", "u=2", "--json", cwd=tmp_path)

@@ -6,12 +6,13 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import ValueKind
+from falsifier.core.space import InputRange, SearchSpace, ValueKind
 from falsifier.engines import make_engine
-from falsifier.errors import ChatError
+from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+from falsifier.search.assurance.assess import assess
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
 from falsifier.search.journal import read_journal
@@ -46,6 +47,15 @@ def test_uses_the_budget_up_and_says_so() -> None:
     assert "7 simulations" in result.reason
     assert result.best is not None
     assert result.best.robustness == min(e.robustness for e in result.evaluations if e.robustness is not None)
+
+
+def test_only_values_within_the_models_limits_are_searched() -> None:
+    problem = lag_problem()
+    wide = replace(problem, space=SearchSpace((InputRange("u", -50, 1),), (), 10.0))
+    with pytest.raises(SpecError, match=r"LAG: .* exceeds the model's limits for 'u', .*; narrow the range"):
+        run(wide, budget=1)
+    with pytest.raises(SpecError, match="narrow the range"):
+        assess(wide, budget=1)
 
 
 def test_robustness_zero_is_no_violation() -> None:

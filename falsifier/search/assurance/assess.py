@@ -14,7 +14,7 @@ from falsifier.engines.box import UnitBox
 from falsifier.engines.uniform import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, check_limits
 from falsifier.search.assurance.bounds import interval, upper_bound
 from falsifier.search.assurance.distribution import distribution_text
 from falsifier.search.assurance.splitting import Splitting, least_budget, split
@@ -96,7 +96,8 @@ def assess(
         progress: called with the number of simulations so far.
 
     Raises:
-        SpecError: if a number is out of range, or there is nothing to vary.
+        SpecError: if a number is out of range, there is nothing to vary, or a range exceeds the model's
+            limits.
         SimulationError: if every simulation failed.
         ModelError: if the model cannot be used at all.
     """
@@ -105,6 +106,7 @@ def assess(
         raise SpecError(f"confidence: expected a number between 0 and 1, got {confidence!r}")
     if not problem.space.names:
         raise SpecError("nothing to vary; give at least one input or parameter a range")
+    check_limits(problem)
     rest = _for_splitting(budget, splitting)
     count = _Counted(problem, progress or (lambda _: None))
     engine = Uniform(problem, seed=seed)
