@@ -1,7 +1,13 @@
-"""A campaign on a local Dask cluster of two workers."""
+"""Workers: a local Dask cluster of two, and processes of this machine."""
 
 import logging
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -9,17 +15,42 @@ from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SpecError
 from falsifier.evaluation.workers import local_executor, open_workers
 from tests.campaigns.support import outcomes, request, work_in_threads
+from tests.patience import wait_until
+from tests.problems import BEGUN, HOLD, RELEASE
 
-
-def test_a_cluster_gives_the_same_results_as_this_machine(tmp_path: Path) -> None:
+if TYPE_CHECKING:
     from distributed import LocalCluster
 
-    wanted = request("easy", "hard", engines=("uniform", "corners"), seeds=1)
-    with pytest.MonkeyPatch.context() as patch:
-        work_in_threads(patch)
-        run_campaign(wanted, tmp_path / "here")
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
-        run_campaign(wanted, tmp_path / "cluster", executor=f"dask:{cluster.scheduler_address}")
+WANTED = request("held_hard", "held_impossible", engines=("uniform", "corners"), seeds=1)
+HELD_AFTER = 30  # of some 60 simulations
+
+
+@pytest.fixture
+def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator["LocalCluster"]:
+    """A cluster whose simulations are held after some of them."""
+    from distributed import LocalCluster
+
+    monkeypatch.setenv(HOLD, f"{HELD_AFTER} {tmp_path}")
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as found:
+        monkeypatch.delenv(HOLD)
+        yield found
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kills with SIGKILL")
+def test_a_cluster_gives_the_same_results_as_this_machine_even_if_a_worker_is_killed(
+    cluster: "LocalCluster", tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = tmp_path / BEGUN
+    with ThreadPoolExecutor(1) as aside:
+        address = f"dask:{cluster.scheduler_address}"
+        campaign = aside.submit(run_campaign, WANTED, tmp_path / "cluster", executor=address)
+        wait_until(lambda: campaign.done() or (begun.exists() and begun.stat().st_size > HELD_AFTER))
+        assert not campaign.done()
+        os.kill(cluster.workers[0].pid, signal.SIGKILL)
+        (tmp_path / RELEASE).touch()
+        assert not campaign.result().reason
+    work_in_threads(monkeypatch)
+    run_campaign(WANTED, tmp_path / "here")
     assert outcomes(tmp_path / "cluster") == outcomes(tmp_path / "here")
 
 
