@@ -13,8 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.surrogate.grid import Trace
 from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.trace import Trace
 
 # Predicted states are limited to the range of the simulated ones, widened by this share of it on both sides.
 _WIDENING = 0.5

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.surrogate.grid import Grid
-from falsifier.engines.surrogate.layout import Layout
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import Layout
 
 # Log odds of a failure before anything is known, and the strength of that belief and of small weights.
 _PRIOR, _RIDGE = -1.0, 0.1

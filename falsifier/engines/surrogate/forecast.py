@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from falsifier.engines.box import Array
+from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate.coarse import Envelope
 from falsifier.engines.surrogate.dynamics import (
     DeviationDynamics,
@@ -13,10 +14,9 @@ from falsifier.engines.surrogate.dynamics import (
     FourierDynamics,
     StartState,
 )
-from falsifier.engines.surrogate.grid import Trace
-from falsifier.engines.surrogate.layout import Layout
 from falsifier.engines.surrogate.objective import LeafValues, Objective
 from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.trace import Trace
 from falsifier.stl import Verdict
 
 _KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {

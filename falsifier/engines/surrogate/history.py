@@ -7,11 +7,12 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Array, learnable
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
-from falsifier.engines.surrogate.grid import Grid, Trace, trace_of
-from falsifier.engines.surrogate.layout import Layout
 from falsifier.engines.surrogate.objective import LeafValues, Objective, make_objective
 from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.trace import Trace, trace_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 

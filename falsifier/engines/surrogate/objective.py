@@ -7,9 +7,9 @@ import numpy as np
 
 from falsifier.core.space import SearchSpace
 from falsifier.engines.box import Array
+from falsifier.engines.grid import Grid
 from falsifier.engines.surrogate.coarse import CoarseFormula, Leaf, coarse_formula
 from falsifier.engines.surrogate.coordinates import Coordinates
-from falsifier.engines.surrogate.grid import Grid
 from falsifier.stl import Verdict
 from falsifier.stl.formula import Formula
 

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.surrogate.layout import Layout
+from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import mutations, random_points
 

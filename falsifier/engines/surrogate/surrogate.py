@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.engines.box import Array
 from falsifier.engines.corner_walk import CornerWalk, Levels
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import Layout, planning_layout, region_layouts
 from falsifier.engines.surrogate.arms import choose_arm, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.forecast import Ensemble, Forecast
-from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.history import History, Sample, scaled_costs
-from falsifier.engines.surrogate.layout import Layout, planning_layout, region_layouts
 from falsifier.engines.surrogate.opening import opening
 from falsifier.engines.surrogate.planning import plan
 from falsifier.engines.surrogate.settings import Settings

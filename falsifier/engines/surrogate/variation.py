@@ -3,7 +3,7 @@
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.surrogate.layout import Layout
+from falsifier.engines.layout import Layout
 
 # Standard deviations of small changes, as shares of a range: coarse, medium and fine, equally likely.
 _STEPS = np.array([0.3, 0.1, 0.03])

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import planning_layout
 from falsifier.engines.surrogate import Settings
-from falsifier.engines.surrogate.grid import Grid
 from falsifier.engines.surrogate.history import History
-from falsifier.engines.surrogate.layout import planning_layout
 from falsifier.engines.surrogate.variation import random_points
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem

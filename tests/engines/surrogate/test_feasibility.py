@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 
 from falsifier.engines import box
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import planning_layout
 from falsifier.engines.surrogate.feasibility import Feasibility
-from falsifier.engines.surrogate.grid import Grid
-from falsifier.engines.surrogate.layout import planning_layout
 from falsifier.engines.surrogate.surrogate import Surrogate
 from falsifier.search.run import falsify
 from falsifier.testing import Array, lag, lag_problem

@@ -1,9 +1,9 @@
 import numpy as np
 
 from falsifier.engines.box import Array
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import planning_layout
 from falsifier.engines.surrogate import Settings
-from falsifier.engines.surrogate.grid import Grid
-from falsifier.engines.surrogate.layout import planning_layout
 from falsifier.engines.surrogate.planning import plan
 from falsifier.testing import FREE, lag_problem
 

@@ -1,8 +1,8 @@
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.surrogate.grid import Grid
-from falsifier.engines.surrogate.layout import Layout, planning_layout
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import Layout, planning_layout
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
 from falsifier.testing import FREE, START, lag_problem
 

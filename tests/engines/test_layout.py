@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from falsifier.engines.surrogate.grid import Grid
-from falsifier.engines.surrogate.layout import planning_layout, region_layouts
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import planning_layout, region_layouts
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
 from falsifier.testing import FREE, START, lag_problem
 

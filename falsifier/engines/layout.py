@@ -11,7 +11,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines.box import Array
-from falsifier.engines.surrogate.grid import Grid
+from falsifier.engines.grid import Grid
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The time grid of predictions, and simulations on that grid."""
+"""Simulations on the time grid of predictions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,40 +9,9 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Array
+from falsifier.engines.grid import Grid
 from falsifier.engines.surrogate.coarse import Leaf
 from falsifier.engines.surrogate.coordinates import Coordinates
-
-# Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
-_MAX_HORIZONS = 20
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """Evenly spaced times from 0 over the formula's horizon, and on to the end of the simulation.
-
-    Attributes:
-        step: step in s.
-        cells: number of cells over the horizon.
-        all_cells: number of complete cells until the end of the simulation, at most twenty horizons.
-    """
-
-    step: float
-    cells: int
-    all_cells: int
-
-    @classmethod
-    def over(cls, horizon: float, stop_time: float, *, cells: int, shortest: float) -> "Grid":
-        """Return a grid of ``cells`` cells over the horizon, fewer if needed for cells of ``shortest`` s."""
-        horizon = min(horizon, stop_time) if horizon > 0 else stop_time
-        count = max(1, min(cells, round(horizon / shortest)))
-        step = horizon / count
-        rest = int(stop_time / step + 1e-6)
-        return cls(step, count, max(count, min(rest, _MAX_HORIZONS * count)))
-
-    @property
-    def middles(self) -> Array:
-        """Middle times of the horizon's cells in s, shape (cells,)."""
-        return np.asarray((np.arange(self.cells) + 0.5) * self.step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
