@@ -54,6 +54,11 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             "learns the dynamics and searches on its predictions",
             is_free=True,
         ),
+        "coverage": Registered(
+            "falsifier.engines.coverage:Coverage",
+            "goes on from inputs that reached something new; does not use robustness",
+            is_free=True,
+        ),
         "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points"),
         "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence"),
         "corners": Registered("falsifier.engines.corners:Corners", "constant extremes first, then random"),

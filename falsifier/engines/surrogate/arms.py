@@ -25,6 +25,14 @@ def quality(arm: str, arms: Sequence[str], costs: Sequence[float], *, window: in
     return float(np.mean(shares))
 
 
+def flatness(costs: Sequence[float]) -> float:
+    """Return the share of costs that equal the most common one; near 1, costs do not lead a search."""
+    if not costs:
+        return 0.0
+    _, counts = np.unique(np.asarray(costs), return_counts=True)
+    return float(counts.max() / len(costs))
+
+
 def choose_arm(qualities: Mapping[str, float], rng: np.random.Generator, *, least: float) -> str:
     """Draw an arm; better ones are more likely, and each has a probability of about ``least`` or more."""
     names = list(qualities)

@@ -54,6 +54,9 @@ class Settings:
         region_bound_start: probability that a coordinate of one of the first points is at a bound.
         region_bound: probability that a changed coordinate is moved to its nearer bound.
         region_jump: probability that a changed coordinate is redrawn from its whole range.
+        flat: share of simulations with the same cost from which on coverage leads the search.
+        flat_start: minimum number of simulations for that.
+        coverage_share: probability of coverage where it leads.
         retries: number of further proposals if one will probably fail; the least risky one is simulated.
         risk_weight: scaled robustness that a certain failure costs in planning.
     """
@@ -97,5 +100,8 @@ class Settings:
     region_bound_start: float = 0.7
     region_bound: float = 0.2
     region_jump: float = 0.06
+    flat: float = 0.6
+    flat_start: int = 4
+    coverage_share: float = 0.8
     retries: int = 12
     risk_weight: float = 5.0

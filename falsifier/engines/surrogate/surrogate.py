@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.engines.box import Array
 from falsifier.engines.corner_walk import CornerWalk, Levels
+from falsifier.engines.coverage import Explorer
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout, planning_layout, region_layouts
-from falsifier.engines.surrogate.arms import choose_arm, quality
+from falsifier.engines.surrogate.arms import choose_arm, flatness, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.forecast import Ensemble, Forecast
@@ -53,7 +54,8 @@ class Pending:
 class Surrogate:
     """Learns the dynamics from whole trajectories and proposes inputs with a low predicted robustness.
 
-    In addition it searches directly, in a trust region; the arm that does better gets more turns.
+    In addition it searches directly, in a trust region; the arm that does better gets more turns. Where most
+    simulations have the same robustness, what they covered leads the search.
     """
 
     name = "surrogate"
@@ -68,6 +70,7 @@ class Surrogate:
         self.layout = planning_layout(space, self.grid)
         self.history = History(problem, self.grid, self.layout, self.settings)
         self.feasibility = Feasibility(self.grid)
+        self._explorer = Explorer(problem, self.layout)
         self.dynamics = Ensemble(self.settings)
         windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
         self._windows = windows
@@ -98,6 +101,8 @@ class Surrogate:
             sample = self.history.add(evaluation, pending.arm if pending else "")
             point = self.layout.point(told)
             self.feasibility.add(self.layout, point, failed=sample is None)
+            if evaluation.trajectory is not None:
+                self._explorer.learn(point, evaluation.trajectory)
             if sample is None:
                 self._failed.append(point)
             if pending is not None:
@@ -183,15 +188,21 @@ class Surrogate:
             point = random_points(self.layout, rng, 1)[0]
             return Pending("random", self.layout, point, "random: too few simulations to learn from yet")
         arm = self._choose_arm(rng)
+        if arm == "coverage":
+            idea = self._explorer.propose(rng)
+            return Pending("coverage", self.layout, idea.point, idea.why)
         if arm == "dynamics":
             return self._plan(rng)
         return self._switch(rng) if arm == "switching" else self._search(rng)
 
     def _choose_arm(self, rng: np.random.Generator) -> str:
         settings = self.settings
+        costs = self.history.direct_costs()
+        is_flat = len(costs) >= settings.flat_start and flatness(costs) >= settings.flat
+        if is_flat and rng.random() < settings.coverage_share:
+            return "coverage"
         if self._planned < settings.trial and rng.random() < settings.trial_share:
             return "dynamics"
-        costs = self.history.direct_costs()
         arms = [s.arm for s in self.history.samples]
         may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
         names = ("dynamics", "region", "switching") if may_switch else ("dynamics", "region")

@@ -12,8 +12,10 @@ from falsifier.engines.surrogate import Settings, Surrogate
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
+from falsifier.search.run import falsify
 from falsifier.stl import parse
 from falsifier.testing import BIAS, FREE, START, Array, EngineContract, lag, lag_problem
+from tests.engines.coverage.support import lock_problem
 from tests.engines.support import HASTY
 
 
@@ -108,6 +110,16 @@ def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
     engine.tell([evaluate(problem, candidate)])
     assert engine.history.objective is not None and engine.history.objective.is_relaxed
     assert simulations_until_violation(problem, seed=1, budget=20) is not None
+
+
+def test_coverage_leads_where_robustness_is_flat_and_only_there() -> None:
+    flat, sloped = lock_problem(free=FREE), lag_problem("G[0,10] (x <= 1.25)", free=FREE)
+    led = []
+    for problem in (flat, sloped):
+        found = falsify(problem, Surrogate(problem, seed=0, settings=HASTY), budget=30)
+        led.append(["the input that made" in e.candidate.rationale for e in found.evaluations])
+    assert not any(led[0][:4]) and 15 <= sum(led[0]) < 26
+    assert not any(led[1])
 
 
 def test_parallel_candidates_differ() -> None:

@@ -1,0 +1,130 @@
+"""The archive of what was reached, and how to reach more: return to it, then go on differently.
+
+Returning before exploring is the idea of Go-Explore (Ecoffet et al., Nature 590 (2021) 580-586). Preferring
+what is rare is the power schedule of coverage-guided fuzzers (Böhme et al., IEEE TSE 45 (2019) 489-506).
+Systems are causal: inputs that stay the same up to a time do what they did until then.
+"""
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.box import Array
+from falsifier.engines.coverage.marks import MODES, Mark, Marker
+from falsifier.engines.coverage.programs import Programs
+from falsifier.engines.layout import Layout
+from falsifier.problem.problem import Problem
+
+# Probabilities of what follows a mark: a new end, a span of the same or another program; else a small change.
+_NEW_END, _REPEATED = 0.6, 0.2
+
+
+@dataclass(slots=True, eq=False)
+class Reached:
+    """The input that reached a mark first, or much earlier than the first one.
+
+    Attributes:
+        point: the input in the explorer's layout.
+        time: when it reached the mark, in s.
+        tries: how often the search has gone on from here.
+    """
+
+    point: Array
+    time: float
+    tries: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Idea:
+    """A proposed input.
+
+    Attributes:
+        point: the input.
+        why: the reason, in words.
+    """
+
+    point: Array
+    why: str
+
+
+class Explorer:
+    """Proposes inputs that reach something that no simulation so far has reached."""
+
+    def __init__(self, problem: Problem, layout: Layout) -> None:
+        self._marker = Marker.of(problem)
+        self._programs = Programs(layout)
+        self._reached: dict[Mark, Reached] = {}
+        self._by_source: dict[str, list[Mark]] = defaultdict(list)
+        self._hits: Counter[Mark] = Counter()
+        self._new: Counter[str] = Counter()
+        self._seen = 0
+
+    def learn(self, point: Array, trajectory: Trajectory) -> None:
+        """Add a simulation to the archive."""
+        self._seen += 1
+        marks = self._marker.marks(trajectory)
+        self._new.update({mark.source for mark in marks if mark not in self._reached})
+        for mark, time in marks.items():
+            self._hits[mark] += 1
+            known = self._reached.get(mark)
+            if known is None:
+                self._by_source[mark.source].append(mark)
+            if known is None or time < 0.95 * known.time:
+                self._reached[mark] = Reached(point, time, known.tries if known else 0)
+
+    def propose(self, rng: np.random.Generator) -> Idea:
+        """Return the next input: one that reached a rare mark, continued differently after it."""
+        mark = self._choose(rng)
+        if mark is None:
+            return Idea(
+                self._programs.fresh(rng), "a random program of the inputs: nothing has been reached yet"
+            )
+        reached = self._reached[mark]
+        reached.tries += 1
+        kind = rng.random()
+        where = f"the input that made {describe(mark)} at {reached.time:.3g} s"
+        if kind < _NEW_END:
+            point = self._programs.another_end(rng, reached.point, reached.time)
+            return Idea(point, f"{where}, continued differently")
+        if kind < _NEW_END + _REPEATED:
+            other = self._choose(rng) or mark
+            source = self._reached[other]
+            span = (float(rng.uniform(0.0, source.time)), source.time)
+            point = self._programs.repeated(rng, reached.point, reached.time, source.point, span)
+            return Idea(point, f"{where}, followed by what made {describe(other)}")
+        return Idea(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+
+    def _choose(self, rng: np.random.Generator) -> Mark | None:
+        """Draw a signal, then one of its marks; rare ones from which little was tried are more likely."""
+        if not self._by_source:
+            return None
+        sources = list(self._by_source)
+        # A signal that does something new every time distinguishes as little as one that never does.
+        weights = np.array([1.05 - self._new[s] / self._seen for s in sources])
+        # The modes count as much as all signals together: they are the states of what the system does.
+        weights[[s == MODES for s in sources]] *= len(sources)
+        source = sources[int(rng.choice(len(sources), p=weights / weights.sum()))]
+        marks = self._by_source[source]
+        rarity = np.array([1.0 / sqrt(self._hits[m] * (1 + self._reached[m].tries)) for m in marks])
+        return marks[int(rng.choice(len(marks), p=rarity / rarity.sum()))]
+
+
+def describe(mark: Mark) -> str:
+    """Return a mark in words, as the object of "made"."""
+    source, what = mark
+    if source == MODES:
+        return f"the modes {', '.join(f'{value:g}' for value in what)}"
+    match what:
+        case ("is", value):
+            return f"{source} = {value:g}"
+        case ("changes", old, new, count):
+            return f"{source} change from {old:g} to {new:g}{f' {count} times' if count != 1 else ''}"
+        case ("after", old, new, before, earlier, later, _):
+            return f"{source} change from {old:g} to {new:g} after {before} from {earlier:g} to {later:g}"
+        case ("near", _):
+            return f"{source} come close to its threshold"
+        case _:
+            return f"{source} go {what[0]}"

@@ -1,0 +1,205 @@
+"""What a trajectory did: the marks that tell a simulation which reached something new from one that did not.
+
+A mark is a value of a discrete signal, one of its changes, two changes one after the other with the time
+between them, what all discrete signals were at the same time, a level that a continuous signal reached, or
+how close a predicate came to its threshold. Levels, distances and times count in octaves, so that no scale
+has to be known and marks do not multiply with the sampling rate.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from falsifier.core.model import ModelInfo
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.box import learnable
+from falsifier.problem.problem import Problem
+from falsifier.stl.formula import Predicate
+
+Floats = NDArray[np.float64]
+
+# Maximum number of distinct values, all integers, of a signal that is taken for discrete.
+_MAX_LEVELS = 16
+# Half octaves below the largest deviation of a signal that still count as levels.
+_LEVELS = 12
+# Changes of a trajectory that are looked at; a signal that chatters would otherwise hide the others.
+_MAX_CHANGES = 200
+
+
+# Source of the marks of all discrete signals together.
+MODES = "the modes"
+
+
+class Mark(NamedTuple):
+    """Something that a trajectory did.
+
+    Attributes:
+        source: the signal or predicate that did it.
+        what: what it did.
+    """
+
+    source: str
+    what: tuple[float | str, ...]
+
+
+class Change(NamedTuple):
+    """A change of a discrete signal, or of the truth of a predicate.
+
+    Attributes:
+        sample: index of the first sample with the new value.
+        source: the signal or predicate.
+        old: value before.
+        new: value after.
+    """
+
+    sample: int
+    source: str
+    old: float
+    new: float
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """Finds the marks of trajectories.
+
+    Attributes:
+        outputs: recorded signals that are not searched inputs.
+        predicates: predicates of the formula that depend on such a signal.
+        info: what is known about the model.
+    """
+
+    outputs: tuple[str, ...]
+    predicates: tuple[Predicate, ...]
+    info: ModelInfo
+
+    @classmethod
+    def of(cls, problem: Problem) -> "Marker":
+        """Return the marker for a problem."""
+        driven = {r.name for r in problem.space.inputs}
+        formula = problem.requirement.formula
+        outputs = tuple(dict.fromkeys((*problem.experiment.outputs, *formula.signals)))
+        return cls(
+            tuple(name for name in outputs if name not in driven),
+            tuple(p for p in formula.predicates if not {*p.left.signals, *p.right.signals} <= driven),
+            problem.info,
+        )
+
+    def marks(self, trajectory: Trajectory) -> dict[Mark, float]:
+        """Return the marks of a trajectory and the time in s at which each was reached first."""
+        discrete = {n: c for n, c in self._columns(trajectory) if is_discrete(self.info, n, c)}
+        margins = {str(p): _margin(p, trajectory) for p in self.predicates if not _only(p, discrete)}
+        truths = {name: (margin > 0).astype(np.float64) for name, margin in margins.items()}
+        found = [
+            *(mark for name, column in discrete.items() for mark in _values(name, column)),
+            *_modes({**discrete, **truths}),
+            *_changes(sorted(_all_changes({**discrete, **truths}))[:_MAX_CHANGES]),
+            *(m for n, c in self._columns(trajectory) if n not in discrete for m in _levels(n, c)),
+            *(mark for name, margin in margins.items() for mark in _nearness(name, margin)),
+        ]
+        first: dict[Mark, int] = {}
+        for mark, sample in found:
+            first[mark] = min(sample, first.get(mark, sample))
+        return {mark: float(trajectory.times[sample]) for mark, sample in first.items()}
+
+    def _columns(self, trajectory: Trajectory) -> Iterator[tuple[str, Floats]]:
+        for name in self.outputs:
+            if name in trajectory.columns:
+                yield name, _finite(trajectory[name])
+
+
+def is_discrete(info: ModelInfo, name: str, column: Floats) -> bool:
+    """Whether a signal takes few values, all of them integers: by its type, otherwise by its course."""
+    if name in info and info[name].kind in ("integer", "boolean", "enumeration"):
+        return True
+    levels = np.unique(column)
+    return 1 < len(levels) <= _MAX_LEVELS and bool((levels == np.round(levels)).all())
+
+
+def _only(predicate: Predicate, discrete: Mapping[str, Floats]) -> bool:
+    return {*predicate.left.signals, *predicate.right.signals} <= discrete.keys()
+
+
+def _margin(predicate: Predicate, trajectory: Trajectory) -> Floats:
+    names = (*predicate.left.signals, *predicate.right.signals)
+    columns = {name: _finite(trajectory[name]) for name in names}
+    margin = predicate.left.evaluate(columns) - predicate.right.evaluate(columns)
+    return np.broadcast_to(_finite(margin), trajectory.times.shape)
+
+
+def _finite(numbers: ArrayLike) -> Floats:
+    return np.nan_to_num(learnable(numbers))
+
+
+def _values(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
+    values, samples = np.unique(column, return_index=True)
+    for value, sample in zip(values.tolist(), samples.tolist(), strict=True):
+        yield Mark(name, ("is", value)), sample
+
+
+def _modes(columns: Mapping[str, Floats]) -> Iterator[tuple[Mark, int]]:
+    """Yield what the discrete signals were at the same time, with large numbers in octaves."""
+    if len(columns) < 2:
+        return
+    table = np.stack([_coarse(column) for column in columns.values()])
+    starts = np.flatnonzero((np.diff(table, axis=1) != 0).any(axis=0))[:_MAX_CHANGES] + 1
+    for sample in (0, *starts.tolist()):
+        yield Mark(MODES, tuple(table[:, sample].tolist())), sample
+
+
+def _coarse(column: Floats) -> Floats:
+    size = np.abs(column)
+    octave = np.floor(np.log2(np.maximum(size, 1.0)))
+    return np.where(size > _MAX_LEVELS, np.sign(column) * 2.0**octave, column)
+
+
+def _all_changes(columns: Mapping[str, Floats]) -> Iterator[Change]:
+    for name, column in columns.items():
+        for sample in (np.flatnonzero(np.diff(column))[:_MAX_CHANGES] + 1).tolist():
+            yield Change(sample, name, float(column[sample - 1]), float(column[sample]))
+
+
+def _changes(changes: list[Change]) -> Iterator[tuple[Mark, int]]:
+    """Yield the marks of changes in the order of time: each with its number, and with the ones before it."""
+    counts: dict[tuple[str, float, float], int] = {}
+    latest: dict[str, Change] = {}
+    for change in changes:
+        key = change.source, change.old, change.new
+        counts[key] = counts.get(key, 0) + 1
+        if (count := counts[key]).bit_count() == 1 or count == 3:
+            yield Mark(change.source, ("changes", change.old, change.new, count)), change.sample
+        for before in latest.values():
+            gap = _octave(change.sample - before.sample + 1)
+            what = "after", change.old, change.new, before.source, before.old, before.new, gap
+            yield Mark(change.source, what), change.sample
+        latest[change.source] = change
+
+
+def _levels(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
+    """Yield the levels that a signal reached above and below its first value, in half octaves."""
+    for direction, deviation in (("up", column - column[0]), ("down", column[0] - column)):
+        largest = float(deviation.max())
+        if largest <= 0.0:
+            continue
+        top = int(np.floor(2 * np.log2(largest)))
+        for level in range(top - _LEVELS + 1, top + 1):
+            yield Mark(name, (direction, level)), int(np.argmax(deviation >= 2.0 ** (level / 2)))
+
+
+def _nearness(name: str, margin: Floats) -> Iterator[tuple[Mark, int]]:
+    """Yield how close a predicate came to the other side of its threshold, in half octaves."""
+    distance = np.minimum.accumulate(margin if margin[0] > 0 else -margin)
+    start = float(distance[0])
+    if start <= 0.0:
+        return
+    for level in range(_LEVELS):
+        reached = distance <= start / 2.0 ** (level / 2)
+        if not reached[-1]:
+            return
+        yield Mark(name, ("near", level)), int(np.argmax(reached))
+
+
+def _octave(samples: int) -> int:
+    return int(samples).bit_length()

@@ -1,0 +1,152 @@
+"""Inputs as short programs: pieces that hold a value for some time, and changes of such programs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.space import InputRange, ParameterRange, nearest_value
+from falsifier.engines.box import Array
+from falsifier.engines.layout import Layout
+
+# Discrete inputs with more values than this are drawn like real ones.
+_MAX_LEVELS = 32
+# Share of pieces of a real input that are at a bound.
+_AT_BOUND = 0.6
+# Share of inputs that keep their value in a new tail, if there are several.
+_KEPT = 0.25
+# Probability that a parameter is drawn again: nothing of what followed is certain then.
+_PARAMETER_REDRAWN = 0.1
+
+
+class Programs:
+    """Draws programs in a layout.
+
+    Args:
+        layout: the layout of the points.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        space = layout.space
+        self._layout = layout
+        ranges: tuple[InputRange | ParameterRange, ...] = (*space.inputs, *space.parameters)
+        self._levels = [_levels(r) for r in ranges]
+        self._times = [np.asarray(coding.times) for coding in layout.codings]
+        self._longest = max((len(times) for times in self._times), default=1)
+
+    def fresh(self, rng: np.random.Generator) -> Array:
+        """Return a new program, shape (d,)."""
+        point = rng.random(self._layout.dimension)
+        for j, group in enumerate(self._layout.groups):
+            point[group] = self._level(rng, j, None)
+        return self.another_end(rng, point, -1.0)
+
+    def another_end(self, rng: np.random.Generator, point: Array, time: float) -> Array:
+        """Return the program that is the same up to a time in s, and drawn again after it."""
+        point = self._parameters(rng, point)
+        pace = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2)))))
+        moving = rng.random(len(self._times)) >= _KEPT
+        if moving.size:
+            moving[rng.integers(len(moving))] = True
+        for j, times in enumerate(self._times):
+            if moving[j]:
+                start = int(np.searchsorted(times, time, side="right"))
+                point[self._layout.groups[j]] = self._pieces(
+                    rng, j, point[self._layout.groups[j]], start, pace
+                )
+        return point
+
+    def repeated(
+        self, rng: np.random.Generator, point: Array, time: float, source: Array, span: tuple[float, float]
+    ) -> Array:
+        """Return the program that is the same up to a time, followed after a pause by a span of another one.
+
+        Args:
+            rng: random generator.
+            point: the program to continue, shape (d,).
+            time: end in s of what is kept of it.
+            source: the program that the span is taken from, shape (d,).
+            span: its start and end in s.
+        """
+        result = self._parameters(rng, point)
+        pause = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2))))) - 1.0
+        for j, times in enumerate(self._times):
+            group = self._layout.groups[j]
+            first, stop = (int(np.searchsorted(times, t, side="left")) for t in span)
+            start = int(np.searchsorted(times, time, side="right"))
+            begin = min(len(times), start + round(pause))
+            piece = source[group][first : max(stop, first + 1) + 1][: len(times) - begin]
+            values = result[group]
+            if start < begin:
+                values[start:begin] = (
+                    values[start - 1] if start and rng.random() < 0.5 else self._level(rng, j, None)
+                )
+            values[begin : begin + len(piece)] = piece
+            values[begin + len(piece) :] = values[begin + len(piece) - 1]
+            result[group] = values
+        return result
+
+    def moved(self, rng: np.random.Generator, point: Array) -> Array:
+        """Return the program with one switch of one input moved, one piece dropped or one value changed."""
+        point = self._parameters(rng, point)
+        if not self._times:
+            return point
+        j = int(rng.integers(len(self._times)))
+        group = self._layout.groups[j]
+        values = point[group]
+        switches = np.flatnonzero(np.diff(values)) + 1
+        kind = rng.random()
+        if not len(switches) or kind < 0.3:
+            edges = np.concatenate([[0], switches, [len(values)]])
+            k = int(rng.integers(len(edges) - 1))
+            values[edges[k] : edges[k + 1]] = self._level(rng, j, float(values[edges[k]]))
+        elif kind < 0.8:
+            at = int(rng.choice(switches))
+            shift = int(np.ceil(np.exp(rng.uniform(0.0, np.log(max(len(values) / 4, 2))))))
+            if rng.random() < 0.5:
+                values[max(0, at - shift) : at] = values[at]
+            else:
+                values[at : at + shift] = values[at - 1]
+        else:
+            at = int(rng.choice(switches))
+            later = switches[switches > at]
+            values[at : int(later[0]) if len(later) else len(values)] = values[at - 1]
+        point[group] = values
+        return point
+
+    def _parameters(self, rng: np.random.Generator, point: Array) -> Array:
+        point = point.copy()
+        for j in range(len(self._times), len(self._layout.groups)):
+            if not self._times or rng.random() < _PARAMETER_REDRAWN:
+                point[self._layout.groups[j]] = self._level(rng, j, None)
+        return point
+
+    def _pieces(self, rng: np.random.Generator, j: int, values: Array, start: int, pace: float) -> Array:
+        at = start
+        last = float(values[start - 1]) if start else None
+        while at < len(values):
+            length = max(1, round(pace * 2.0 ** rng.uniform(-1.0, 1.0)))
+            last = self._level(rng, j, last)
+            values[at : at + length] = last
+            at += length
+        return values
+
+    def _level(self, rng: np.random.Generator, j: int, last: float | None) -> float:
+        """Draw a value in [0, 1] of an input or parameter, another one than the last if it is discrete."""
+        levels = self._levels[j]
+        if levels is not None:
+            others = levels if last is None or len(levels) < 2 else levels[np.abs(levels - last) > 1e-9]
+            return float(rng.choice(others))
+        return float(rng.integers(2)) if rng.random() < _AT_BOUND else float(rng.random())
+
+
+def _levels(ranged: InputRange | ParameterRange) -> NDArray[np.float64] | None:
+    """Return the values in [0, 1] of a discrete input; None for a real one and for very many values."""
+    if ranged.kind == "real" or ranged.high - ranged.low > _MAX_LEVELS * 4:
+        return None
+    numbers: Sequence[float] = sorted(
+        {nearest_value(ranged, n) for n in range(int(np.floor(ranged.low)), int(np.ceil(ranged.high)) + 1)}
+    )
+    if len(numbers) > _MAX_LEVELS:
+        return None
+    return (np.array(numbers) - ranged.low) / ((ranged.high - ranged.low) or 1.0)

@@ -1,0 +1,51 @@
+"""A lock that opens after a sequence of inputs, which its robustness does not show."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.space import Freedom, InputRange, SearchSpace
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.stl import parse
+
+Array = NDArray[np.float64]
+STOP_TIME, INTERVAL = 10.0, 0.1
+CODE = (3, 1, 4, 2, 5, 1, 3)
+# A key counts if the previous one was pressed at most this long ago, in s.
+PATIENCE = 1.2
+
+
+def lock(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Count the right keys in a row; a wrong or a late one starts from the beginning. Seven open the lock."""
+    done, since, last = 0, 0.0, 0
+    shown, opened = np.zeros(len(times)), np.zeros(len(times))
+    for k, key in enumerate(inputs["key"].astype(int).tolist()):
+        since += INTERVAL
+        if done < len(CODE):
+            if since > PATIENCE:
+                done = 0
+            if key != last and key:
+                done = done + 1 if key == CODE[done] else int(key == CODE[0])
+                since = 0.0
+        last = key
+        shown[k], opened[k] = done, done == len(CODE)
+    return {"stage": shown, "open": opened}
+
+
+def lock_problem(*, points: int = 20, free: Freedom | None = None) -> Problem:
+    """The lock must never open; of a million uniform inputs with twenty control points some 280 open it."""
+    key = InputRange("key", 0, 5, control_points=points, interpolation="constant", free=free, kind="integer")
+    variables = (
+        Variable("key", causality="input", kind="integer", type="Int32", low=0, high=5, start=0.0),
+        Variable("stage", causality="output", kind="integer", type="Int32"),
+        Variable("open", causality="output", kind="boolean", type="Boolean"),
+    )
+    return Problem(
+        FunctionModel(lock, ModelInfo("lock", "A lock.", variables=variables)),
+        Requirement("LOCK", parse("G[0,10] (open < 0.5)")),
+        SearchSpace((key,), (), STOP_TIME),
+        Experiment(STOP_TIME, INTERVAL, ("stage", "open")),
+    )

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.coverage.marks import MODES, Mark, Marker, is_discrete
+from falsifier.testing import lag_problem
+from tests.engines.coverage.support import lock_problem
+
+
+def lock_marks(stage: list[float], opened: list[float]) -> dict[Mark, float]:
+    times = np.linspace(0.0, 0.5 * (len(stage) - 1), len(stage))
+    columns = {"stage": np.array(stage), "open": np.array(opened)}
+    return Marker.of(lock_problem()).marks(Trajectory(times, columns))
+
+
+def test_values_changes_and_modes_are_marks_with_the_time_of_their_first_occurrence() -> None:
+    marks = lock_marks([0, 1, 0, 1, 2], [0, 0, 0, 0, 1])
+    assert marks[Mark("stage", ("is", 0.0))] == 0.0
+    assert marks[Mark("stage", ("changes", 0.0, 1.0, 1))] == 0.5
+    assert marks[Mark("stage", ("changes", 0.0, 1.0, 2))] == 1.5
+    assert marks[Mark(MODES, (2.0, 1.0))] == 2.0
+    assert Mark("open", ("is", 1.0)) in marks
+    assert Mark(MODES, (0.0, 1.0)) not in marks
+
+
+def test_the_order_of_changes_and_the_time_between_them_are_marks() -> None:
+    soon = lock_marks([0, 1, 1, 1, 1, 1], [0, 0, 1, 1, 1, 1])
+    late = lock_marks([0, 1, 1, 1, 1, 1], [0, 0, 0, 0, 0, 1])
+    other = lock_marks([0, 0, 1, 1, 1, 1], [0, 1, 1, 1, 1, 1])
+    pairs = [{m for m in marks if m.what[0] == "after"} for marks in (soon, late, other)]
+    assert all(len(found) == 1 for found in pairs)
+    assert len(set.union(*pairs)) == 3
+
+
+def test_a_signal_that_chatters_does_not_hide_the_others() -> None:
+    count = 5000
+    opened = np.zeros(count)
+    opened[3] = 1
+    marks = lock_marks((np.arange(count) % 2.0).tolist(), opened.tolist())
+    assert len(marks) < 100
+    assert Mark("open", ("changes", 0.0, 1.0, 1)) in marks
+
+
+def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)")
+    marker = Marker.of(problem)
+    times = np.linspace(0.0, 10.0, 101)
+
+    def found(scale: float) -> set[Mark]:
+        x = scale * (1 - np.exp(-times))
+        return set(marker.marks(Trajectory(times, {"x": x, "u": np.ones(101)})))
+
+    assert {m.what[0] for m in found(0.85) - found(0.5)} == {"up", "near"}
+    assert not {m.source for m in found(0.5)} & {"u"}
+    assert any(m.what[0] == "changes" for m in found(0.95)), "the predicate became false"
+
+
+@given(
+    st.lists(
+        st.sampled_from([0.0, 1e-300, -1.0, 2.0, 1e300, np.inf, np.nan, -np.inf]), min_size=2, max_size=9
+    )
+)
+def test_any_numbers_have_marks(values: list[float]) -> None:
+    marker = Marker.of(lag_problem("G[0,10] (x <= 0.9)"))
+    times = np.linspace(0.0, 1.0, len(values))
+    marker.marks(Trajectory(times, {"x": np.array(values), "u": np.zeros(len(values))}))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "expected"),
+    [
+        ("stage", [0, 0], True),  # by its type
+        ("unknown", [0, 0], False),  # nothing can be said of a constant
+        ("unknown", [0, 3], True),
+        ("unknown", [0, 0.5], False),
+        ("unknown", list(range(17)), False),
+    ],
+)
+def test_what_counts_as_discrete(name: str, values: list[float], expected: bool) -> None:
+    assert is_discrete(lock_problem().info, name, np.array(values, dtype=float)) is expected

@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from falsifier.core.space import Freedom
+from falsifier.engines.box import Array
+from falsifier.engines.coverage.programs import Programs
+from falsifier.engines.grid import Grid
+from falsifier.engines.layout import Layout, planning_layout
+from falsifier.testing import FREE, START, lag_problem
+from tests.engines.coverage.support import lock_problem
+
+GRID = Grid.over(10.0, 10.0, cells=50, shortest=0.1)
+
+
+def layout_of(*, inputs: int) -> Layout:
+    return planning_layout(lag_problem(inputs=inputs, free=FREE, parameters=[START]).space, GRID)
+
+
+def drawn(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize("time", [0.0, 3.1, 9.99])
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_what_follows_a_time_is_drawn_again_and_what_precedes_it_is_kept(time: float, inputs: int) -> None:
+    layout = layout_of(inputs=inputs)
+    programs = Programs(layout)
+    changed = False
+    for seed in range(20):
+        point = programs.fresh(drawn(seed))
+        for other in (
+            programs.another_end(drawn(seed + 100), point, time),
+            programs.repeated(drawn(seed), point, time, programs.fresh(drawn(seed + 50)), (1.0, 4.0)),
+        ):
+            for coding, group in zip(layout.codings, layout.groups, strict=False):
+                kept = np.asarray(coding.times) <= time
+                assert (other[group][kept] == point[group][kept]).all()
+            assert other.min() >= 0.0 and other.max() <= 1.0
+            changed |= bool((other != point).any())
+    assert changed
+
+
+def pieces(values: Array) -> int:
+    return 1 + int(np.count_nonzero(np.diff(values)))
+
+
+def test_programs_have_few_and_many_pieces() -> None:
+    programs = Programs(layout_of(inputs=1))
+    counts = [pieces(programs.fresh(drawn(seed))[:50]) for seed in range(100)]
+    assert min(counts) == 1 and max(counts) > 20
+
+
+def test_discrete_inputs_take_their_values_only() -> None:
+    layout = planning_layout(lock_problem(free=Freedom(100, 0.1)).space, GRID)
+    programs = Programs(layout)
+    point = programs.fresh(drawn(1))
+    for seed in range(50):
+        point = programs.moved(drawn(seed), programs.another_end(drawn(seed), point, 2.0))
+        assert point * 5 == pytest.approx(np.round(point * 5))
+
+
+def test_a_span_is_repeated_after_a_pause() -> None:
+    layout = layout_of(inputs=1)
+    programs, source = Programs(layout), np.zeros(layout.dimension)
+    source[5:10] = 1.0
+    found = programs.repeated(drawn(3), np.zeros(layout.dimension), 2.0, source, (1.0, 2.0))
+    assert np.count_nonzero(found[11:50] == 1.0) >= 5
+
+
+def test_a_small_change_leaves_most_of_a_program() -> None:
+    layout = layout_of(inputs=1)
+    programs = Programs(layout)
+    point = programs.fresh(drawn(4))
+    assert any((programs.moved(drawn(seed), point) != point).any() for seed in range(5))
+    assert all(
+        pieces(programs.moved(drawn(seed), point)[:50]) <= pieces(point[:50]) + 2 for seed in range(50)
+    )
+
+
+def test_without_inputs_parameters_are_drawn() -> None:
+    layout = planning_layout(lag_problem(inputs=0, parameters=[START]).space, GRID)
+    programs = Programs(layout)
+    found = [programs.another_end(drawn(seed), np.zeros(1), 1.0).item() for seed in range(30)]
+    assert {0.0, 1.0} < set(found)
