@@ -44,6 +44,8 @@ SAME, ONE_LINE, TRACEBACK, OTHER = OUTCOMES = ("as unhurt", "one clear line", "t
 FMUS = Path(__file__).parents[1] / "tests" / "fixtures" / "fmus"
 COMMAND = [sys.executable, "-c", "from falsifier.cli import main; main()"]
 QUIET = ("--engine", "uniform", "--budget", "30", "--quiet")
+# After this time in s a command hangs; long, because the trials run beside other work.
+PATIENCE = 1200.0
 # A search that finds a counterexample after 18 simulations, one that finds none, and a short campaign.
 SEARCHES = {
     "found": ("run", "AT2", "--seed", "2", *QUIET),
@@ -103,7 +105,7 @@ def campaign_outcome(place: Path) -> list[tuple[object, ...]]:
     ]
 
 
-def command(*arguments: str, limit: float = 300) -> tuple[int, str]:
+def command(*arguments: str, limit: float = PATIENCE) -> tuple[int, str]:
     """Run the command line; return its exit code and what it said on stderr."""
     done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=limit, check=False)
     if "Traceback" in done.stderr or "defect of falsifier" in done.stderr:
@@ -187,7 +189,7 @@ def kill(random: Random, place: Path, kind: str) -> str:
         if victim != process.pid:
             time.sleep(random.uniform(0.0, 2.0))
             process.kill()
-        _, said = process.communicate(timeout=120)
+        _, said = process.communicate(timeout=PATIENCE)
         if "Traceback" in said or "defect of falsifier" in said:
             raise RuntimeError(said)
     if not (place / "manifest.json").exists() and not (place / "campaign.json").exists():
@@ -203,6 +205,30 @@ def children(pid: int) -> list[int]:
         return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     except OSError:
         return []
+
+
+def kill_dask(random: Random, place: Path, kind: str) -> str:
+    """Kill workers of a Dask cluster at random moments of a campaign, up to three times."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+        address = f"dask:{cluster.scheduler_address}"
+        process = subprocess.Popen(
+            [*COMMAND, *SEARCHES[kind], "--out", str(place), "--executor", address],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(random.randint(1, 3)):
+            time.sleep(random.uniform(0.5, 6.0))
+            worker = random.choice(list(cluster.workers.values()))
+            with suppress(ProcessLookupError, AttributeError, TypeError):
+                os.kill(worker.pid, signal.SIGKILL)
+        _, said = process.communicate(timeout=PATIENCE)
+    if "Traceback" in said or "defect of falsifier" in said:
+        raise RuntimeError(said)
+    must_equal(resumed(place, kind), wanted(kind), "after kills of workers")
+    return SAME
 
 
 def damage(random: Random, place: Path, kind: str) -> str:
@@ -332,6 +358,7 @@ CLASSES: dict[str, tuple[Trial, str, int]] = {
     "run with a counterexample, killed 1 to 5 times": (kill, "found", 1),
     "run without one, killed 1 to 5 times": (kill, "stands", 1),
     "campaign on 1 or 2 processes, killed 1 to 5 times": (kill, "campaign", 1),
+    "campaign on a Dask cluster, 1 to 3 workers killed": (kill_dask, "campaign", 1),
     "damage to a run with a counterexample": (damage, "found", 15),
     "damage to a run without one": (damage, "stands", 15),
     "damage to a run that a language model leads": (damage, "led", 15),
