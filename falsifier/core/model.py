@@ -256,9 +256,10 @@ class FunctionModel:
     """A Python function as a model, for tutorials and tests.
 
     Attributes:
-        function: called as ``function(times, inputs, parameters)`` with the time grid, shape (n,), the
-            sampled inputs by name, shape (n,) each, and the parameter values by name; returns one array of
-            shape (n,) per output name. It must be importable (no lambda) if it is to run in other processes.
+        function: called as ``function(times, inputs, parameters)`` with the time grid, shape (n,), all
+            inputs of ``info`` by name, sampled or constant, shape (n,) each, and the parameter values by
+            name; returns one array of shape (n,) per output name. It must be importable (no lambda) if it is
+            to run in other processes.
         info: name, description and variables; inputs, parameters and outputs must be listed.
     """
 
@@ -273,14 +274,19 @@ class FunctionModel:
     ) -> Trajectory:
         """Call the function once with all inputs sampled on the experiment's time grid.
 
+        Inputs without a signal have the value in ``parameters``, otherwise their start value, otherwise 0.
+
         Raises:
             SimulationError: if the function raises an exception, omits an output, or returns an array of the
                 wrong shape or a value that is not finite.
         """
         times = experiment.times
-        inputs = {name: signal.sample(times) for name, signal in signals.items()}
+        constant = {v.name: parameters.get(v.name, _number(v.start)) for v in self.info.inputs}
+        inputs = {name: np.full(times.shape, value, dtype=np.float64) for name, value in constant.items()}
+        inputs |= {name: signal.sample(times) for name, signal in signals.items()}
+        others = {name: value for name, value in parameters.items() if name not in inputs}
         try:
-            outputs = self.function(times, inputs, dict(parameters))
+            outputs = self.function(times, inputs, others)
         except Exception as error:
             raise SimulationError(f"{self.info.name}: {type(error).__name__}: {error}") from error
         if not isinstance(outputs, Mapping):
@@ -311,6 +317,10 @@ class FunctionModel:
 
     def close(self) -> None:
         """Nothing to release: a function opens no processes or files."""
+
+
+def _number(start: float | str | None) -> float:
+    return 0.0 if start is None or isinstance(start, str) else start
 
 
 def check_finite(model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]]) -> None:
