@@ -62,6 +62,12 @@ class Explorer:
         self._new: Counter[str] = Counter()
         self._seen = 0
 
+    @property
+    def has_modes(self) -> bool:
+        """Whether a discrete output has changed so far."""
+        outputs = {*self._marker.outputs}
+        return any(mark.what[0] == "changes" and mark.source in outputs for mark in self._reached)
+
     def learn(self, point: Array, trajectory: Trajectory) -> None:
         """Add a simulation to the archive."""
         self._seen += 1

@@ -7,6 +7,7 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Array, learnable
+from falsifier.engines.coverage.marks import is_discrete
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
@@ -15,10 +16,6 @@ from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.trace import Trace, trace_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-
-# Maximum number of distinct values, all integers, of a signal that counts as discrete: it has no slope that a
-# search could follow.
-_MAX_LEVELS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +87,7 @@ class History:
             problem.space,
             self.grid,
             self._coordinates,
-            discrete=frozenset(name for name in outputs if _is_discrete(problem, name, trajectory)),
+            discrete=frozenset(name for name in outputs if is_discrete(problem.info, name, trajectory[name])),
             stretches=self.settings.stretches,
             constants={
                 name: float(trajectory[name][0])
@@ -130,12 +127,3 @@ def scaled_costs(samples: Sequence[Sample], objective: Objective) -> Array:
 
 def _learnable(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, columns={name: learnable(c) for name, c in trajectory.columns.items()})
-
-
-def _is_discrete(problem: Problem, name: str, trajectory: Trajectory) -> bool:
-    if name in problem.info:
-        kind = problem.info[name].kind
-        if kind in ("integer", "boolean", "enumeration"):
-            return True
-    levels = np.unique(trajectory[name])
-    return len(levels) > 1 and len(levels) <= _MAX_LEVELS and bool((levels == np.round(levels)).all())

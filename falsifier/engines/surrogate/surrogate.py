@@ -199,7 +199,8 @@ class Surrogate:
         settings = self.settings
         costs = self.history.direct_costs()
         is_flat = len(costs) >= settings.flat_start and flatness(costs) >= settings.flat
-        if is_flat and rng.random() < settings.coverage_share:
+        # Where all outputs are continuous, the dynamics know how they leave a plateau.
+        if is_flat and self._explorer.has_modes and rng.random() < settings.coverage_share:
             return "coverage"
         if self._planned < settings.trial and rng.random() < settings.trial_share:
             return "dynamics"
