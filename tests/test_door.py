@@ -2,11 +2,15 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 import falsifier
+from falsifier.errors import FalsifierError
 from tests.command import ROOT
+from tests.problems import easy
 
 USER = ROOT / "tests" / "user_code.py"
 
@@ -36,3 +40,41 @@ def test_importing_is_cheap() -> None:
         for _ in range(3)
     ]
     assert min(times) < 0.3
+
+
+# What a user without a type checker may write.
+untyped: Any = falsifier
+WRONG: dict[str, tuple[Callable[[], object], str]] = {
+    "a tuple of limits": (
+        lambda: untyped.InputRange("u", 0.0, 1.0, free=(3, 1)),
+        r"'u': free: .*Freedom.*\(3, 1\)",
+    ),
+    "no formula": (lambda: untyped.parse(None), "text of a formula, got None"),
+    "a number as description": (
+        lambda: untyped.Requirement("R", untyped.parse("G[0,1] (x <= 1)"), description=5),
+        "'R': description: expected text, got 5",
+    ),
+    "a monitor of text": (lambda: untyped.Monitor("..", 0.1, 11), r"use parse\('..'\)"),
+    "one problem to resume": (lambda: untyped.resume("runs/x", problems=easy()), r"problems=\[problem\]"),
+    "a list of inputs": (
+        lambda: untyped.Problem.from_fmu("my.fmu", "G[0,1] (x <= 1)", inputs=["u"]),
+        r"inputs: expected choices by name.*\['u'\]",
+    ),
+    "a result to explain": (lambda: untyped.explain(easy(), 5), "explain: expected an evaluation"),
+    "a number to shrink": (lambda: untyped.shrink(easy(), 5), "shrink: expected an evaluation"),
+    "a device as directory": (
+        lambda: untyped.falsify(easy(), budget=1, directory="/dev/null"),
+        "/dev/null: no folder",
+    ),
+    "a name that is too long": (
+        lambda: untyped.falsify(easy(), budget=1, directory="n" * 300),
+        "no folder can be made here",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_of_a_wrong_type_is_named_with_what_was_expected(what: str) -> None:
+    call, message = WRONG[what]
+    with pytest.raises(FalsifierError, match=message):
+        call()

@@ -1,5 +1,6 @@
 """Checks of values that users write in Python."""
 
+import reprlib
 from collections.abc import Sequence
 from math import isfinite
 from numbers import Real
@@ -43,6 +44,16 @@ def positive(name: str, given: object) -> float:
     if (number := finite(name, given)) > 0:
         return number
     raise SpecError(f"{name}: expected a positive number, got {given!r}")
+
+
+def instance(name: str, given: object, kind: type, expected: str) -> None:
+    """Check the type of a value that a user gave.
+
+    Raises:
+        SpecError: naming the argument, what was expected and what was given.
+    """
+    if not isinstance(given, kind):
+        raise SpecError(f"{name}: expected {expected}, got {reprlib.repr(given)} ({type(given).__name__})")
 
 
 def one_of(name: str, given: object, allowed: Sequence[str]) -> None:

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.arguments import finite, one_of, positive, whole
+from falsifier.core.arguments import finite, instance, one_of, positive, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal, even_times
 from falsifier.errors import CandidateError, SpecError, did_you_mean
@@ -63,7 +63,7 @@ class InputRange:
 
     Raises:
         SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them,
-            or the control points, interpolation or hold are not as above.
+            or the control points, interpolation, hold or free are not as above.
     """
 
     name: str
@@ -86,6 +86,8 @@ class InputRange:
         one_of(f"{what}: interpolation", self.interpolation, INTERPOLATIONS)
         if self.hold is not None:
             positive(f"{what}: hold", self.hold)
+        if self.free is not None:
+            instance(f"{what}: free", self.free, Freedom, "Freedom(max_control_points, min_interval)")
 
 
 @dataclass(frozen=True, slots=True)

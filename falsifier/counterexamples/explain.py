@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange
@@ -133,8 +134,10 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
     """Diagnose a counterexample and reset its parts one at a time.
 
     Raises:
+        SpecError: if no evaluation is given.
         ValueError: if the evaluation has no trajectory.
     """
+    instance("explain", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
     if evaluation.trajectory is None:
         raise ValueError("a failed simulation cannot be explained: pass an evaluation with a trajectory")
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import InputRange
@@ -67,6 +68,7 @@ def shrink(
     Raises:
         SpecError: if the evaluation does not violate by that margin.
     """
+    instance("shrink", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
     hunt = _Hunt(problem, budget, margin or 0.0)
     start = hunt.violation(problem.space.admit(evaluation.candidate))
     if start is None:

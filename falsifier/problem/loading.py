@@ -5,6 +5,7 @@
     problem = load_problem("specs/AT.toml:AT1", profile="instance2")
 """
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -47,6 +48,11 @@ def find_spec(target: str) -> tuple[Path, str | None]:
         if name in requirements:
             return path, name
         names.extend(requirements)
+    if Path(target).is_dir():
+        raise SpecError(
+            f"{target} is a folder; give a spec file, an FMU or a bundled name. If it holds a run: "
+            f"falsifier resume {shlex.quote(target)} continues it"
+        )
     raise SpecError(
         f"no spec file or bundled requirement {target!r}; give a file like my.toml:REQ, or a bundled name: "
         f"{did_you_mean(name, names)}"
@@ -176,7 +182,8 @@ def _of_spec(source: ProblemSource) -> Problem:
         if len(spec.requirements) > 1:
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{source.target}:{next(iter(spec.requirements))}, or falsify all of them with --all. "
+                f"{source.target.rstrip(':')}:{next(iter(spec.requirements))}, or falsify all of them "
+                "with --all. "
                 f"Known: {', '.join(spec.requirements)}",
                 file=str(path),
             )

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from falsifier.core.arguments import instance
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean
 from falsifier.problem.grid import fitting_interval
@@ -19,7 +20,7 @@ class Requirement:
         description: its meaning in words.
 
     Raises:
-        SpecError: if the name is no text, or the formula is not parsed.
+        SpecError: if the name or description is no text, or the formula is not parsed.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Requirement:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise SpecError(f"requirement: expected a name, got {self.name!r}")
+        instance(f"requirement {self.name!r}: description", self.description, str, "text")
         if not isinstance(self.formula, Formula):
             raise SpecError(f"requirement {self.name!r}: expected a formula; use parse({self.formula!r})")
 

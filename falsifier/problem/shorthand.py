@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from falsifier.core.arguments import instance
 from falsifier.core.model import Interface
 from falsifier.core.signals import INTERPOLATIONS
 from falsifier.errors import SpecError, did_you_mean, rejected
@@ -45,6 +46,8 @@ def changes_from(
     Raises:
         SpecError: naming the input, parameter or field that is invalid.
     """
+    instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
+    instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
     sections = {name: _input_section(name, choice) for name, choice in inputs.items()}
     return _changes(
         sections, {name: _parameter_section(name, choice) for name, choice in parameters.items()}, experiment
@@ -151,6 +154,8 @@ def _input(option: str) -> tuple[str, dict[str, object]]:
                 f"--input {name}={_as_range(parts[0])}"
             )
         return name, {"value": _number(parts[0], option)}
+    if "" in (part.strip() for part in parts[:2]):
+        raise SpecError(f"--input {option}: expected NAME=LOW:HIGH, for example --input {name}=0:1")
     section: dict[str, object] = {"range": (_number(parts[0], option), _number(parts[1], option))}
     if len(parts) > 2:
         if not parts[2].isdigit():

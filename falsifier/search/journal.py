@@ -13,6 +13,7 @@ a checksum, lines are numbered, and SUM in the name of a trajectory is that file
 is noticed. Only search/repair.py, which drops what is damaged, touches these files beside this module.
 """
 
+import errno
 import json
 import os
 import shlex
@@ -61,6 +62,8 @@ _SYNC_PERIOD = 1.0
 # best: only the best one, for campaigns of very many runs.
 Keep = Literal["history", "best"]
 _KEPT_TRAJECTORIES = 200
+# Errors of the operating system that say that a path can never be a folder.
+_NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 # Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
 _ASKED = b'"kind":"asked"'
 _KIND_WITHIN = 40
@@ -81,8 +84,9 @@ class Journal:
     def __init__(self, directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> None:
         self.directory = directory
         self._keep = keep
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / TRAJECTORIES).mkdir(exist_ok=True)
+        with _can_be_a_folder(directory):
+            directory.mkdir(parents=True, exist_ok=True)
+            (directory / TRAJECTORIES).mkdir(exist_ok=True)
         self._lock = FileLock(directory / LOCK)
         try:
             self._lock.acquire(timeout=patience)
@@ -92,6 +96,7 @@ class Journal:
             ) from None
         path = directory / JOURNAL
         try:
+            _check_is_file(path)
             _drop_torn_line(path)
             self.records = read_journal(directory)
             self._file = path.open("ab", buffering=0)
@@ -212,9 +217,30 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
         journal.close()
 
 
+@contextmanager
+def _can_be_a_folder(directory: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _NO_FOLDER:
+            raise
+        raise JournalError(
+            f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
+        ) from None
+
+
+def _check_is_file(path: Path) -> None:
+    if path.is_dir():
+        raise JournalError(
+            f"{path} is a folder, not a journal; to set it aside: "
+            f"falsifier repair {shlex.quote(str(path.parent))}"
+        )
+
+
 def holds_run(directory: Path) -> bool:
     """Whether a directory contains a run."""
-    return (directory / MANIFEST).exists()
+    with _can_be_a_folder(directory):
+        return (directory / MANIFEST).exists()
 
 
 def holds_lines(directory: Path) -> bool:
@@ -294,6 +320,7 @@ class JournalReader:
         Raises:
             JournalError: if a line is invalid.
         """
+        _check_is_file(self.path)
         if not self.path.exists() or self.path.stat().st_size == self.offset:
             return
         with self.path.open("rb") as file:

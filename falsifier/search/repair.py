@@ -82,6 +82,8 @@ def _repair_trajectories(folder: Path) -> list[str]:
 
 
 def _repair_journal(path: Path, *, asks_llm: bool) -> list[str]:
+    if path.is_dir():
+        return [f"{path}: a folder, not a journal; kept as {set_aside(path).name}"]
     content = path.read_bytes() if path.exists() else b""
     content = content[: content.rfind(b"\n") + 1]  # a crash may have cut off the last line
     found: dict[int, Record] = {}

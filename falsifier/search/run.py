@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import overload
 
-from falsifier.core.arguments import whole
+from falsifier.core.arguments import instance, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
@@ -188,6 +188,12 @@ def resume(
     Raises:
         JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
     """
+    if isinstance(problems, Problem | str) or not isinstance(problems, Sequence):
+        raise SpecError(
+            f"problems: expected a list, got {type(problems).__name__}; for one: problems=[problem]"
+        )
+    for problem in problems:
+        instance("problems", problem, Problem, "a list of Problem")
     directory = Path(directory)
     places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
     results: list[Result] = []

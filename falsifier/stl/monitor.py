@@ -31,7 +31,8 @@ class Monitor:
         watched: parts of the formula whose extremes tell whether it was tested.
 
     Raises:
-        FormulaError: if a window extends past the end of the grid or a bound is not a multiple of the step.
+        FormulaError: if the formula is not parsed, a window extends past the end of the grid or a bound is
+            not a multiple of the step.
     """
 
     formula: Formula
@@ -42,6 +43,8 @@ class Monitor:
     _spare: list[NDArray[np.float64]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.formula, Formula):
+            raise FormulaError(f"a monitor needs a formula; use parse({self.formula!r})")
         if not (self.step > 0 and np.isfinite(self.step) and self.samples >= 1):
             raise FormulaError(
                 f"a time grid needs a positive step and at least one sample, got {self.step}, {self.samples}"

@@ -101,6 +101,8 @@ def parse(text: str) -> Formula:
     Raises:
         FormulaError: with the position of the mistake, a caret under it and a hint.
     """
+    if not isinstance(text, str):
+        raise FormulaError(f"expected the text of a formula, got {text!r}")
     return _Parser(text).formula()
 
 

@@ -1,11 +1,10 @@
-"""HTML and SVG markup; plain text is escaped automatically."""
+"""HTML markup; plain text is escaped automatically."""
 
 from html import escape
 
 from falsifier.core.literals import plain
 
 _VOID = frozenset({"br", "hr", "link", "meta"})
-_SELF_CLOSING = frozenset({"circle", "line", "path", "rect"})
 
 
 class Html(str):
@@ -32,10 +31,7 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
     )
     if tag in _VOID:
         return Html(f"<{tag}{given}>")
-    content = join(*children)
-    if tag in _SELF_CLOSING and not content:
-        return Html(f"<{tag}{given}/>")
-    return Html(f"<{tag}{given}>{content}</{tag}>")
+    return Html(f"<{tag}{given}>{join(*children)}</{tag}>")
 
 
 def join(*parts: str) -> Html:

@@ -5,7 +5,9 @@ import pytest
 from falsifier.errors import JournalError
 from falsifier.search.journal import open_journal, read_journal
 from falsifier.search.repair import repair, set_aside
+from falsifier.search.run import falsify, resume
 from tests.hostile.test_damage import Led, Standing, outcome
+from tests.problems import easy
 
 
 def test_what_a_model_said_after_a_damaged_reply_is_dropped_with_it(tmp_path: Path) -> None:
@@ -32,3 +34,16 @@ def test_what_is_set_aside_replaces_nothing(tmp_path: Path) -> None:
         (tmp_path / "a").write_text(str(number))
         assert set_aside(tmp_path / "a").name == f"a.damaged-{number}"
     assert (tmp_path / "a.damaged-1").read_text() == "1"
+
+
+def test_a_journal_that_is_a_folder_is_set_aside(tmp_path: Path) -> None:
+    falsify(easy(), "corners", budget=2, directory=tmp_path)
+    journal = tmp_path / "journal.jsonl"
+    journal.unlink()
+    journal.mkdir()
+    with pytest.raises(JournalError, match="is a folder, not a journal; to set it aside: falsifier repair"):
+        resume(tmp_path, problems=[easy()])
+    (finding,) = repair(tmp_path)
+    assert "kept as journal.jsonl.damaged-1" in finding
+    (result,) = resume(tmp_path, problems=[easy()])
+    assert result.spent.simulations > 0

@@ -1,5 +1,11 @@
-"""The report as one self-contained HTML page without scripts."""
+"""The report as one self-contained HTML page.
 
+Its only scripts are the plotting library's and the one that calls it; its policy forbids all others and
+the network.
+"""
+
+from base64 import b64encode
+from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
 
@@ -8,7 +14,6 @@ from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
 from falsifier.core.words import choices, counted
 from falsifier.views.html import Html, el, join
-from falsifier.views.report.charts import SERIES_COLOURS, history_chart, panel_chart, rate_chart
 from falsifier.views.report.content import (
     Content,
     Section,
@@ -18,6 +23,13 @@ from falsifier.views.report.content import (
     replay_command,
     run_command,
     searches,
+)
+from falsifier.views.report.figures import history_figure, rate_figure, simulation_figures
+from falsifier.views.report.plots import columns, scripts
+
+_HINT = (
+    "Plots: drag a rectangle to zoom, point at a curve to read its values; the buttons beside a plot "
+    "move it, zoom with the wheel, reset and save it. The plots of one simulation are zoomed together."
 )
 
 
@@ -32,6 +44,8 @@ def html_report(directory: Path) -> str:
 
 def page(content: Content) -> str:
     """Lay out a report."""
+    run = scripts() if content.sections else []
+    fineness = columns(sum(len(shown.panels) for section in content.sections for shown in section.shown))
     style = Html(files("falsifier.views.report").joinpath("style.css").read_text(encoding="utf-8"))
     title = f"Falsification report: {content.title}"
     head = el(
@@ -39,6 +53,7 @@ def page(content: Content) -> str:
         el("meta", charset="utf-8"),
         el("meta", name="viewport", content="width=device-width, initial-scale=1"),
         el("meta", name="color-scheme", content="light dark"),
+        el("meta", http_equiv="Content-Security-Policy", content=_policy(run)),
         el("title", title),
         el("style", style),
     )
@@ -47,9 +62,22 @@ def page(content: Content) -> str:
         el("a", "Skip to the results", href="#summary", class_="skip"),
         el("header", el("h1", title), el("p", _overview(content))),
         _navigation(content),
-        el("main", _summary(content), *map(_section, content.sections), _environment(content)),
+        el(
+            "main",
+            _summary(content),
+            *(_section(section, fineness) for section in content.sections),
+            _environment(content),
+        ),
+        *(el("script", Html(text)) for text in run),
     )
     return f"<!DOCTYPE html>\n{el('html', head, body, lang='en')}\n"
+
+
+def _policy(scripts: list[str]) -> str:
+    """Content Security Policy: these scripts by their hash, styles and pictures of the page, nothing else."""
+    hashes = [b64encode(sha256(text.encode()).digest()).decode() for text in scripts]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes) or "'none'"
+    return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
 
 
 def _overview(content: Content) -> str:
@@ -83,6 +111,7 @@ def _summary(content: Content) -> Html:
         el("h2", "Summary"),
         _table(content.table, anchors),
         *(el("p", note, class_="note") for note in content.table.notes),
+        el("p", _HINT, class_="note hint"),
         id="summary",
     )
 
@@ -101,15 +130,10 @@ def _scrolling(content: Html, label: str) -> Html:
     return el("div", content, class_="scroll", tabindex="0", role="region", aria_label=label)
 
 
-def _section(section: Section) -> Html:
-    charts = [
-        el("figure", el("figcaption", label), history_chart(runs, label))
-        for label, runs in section.by_method.items()
-    ]
+def _section(section: Section, fineness: int) -> Html:
+    drawn = [history_figure(runs, label) for label, runs in section.by_method.items()]
     if len(section.runs) > 1:
-        charts.append(
-            el("figure", el("figcaption", "Falsified runs"), rate_chart(section.by_method), _legend(section))
-        )
+        drawn.append(rate_figure(section.by_method))
     found = any(shown.run.falsified for shown in section.shown)
     title = "Counterexamples" if found else "Closest to a violation"
     return el(
@@ -117,24 +141,16 @@ def _section(section: Section) -> Html:
         el("h2", section.name),
         el("p", section.description) if section.description else Html(""),
         el("p", el("code", section.formula), class_="formula"),
-        *charts,
+        *drawn,
         el("h3", title),
-        *(_shown(shown, opened=i == 0) for i, shown in enumerate(section.shown)),
+        *(_shown(shown, fineness, opened=i == 0) for i, shown in enumerate(section.shown)),
         _findings(section),
         _troubles(section),
         id=_anchor(section),
     )
 
 
-def _legend(section: Section) -> Html:
-    items = [
-        el("li", el("span", class_=f"chip s{i % SERIES_COLOURS}"), f"{label} ({counted(len(runs), 'run')})")
-        for i, (label, runs) in enumerate(section.by_method.items())
-    ]
-    return el("ul", *items, class_="legend")
-
-
-def _shown(shown: Shown, *, opened: bool) -> Html:
+def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     run, verdict = shown.run, shown.run.verdict
     robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
     heading = f"{run.method.label}, seed {run.seed}: {run.spent.simulations_text}, {robustness}"
@@ -154,7 +170,7 @@ def _shown(shown: Shown, *, opened: bool) -> Html:
     return el(
         "details",
         el("summary", heading),
-        *(el("figure", panel_chart(panel, critical)) for panel in shown.panels),
+        simulation_figures(shown.panels, critical, fineness),
         _facts(facts),
         el("blockquote", rationale, title="the engine's rationale") if rationale else Html(""),
         el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),

@@ -1,4 +1,4 @@
-"""The page in a real browser: it is laid out, scripts do not run, and nothing is asked of the network.
+"""The page in a real browser: plots are drawn, foreign scripts do not run, nothing is asked of the network.
 
 Runs where a Chromium is installed (``CHROMIUM`` names it, or it is on the path); test_page.py checks the
 page's structure everywhere.
@@ -10,6 +10,8 @@ import os
 import re
 import shutil
 import subprocess
+from base64 import b64encode
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -22,21 +24,31 @@ CHROMIUM = os.environ.get("CHROMIUM") or next(
 )
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed; CI installs one")
 
-# Runs in the browser after the page: what a person would see and could reach. The page itself has no script.
+# Runs in the browser when the plots are drawn: what a person would see and could reach. It is added to the
+# page's policy, which forbids foreign scripts.
 PROBE = """
-<script>
-const focusable = [...document.querySelectorAll('a[href], summary, [tabindex="0"]')];
+
+const canvas = plot => plot.firstElementChild?.shadowRoot?.querySelector("canvas, .bk-CanvasView")
+  ?? plot.firstElementChild;
+const done = () => [...document.querySelectorAll('.plot')].filter(e => e.checkVisibility()).every(canvas);
+const look = () => {
+const focusable = [...document.querySelectorAll('a[href], summary, [tabindex="0"]')]
+  .filter(e => e.checkVisibility());
 const reached = focusable.filter(e => { e.focus(); return document.activeElement === e; });
-const charts = [...document.querySelectorAll('svg')].filter(e => e.checkVisibility());
-const drawn = charts.filter(e => e.getBoundingClientRect().height > 80 && e.getBBox().width > 400);
+const charts = [...document.querySelectorAll('.plot')].filter(e => e.checkVisibility());
+const sizes = charts.map(canvas).map(e => e.getBoundingClientRect());
+const drawn = sizes.filter(e => e.height > 150 && e.width > 300);
 const ink = getComputedStyle(document.body).color, page = getComputedStyle(document.body).backgroundColor;
 document.documentElement.setAttribute('data-probe', JSON.stringify({
   focusable: focusable.length, reached: reached.length, charts: charts.length, drawn: drawn.length,
   sideways: document.documentElement.scrollWidth - document.documentElement.clientWidth, ink, page,
   resources: performance.getEntriesByType('resource').length,
-  rows: document.querySelectorAll('tbody tr').length,
+  rows: document.querySelectorAll('#summary tbody tr').length,
+  numbers: [...document.querySelectorAll('details.numbers')].filter(e => e.open).length,
 }));
-</script>
+};
+const wait = () => (done() ? setTimeout(look, 200) : setTimeout(wait, 50));
+wait();
 """
 
 
@@ -56,10 +68,12 @@ def chromium(*arguments: str, profile: Path) -> str:
 
 def probe(page: Path, folder: Path, *flags: str) -> dict[str, object]:
     probed = folder / "probed.html"
-    probed.write_text(
-        page.read_text(encoding="utf-8").replace("</body>", f"{PROBE}</body>"), encoding="utf-8"
+    digest = b64encode(sha256(PROBE.encode()).digest()).decode()
+    text = page.read_text(encoding="utf-8").replace("</body>", f"<script>{PROBE}</script></body>")
+    probed.write_text(text.replace("script-src ", f"script-src 'sha256-{digest}' ", 1), encoding="utf-8")
+    dom = chromium(
+        "--dump-dom", "--virtual-time-budget=20000", *flags, probed.as_uri(), profile=folder / "profile"
     )
-    dom = chromium("--dump-dom", *flags, probed.as_uri(), profile=folder / "profile")
     found = re.search(r'data-probe="([^"]*)"', dom)
     assert found, "the probe did not run"
     result: dict[str, object] = json.loads(html.unescape(found.group(1)))
@@ -74,24 +88,41 @@ def page(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_everything_is_drawn_and_reached_by_keyboard(page: Path, tmp_path: Path) -> None:
-    seen = probe(page, tmp_path, "--window-size=1200,900")
+    seen = probe(page, tmp_path, "--window-size=1200,5000")
     assert seen["rows"] == 4
     assert seen["charts"] == seen["drawn"]
     # Two histories and a curve for each requirement; of its first simulation, which is open, x and u.
     assert seen["charts"] == 2 * (3 + 2)
+    assert seen["numbers"] == 0
     assert seen["reached"] == seen["focusable"]
     assert seen["resources"] == 0
     assert seen["sideways"] == 0
     assert seen["ink"] == "rgb(27, 31, 36)"
 
 
+def test_a_foreign_script_does_not_run(page: Path, tmp_path: Path) -> None:
+    attacked = tmp_path / "attacked.html"
+    attack = "<script>document.documentElement.setAttribute('data-evil', '1')</script>"
+    image = "<img src=x onerror=\"document.documentElement.setAttribute('data-evil', '2')\">"
+    text = page.read_text(encoding="utf-8")
+    attacked.write_text(text.replace("</body>", f"{attack}{image}</body>"), encoding="utf-8")
+    dom = chromium("--dump-dom", "--virtual-time-budget=5000", attacked.as_uri(), profile=tmp_path / "p")
+    assert 'class="scripted"' in dom
+    assert "data-evil=" not in dom
+
+
+def test_without_scripts_the_numbers_are_open(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert text.count('class="numbers" open=""') == text.count('class="plots"') > 0
+
+
 def test_a_telephone_is_wide_enough(page: Path, tmp_path: Path) -> None:
-    seen = probe(page, tmp_path, "--window-size=500,800")
+    seen = probe(page, tmp_path, "--window-size=500,5000")
     assert seen["sideways"] == 0
 
 
 def test_dark_mode_turns_the_colours_round(page: Path, tmp_path: Path) -> None:
-    seen = probe(page, tmp_path, "--blink-settings=preferredColorScheme=0")
+    seen = probe(page, tmp_path, "--blink-settings=preferredColorScheme=0", "--window-size=1200,5000")
     assert (seen["ink"], seen["page"]) == ("rgb(230, 233, 237)", "rgb(20, 24, 29)")
 
 

@@ -1,11 +1,15 @@
 """The page's structure, read by a parser; test_browser.py looks at it in a browser."""
 
+import json
 import re
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,9 +18,10 @@ from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.search.run import falsify
 from falsifier.views.report import html_report
+from falsifier.views.report.plots import scripts
 from tests.problems import easy
 
-VOID = {"meta", "link", "br", "hr", "circle", "line", "path", "rect"}
+VOID = {"meta", "link", "br", "hr"}
 EVIL = "<script>alert(1)</script> & \"quotes\" <img src=x onerror='alert(2)'>"
 
 
@@ -55,11 +60,8 @@ class Parser(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         element = Element(tag, dict(attrs))
         self.open[-1].children.append(element)
-        if tag not in VOID or (tag in ("circle", "line", "path", "rect") and not self._closed()):
+        if tag not in VOID:
             self.open.append(element)
-
-    def _closed(self) -> bool:
-        return (self.get_starttag_text() or "").endswith("/>")
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.open[-1].children.append(Element(tag, dict(attrs)))
@@ -108,8 +110,26 @@ def page(campaign: Path) -> Element:
     return parse(html_report(campaign))
 
 
-def test_it_needs_nothing_from_elsewhere_and_runs_nothing(campaign: Path, page: Element) -> None:
-    assert not page.all("script")
+def plots_of(element: Element) -> list[dict[str, Any]]:
+    """What the groups of plots within an element show."""
+    return [json.loads(group.all("script")[0].content) for group in element.all("div", "plots")]
+
+
+def code(page: Element) -> list[str]:
+    """Scripts that a browser runs."""
+    return [e.content for e in page.all("script") if e.attributes.get("type") != "application/json"]
+
+
+def test_it_needs_nothing_from_elsewhere_and_runs_only_the_plots(page: Element) -> None:
+    (policy,) = (
+        e.attributes["content"] or ""
+        for e in page.all("meta")
+        if e.attributes.get("http-equiv") == "Content-Security-Policy"
+    )
+    assert code(page) == scripts()
+    hashes = [b64encode(sha256(text.encode()).digest()).decode() for text in code(page)]
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert re.findall("'sha256-([^']*)'", policy) == hashes
     assert not page.all("link")
     assert not page.all("iframe")
     for element in page.walk():
@@ -132,37 +152,50 @@ def test_every_run_is_counted_and_every_counterexample_is_drawn(page: Element) -
     rows = page.all("tbody")[0].all("tr")
     assert [row.content[:4] for row in rows] == ["HARD", "HARD", "NEVE", "NEVE"]
     hard, never = page.all("section")[1:3]
-    assert len(hard.all("details")) == 4
-    for details in hard.all("details"):
-        assert len(details.all("svg")) == 2  # the output x and the input u
-        output, input_ = details.all("svg")
-        assert output.all("path", "bound") and output.all("rect", "window")
-        assert len(output.all("circle", "critical")) == len(output.all("line", "critical-time")) == 1
-        assert len(input_.all("circle", "point")) == 4
+    counterexamples = [d for d in hard.all("details") if d.attributes.get("class") != "numbers"]
+    assert len(counterexamples) == 4
+    for details in counterexamples:
+        (group,) = plots_of(details)
+        assert len(details.all("div", "plot")) == len(group["plots"]) == 2  # the output x and the input u
+        output, input_ = group["plots"]
+        assert [line["style"] for line in output["lines"]] == ["bound", "output"]
+        assert [dots["style"] for dots in output["dots"]] == ["critical"]
+        assert len(output["windows"]) == 1
+        assert group["mark"] is not None
+        assert len(input_["dots"][0]["x"]) == 4
+        times = [row.all("th")[0].content for row in details.all("tbody")[0].all("tr")]
+        assert sum("critical" in time for time in times) == 1
         assert "falsifier replay" in details.content
         assert "falsifier run python:tests.problems:hard" in details.content
-    assert never.all("h3")[0].content == "Closest to a violation"
-    assert len(never.all("details")) == 1
+    assert "Closest to a violation" in [e.content for e in never.all("h3")]
+    assert sum(d.attributes.get("class") != "numbers" for d in never.all("details")) == 1
 
 
 def test_histories_show_every_simulation_and_the_best_so_far(page: Element) -> None:
-    chart = next(
-        s for s in page.all("svg") if s.attributes["aria-label"] == "Robustness over simulations, uniform"
+    hard, never = page.all("section")[1:3]
+    by_label = dict(
+        zip([e.attributes["aria-label"] for e in hard.all("div", "history")], plots_of(hard), strict=False)
     )
-    never = page.all("section")[2].all("svg")[0]
-    assert len(chart.all("path", "best")) == 2
-    assert [p.attributes["d"].count("h0") for p in never.all("path", "dots")] == [20, 20]  # type: ignore[union-attr]
-    assert len(chart.all("circle", "critical")) == 2
-    assert not never.all("circle", "critical")
+    (chart,) = by_label["Robustness over simulations, uniform"]["plots"]
+    assert [line["style"] for line in chart["lines"]] == ["best", "best"]
+    assert [dots["style"] for dots in chart["dots"]] == ["dots", "dots", "critical", "critical"]
+    (never_chart,) = plots_of(never)[0]["plots"]
+    assert [len(dots["x"]) for dots in never_chart["dots"]] == [20, 20]
+    rows = never.all("details", "numbers")[0].all("tbody")[0].all("tr")
+    assert [row.all("td")[0].content for row in rows] == ["20", "20"]
+    assert [row.all("td")[2].content for row in rows] == ["–", "–"]
 
 
 def test_it_can_be_used_without_a_mouse_and_read_aloud(page: Element) -> None:
     assert page.all("html")[0].attributes["lang"] == "en"
     assert len(page.all("main")) == len(page.all("h1")) == 1
     assert page.all("body")[0].children[0].content == "Skip to the results"
-    for chart in page.all("svg"):
-        assert chart.attributes["role"] == "img"
-        assert chart.attributes["aria-label"] == chart.all("title")[0].content
+    for group in page.all("div", "plots"):
+        assert group.all("details", "numbers")[0].all("table")
+        assert "open" in group.all("details", "numbers")[0].attributes
+        for chart in group.all("div", "plot"):
+            assert chart.attributes["role"] == "img"
+            assert chart.attributes["aria-label"]
     for region in page.all("div", "scroll"):
         assert region.attributes["tabindex"] == "0"
         assert region.attributes["aria-label"]
@@ -177,7 +210,7 @@ def test_what_a_model_says_is_text(talked: Path) -> None:
     text = html_report(talked)
     root = parse(text)
     assert EVIL not in text
-    assert not root.all("script")
+    assert code(root) == scripts()
     assert not root.all("img")
     (quote,) = root.all("blockquote")
     assert quote.content == EVIL
