@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from falsifier.search import events
     from falsifier.search.assurance import Assurance, Splitting, assess
     from falsifier.search.budget import Budget, Spent
+    from falsifier.search.coverage import Coverage, coverage
     from falsifier.search.events import Event, Listener
     from falsifier.search.margin import Margin, margin
     from falsifier.search.request import LLMSettings
@@ -92,6 +93,7 @@ _EXPORTS = {
     "Chat": "falsifier.llm.messages",
     "Confirmation": "falsifier.evaluation.confirm",
     "DEFAULT_ENGINE": "falsifier.engines",
+    "Coverage": "falsifier.search.coverage",
     "Diagnosis": "falsifier.stl",
     "ENGINES": "falsifier.engines",
     "Engine": "falsifier.engines.protocol",
@@ -135,6 +137,7 @@ _EXPORTS = {
     "assess": "falsifier.search.assurance",
     "confirm": "falsifier.evaluation.confirm",
     "connect": "falsifier.llm.connect",
+    "coverage": "falsifier.search.coverage",
     "cross": "falsifier.campaigns",
     "evaluate": "falsifier.evaluation.evaluate",
     "explain": "falsifier.counterexamples.explain",
@@ -177,6 +180,7 @@ __all__ = [
     "Candidate",
     "Chat",
     "Confirmation",
+    "Coverage",
     "Diagnosis",
     "Engine",
     "Evaluation",
@@ -220,6 +224,7 @@ __all__ = [
     "assess",
     "confirm",
     "connect",
+    "coverage",
     "cross",
     "evaluate",
     "events",
