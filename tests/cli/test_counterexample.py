@@ -177,3 +177,20 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
         assert (done.code, why in done.err) == (2, True), done.err
     assert own.read_bytes() == b"PK mine"
     assert [run(folder, "report", "run", "--out", "r.html").code for _ in range(2)] == [0, 0]
+
+
+def test_a_run_that_falsified_nothing_is_asked_about_its_nearest_miss(tmp_path: Path) -> None:
+    never = "python:tests.problems:impossible"
+    run(tmp_path, "run", never, "--engine", "uniform", "--budget", "5", "--quiet", "--out", "r")
+    told = [run(tmp_path, name, "r") for name in ("explain", "shrink")]
+    told.append(run(tmp_path, "robustness-map", "r", "--samples", "4", "--grid", "2"))
+    for done in told:
+        assert done.code == 0, done.err
+        assert "NEVER was not falsified in 5 simulations; this is about the nearest miss" in done.out
+        assert "counterexample" not in done.out
+    pictures = ("nearest-miss.png", "shrunk.png", "robustness-map.png")
+    assert all((tmp_path / "r" / name).exists() for name in pictures)
+    shrunk = run(tmp_path, "simulate", never, "--input-file", "r/shrunk.csv")
+    assert shrunk.code == 0 and "not violated by these inputs" in shrunk.out
+    refused = run(tmp_path, "shrink", "r", "--margin", "0.1")
+    assert refused.code == 2 and "--margin: a nearest miss is no counterexample" in refused.err
