@@ -22,12 +22,14 @@ class Registered:
             name.
         is_free: whether it chooses control points itself if the space allows it; the others search the fixed
             parameterization.
+        learns: whether what it suggests depends on the evaluations that it is told.
     """
 
     target: str
     summary: str
     extra: str = ""
     is_free: bool = False
+    learns: bool = True
 
     def load(self) -> Any:
         """Import the engine's class.
@@ -54,9 +56,11 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             "learns the dynamics and searches on its predictions",
             is_free=True,
         ),
-        "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points"),
-        "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence"),
-        "corners": Registered("falsifier.engines.corners:Corners", "constant extremes first, then random"),
+        "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points", learns=False),
+        "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence", learns=False),
+        "corners": Registered(
+            "falsifier.engines.corners:Corners", "constant extremes first, then random", learns=False
+        ),
         "annealing": Registered("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
         "cma": Registered("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(
