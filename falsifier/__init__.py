@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
     from falsifier.search import events
-    from falsifier.search.assurance import Assurance, Splitting, assess
+    from falsifier.search.assurance import Assurance, Splitting, Tail, assess
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.coverage import Coverage, coverage
     from falsifier.search.events import Event, Listener
@@ -130,6 +130,7 @@ _EXPORTS = {
     "Spent": "falsifier.search.budget",
     "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
+    "Tail": "falsifier.search.assurance",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
@@ -216,6 +217,7 @@ __all__ = [
     "Spent",
     "Splitting",
     "StoredCounterexample",
+    "Tail",
     "Trajectory",
     "Variable",
     "Verdict",

@@ -143,7 +143,10 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "upper_bound": found.bound,
         "interval": found.interval,
         "smallest": evaluation_json(found.smallest),
+        "tail": found.tail and asdict(found.tail),
         "estimate": found.splitting and asdict(found.splitting),
+        "optimum": found.optimum,
+        "interrupted": found.interrupted,
     }
 
 
