@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from falsifier.core.words import counted, listed
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
+from falsifier.search.effects import Effects
 from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.expression import Number
 from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Not, Or, Predicate, Until
@@ -44,6 +45,7 @@ class Vacuity:
         self._highs = np.full(len(self._parts), -np.inf)
         self._lowest: list[_Moment | None] = [None] * len(self._parts)
         self._highest: list[_Moment | None] = [None] * len(self._parts)
+        self._effects = Effects(problem)
         self._count = 0
         self._aimed: Counter[str] = Counter()
         self._robustness: set[float] = set()
@@ -57,6 +59,7 @@ class Vacuity:
             return
         self._count += 1
         self._aimed[evaluation.candidate.aim] += 1
+        self._effects.see(evaluation.candidate, trajectory)
         if len(self._robustness) <= 1:
             self._robustness.add(verdict.robustness)
         for name in set(self._problem.requirement.formula.signals) - self._moved:
@@ -89,7 +92,9 @@ class Vacuity:
         # A requirement whose signals do not move at all has no predicate that could be nearer.
         far = [] if constant else [self._far(i) for i in self._of(Predicate) if self._is_far(i, said)]
         unique = {(finding.kind, finding.part): finding for finding in (*conditions, *disjuncts, *far)}
-        return (*constant, *unique.values())
+        # If nothing moves the requirement's signals, that has been said of everything that was searched.
+        idle = self._effects.findings() if self._moved else ()
+        return (*constant, *unique.values(), *idle)
 
     def _of(self, kind: type[Formula]) -> list[int]:
         """Return the watched parts that belong to formulas of this kind."""
