@@ -86,11 +86,12 @@ def test_a_language_model_is_given_the_findings_and_its_words_are_returned() -> 
 
 def test_of_a_near_miss_is_said_what_brings_it_near_and_what_keeps_it_away() -> None:
     problem = lag_problem("G[0,10] (x <= 2)", inputs=2)
-    candidate = problem.space.decode([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+    candidate = problem.space.decode([1.0] * 4 + [-0.5] * 4)
     found = explain(problem, evaluate(problem, candidate))
     assert not found.violated
     assert "It is not violated here; " in found.text
     assert "u brings it near: at rest (0 V) robustness would be +2." in found.text
+    assert "v keeps it away: at rest (0 V) robustness would be +1, nearer." in found.text
     assert "counterexample" not in found.text
 
 
