@@ -9,7 +9,11 @@ numbers, drawn uniformly from [0, 1], from its largest value (one corner) or fro
 - interval: share of 200 estimates by splitting, each with another seed and at most 4000 simulations, whose
   interval contains the true probability. Estimates that ran out of budget say so, and are counted apart.
 
+- tail: share of 200 estimates by extreme value theory, each from 300 draws with another seed, whose interval
+  contains the true probability, and of those whose fit is poor.
+
     python -m bench.assurance > bench/assurance.md
+    python -m bench.assurance tail                     # only the second table
 """
 
 import sys
@@ -23,9 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from falsifier import Splitting
+from falsifier import Splitting, Tail
 from falsifier.search.assurance.bounds import upper_bound
 from falsifier.search.assurance.splitting import split
+from falsifier.search.assurance.tail import tail
 
 # Others than those with which the intervals were developed.
 SEEDS = range(1000, 1200)
@@ -50,8 +55,36 @@ def estimated(probability: float, corners: int, seed: int) -> Splitting:
     return split(robustness(probability, corners), 4, budget=SPLITTING, seed=seed, confidence=0.95)
 
 
+def extrapolated(probability: float, corners: int, seed: int) -> Tail | None:
+    """Extrapolate the probability of one system from draws with one seed."""
+    cost = robustness(probability, corners)
+    points = np.random.default_rng(seed).random((DRAWN, 4))
+    return tail([cost(point) for point in points], confidence=0.95, seed=seed)
+
+
+def print_tails() -> None:
+    """Print the table of extreme value theory."""
+    print("| system | probability | tail | poor fits | median estimate / truth | median high / truth |")
+    print("|---|---|---|---|---|---|", flush=True)
+    for corners, name in CORNERS.items():
+        for probability in PROBABILITIES[:2]:
+            found = [t for seed in SEEDS if (t := extrapolated(probability, corners, seed)) is not None]
+            within = sum(t.low <= probability <= t.high for t in found) / len(found)
+            poor = sum(t.is_poor for t in found) / len(found)
+            ratio, high = (median(v / probability for v in each) for each in _columns(found))
+            row_ = f"| {name} | {probability:.0e} | {within:.1%} | {poor:.1%} | {ratio:.2g} | {high:.2g} |"
+            print(row_, flush=True)
+
+
+def _columns(found: list[Tail]) -> tuple[list[float], list[float]]:
+    return [t.probability for t in found], [t.high for t in found]
+
+
 def main() -> None:
-    """Print the table."""
+    """Print both tables."""
+    if sys.argv[1:] == ["tail"]:
+        print_tails()
+        return
     print("# Coverage of bounds and intervals of 95 %\n")
     print("\n\n".join((__doc__ or "").split("\n\n")[1:3]))
     print("\nCommand: `python -m bench.assurance > bench/assurance.md`\n")
@@ -66,6 +99,8 @@ def main() -> None:
                 task = partial(estimated, probability, corners)
                 print(row(name, probability, list(pool.map(task, SEEDS, chunksize=10))))
                 sys.stdout.flush()
+    print()
+    print_tails()
 
 
 def row(name: str, probability: float, found: list[Splitting]) -> str:

@@ -70,8 +70,9 @@ if TYPE_CHECKING:
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
     from falsifier.search import events
-    from falsifier.search.assurance import Assurance, Splitting, assess
+    from falsifier.search.assurance import Assurance, Splitting, Tail, assess
     from falsifier.search.budget import Budget, Spent
+    from falsifier.search.coverage import Coverage, coverage
     from falsifier.search.events import Event, Listener
     from falsifier.search.margin import Margin, margin
     from falsifier.search.request import LLMSettings
@@ -92,6 +93,7 @@ _EXPORTS = {
     "Chat": "falsifier.llm.messages",
     "Confirmation": "falsifier.evaluation.confirm",
     "DEFAULT_ENGINE": "falsifier.engines",
+    "Coverage": "falsifier.search.coverage",
     "Diagnosis": "falsifier.stl",
     "ENGINES": "falsifier.engines",
     "Engine": "falsifier.engines.protocol",
@@ -128,6 +130,7 @@ _EXPORTS = {
     "Spent": "falsifier.search.budget",
     "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
+    "Tail": "falsifier.search.assurance",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
@@ -135,6 +138,7 @@ _EXPORTS = {
     "assess": "falsifier.search.assurance",
     "confirm": "falsifier.evaluation.confirm",
     "connect": "falsifier.llm.connect",
+    "coverage": "falsifier.search.coverage",
     "cross": "falsifier.campaigns",
     "evaluate": "falsifier.evaluation.evaluate",
     "explain": "falsifier.counterexamples.explain",
@@ -177,6 +181,7 @@ __all__ = [
     "Candidate",
     "Chat",
     "Confirmation",
+    "Coverage",
     "Diagnosis",
     "Engine",
     "Evaluation",
@@ -212,6 +217,7 @@ __all__ = [
     "Spent",
     "Splitting",
     "StoredCounterexample",
+    "Tail",
     "Trajectory",
     "Variable",
     "Verdict",
@@ -220,6 +226,7 @@ __all__ = [
     "assess",
     "confirm",
     "connect",
+    "coverage",
     "cross",
     "evaluate",
     "events",

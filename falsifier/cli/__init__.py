@@ -44,6 +44,7 @@ _COMMANDS = {
     "simulate": ("falsifier.cli.simulate", "Simulate your own inputs and judge the requirement."),
     "assess": ("falsifier.cli.assess", "Bound the probability of a violation."),
     "margin": ("falsifier.cli.assess", "Find the threshold at which violations begin."),
+    "coverage": ("falsifier.cli.coverage", "Show what a run has tried, and what it has not."),
     "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
     "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
     "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from falsifier.cli.options import (
+    DEFAULT_PARAMETERIZATION,
     budget_option,
     json_option,
     out_option,
@@ -17,11 +18,17 @@ from falsifier.cli.options import (
     seed_option,
 )
 from falsifier.cli.output import conclude
+from falsifier.cli.streams import INTERRUPTED
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
+from falsifier.counterexamples.known_inputs import judged_candidates
 from falsifier.engines import DEFAULT_ENGINE
+from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source
+from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
+from falsifier.search.journal import holds_run
+from falsifier.search.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -43,6 +50,7 @@ _SAID_EVERY = 100
 @click.option(
     "--confidence", type=float, default=0.95, show_default=True, help="Confidence of bound and intervals."
 )
+@click.option("--requirement", metavar="NAME", help="Which one, if a run searched several requirements.")
 @seed_option()
 @quiet_option
 @out_option("Directory for assurance.json.", metavar="DIR")
@@ -52,6 +60,7 @@ def assess(
     budget: int,
     splitting: int | None,
     confidence: float,
+    requirement: str | None,
     seed: int,
     quiet: bool,
     out: Path | None,
@@ -60,12 +69,13 @@ def assess(
 ) -> None:
     """Bound the probability of a violation by simulating at random.
 
-    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Every
-    control point and every parameter is drawn uniformly from its range, as by the engine uniform. The upper
-    bound is exact (Clopper and Pearson); what splitting adds is an estimate.
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), an FMU with --stl, or the
+    directory of a run, whose search space is drawn from and whose smallest robustness is stated beside the
+    bound. Every control point and every parameter is drawn uniformly from its range, as by the engine
+    uniform. The upper bound is exact (Clopper and Pearson); extreme value theory and splitting add estimates.
 
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
-    failed.
+    failed, 130 interrupted, after which the draws so far count.
     """
     from falsifier.search.assurance import assess as assess_problem
 
@@ -73,10 +83,16 @@ def assess(
         if not quiet and count % _SAID_EVERY == 0:
             warn(f"simulation {count} of at most {budget}")
 
-    problem = load_source(problem_source(options))
+    problem, optimum = _loaded(options, requirement)
     try:
         found = assess_problem(
-            problem, budget=budget, seed=seed, confidence=confidence, splitting=splitting, progress=said
+            problem,
+            budget=budget,
+            seed=seed,
+            confidence=confidence,
+            splitting=splitting,
+            optimum=optimum,
+            progress=said,
         )
     finally:
         problem.model.close()
@@ -87,7 +103,8 @@ def assess(
         *(f"  {line}" for line in found.text.splitlines()),
     ]
     lines += [f"  file: {file}"] if file else []
-    conclude(content if as_json else "\n".join(map(one_line, lines)), 1 if found.violations else 0)
+    code = INTERRUPTED if found.interrupted else 1 if found.violations else 0
+    conclude(content if as_json else "\n".join(map(one_line, lines)), code)
 
 
 @click.command()
@@ -118,7 +135,7 @@ def margin(
     its requirement. Every simulation is judged for all thresholds.
 
     Exit codes: 0 not falsified at any threshold, 1 falsified at one, 2 wrong usage or spec, 3 the simulations
-    failed.
+    failed, 130 interrupted, after which the searches so far count.
     """
     from falsifier.search.margin import PLACE
     from falsifier.search.margin import margin as find_margin
@@ -144,7 +161,34 @@ def margin(
         problem.model.close()
     content = {"vary": vary, "between": [low, high], **asdict(found)}
     text = json.dumps(content, indent=2) if as_json else one_line(f"{vary}: {found.text}")
-    conclude(text, 0 if found.falsified is None else 1)
+    conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
+
+
+def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, float | None]:
+    """Load the problem of a target or a run; of a run, return the smallest robustness that it found, too.
+
+    Raises:
+        click.UsageError: if options change the problem of a run, or a requirement is chosen from no run.
+        SpecError: if the run's problem was made in Python.
+    """
+    place = Path(options["target"])
+    if not (place.is_dir() and holds_run(place)):
+        if requirement is not None:
+            raise click.UsageError("--requirement chooses from a run directory; TARGET is none")
+        return load_source(problem_source(options)), None
+    unset = {"target": None, "parameterization": DEFAULT_PARAMETERIZATION}
+    changed = [
+        name for name, value in options.items() if name != "target" and value and value != unset.get(name)
+    ]
+    if changed:
+        raise click.UsageError(f"{place}: a run is assessed as it was searched; drop {', '.join(changed)}")
+    described = read_manifest(place)
+    described = described.of(requirement or described.requirement.name)
+    source = described.request.source
+    if source is None:
+        raise SpecError(f"{place}: the problem of this run was made in Python: call assess() there")
+    found = [robustness for robustness, _ in judged_candidates(place, described.requirement.name)]
+    return load_source(source), min(found, default=None)
 
 
 def _between(text: str) -> tuple[float, float]:

@@ -1,4 +1,7 @@
-"""Commands on counterexamples: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``."""
+"""Commands on counterexamples: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``.
+
+Of a run that falsified nothing, ``shrink``, ``explain`` and ``robustness-map`` take the nearest miss.
+"""
 
 import json
 from collections.abc import Iterator
@@ -9,6 +12,13 @@ from typing import Any
 
 import click
 
+from falsifier.cli.nearest_miss import (
+    draw_nearest_miss,
+    nearest_miss_line,
+    refuse,
+    shrink_nearest_miss,
+    shrunk_line,
+)
 from falsifier.cli.options import (
     api_base_option,
     budget_option,
@@ -22,7 +32,9 @@ from falsifier.cli.options import (
 )
 from falsifier.cli.output import conclude, say
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import candidate_lines, counted, in_one_line
+from falsifier.core.literals import one_line
+from falsifier.core.words import candidate_lines, in_one_line
+from falsifier.counterexamples.nearest_miss import NearestMiss, Subject, asked_about
 from falsifier.counterexamples.store import (
     Database,
     Replayed,
@@ -43,6 +55,10 @@ from falsifier.views.terminal import warn
 
 # Shrinking usually reaches a local minimum with fewer simulations.
 _SHRINK_BUDGET = 500
+
+_requirement_option = click.option(
+    "--requirement", metavar="NAME", help="Which one, if RUN searched several requirements."
+)
 
 
 @click.command()
@@ -79,50 +95,78 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
     help="Margin to keep: the robustness stays at or below minus this value. Default: half of the "
     "original's; 0: any violation will do.",
 )
-@out_option("File to write; default: shrunk.json in RUN's directory.")
+@click.option(
+    "--within",
+    type=float,
+    help="For a nearest miss: the robustness may grow by this value. Default: a tenth of it.",
+)
+@_requirement_option
+@out_option("File to write; default: shrunk.json in RUN's directory; of a nearest miss shrunk.csv.")
 @store_option
 @json_option
 def shrink(
-    *, run: Path, budget: int, margin: float | None, out: Path | None, store: Path | None, as_json: bool
+    *,
+    run: Path,
+    budget: int,
+    margin: float | None,
+    within: float | None,
+    requirement: str | None,
+    out: Path | None,
+    store: Path | None,
+    as_json: bool,
 ) -> None:
     """Make a counterexample as simple as possible while it still violates; the original is kept.
 
-    RUN is a run directory or a counterexample file.
+    RUN is a run directory or a counterexample file. Of a run that falsified nothing, the input that came
+    nearest to a violation is made as simple as possible while it still comes about as near.
     """
+    found = asked_about(run, requirement)
+    if isinstance(found, NearestMiss):
+        refuse("a nearest miss is no counterexample", {"--margin": margin, "--store": store})
+        shrink_nearest_miss(found, budget=budget, within=within, out=out, as_json=as_json)
+        return
+    refuse("applies to the nearest miss of a run that falsified nothing", {"--within": within})
+    file, stored = found
+    _shrink(file, stored, budget=budget, margin=margin, out=out, store=store, as_json=as_json)
+
+
+def _shrink(
+    original: Path,
+    stored: StoredCounterexample,
+    *,
+    budget: int,
+    margin: float | None,
+    out: Path | None,
+    store: Path | None,
+    as_json: bool,
+) -> None:
     from falsifier.cli.files import check_out, write_counterexample
     from falsifier.counterexamples.shrink import shrink as shrink_violation
 
-    stored = load(run)
     # A link is followed, not replaced.
-    file = _beside(run, "shrunk.json") if out is None else out.resolve()
-    check_out(file, beginnings=(b'{\n  "format"',), kept=counterexample_file(run))
+    file = _beside(original, "shrunk.json") if out is None else out.resolve()
+    check_out(file, beginnings=(b'{\n  "format"',), kept=original)
     with _problem(stored) as problem:
-        original = _simulated(stored, problem)
         shrunk = shrink_violation(
             problem,
-            original,
+            _simulated(stored, problem),
             budget=budget,
             margin=margin,
             progress=lambda simpler, n: warn(f"simulation {n}: {_inputs_line(simpler)}"),
         )
         confirmation = confirm(problem, shrunk.evaluation)
     if confirmation.outcome == "refuted":
-        raise SpecError(f"{run}: {confirmation.reason}")
+        raise SpecError(f"{original}: {confirmation.reason}")
     written = write_counterexample(confirmation, file.parent, name=file.name)
     if store is not None:
         written.append(Database(store).save(problem, to_store(confirmation)))
-    end = (
-        "no simpler one found nearby"
-        if shrunk.minimal
-        else f"the budget of {counted(budget, 'simulation')} is used up"
-    )
     if as_json:
         content = _confirmation_json(confirmation)
         content |= {"minimal": shrunk.minimal, "simulations": shrunk.simulations}
         content |= {"least_margin": shrunk.least_margin}
         say(json.dumps(content | {"files": list(map(str, written))}, indent=2))
         return
-    say(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
+    say(shrunk_line(problem, shrunk, budget))
     say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
     half = ", half of the original's; --margin changes it" if margin is None else ""
     say(f"  margin         at least {shrunk.least_margin:.6g} was kept{half}")
@@ -136,36 +180,52 @@ def shrink(
 @llm_option()
 @effort_option
 @api_base_option
+@_requirement_option
 @json_option
-def explain(*, run: Path, llm: str | None, effort: str | None, api_base: str | None, as_json: bool) -> None:
+def explain(
+    *,
+    run: Path,
+    llm: str | None,
+    effort: str | None,
+    api_base: str | None,
+    requirement: str | None,
+    as_json: bool,
+) -> None:
     """Explain in one paragraph why a counterexample violates and which inputs are necessary.
 
-    RUN is a run directory or a counterexample file. With --llm, a language model describes it in its own
-    words, too.
+    RUN is a run directory or a counterexample file. Of a run that falsified nothing, the simulation that came
+    nearest to a violation is explained, and drawn as nearest-miss.png. With --llm, a language model describes
+    it in its own words, too.
     """
     from falsifier.counterexamples.explain import explain as explain_violation
     from falsifier.counterexamples.explain import narrate
 
     if llm is None and (effort is not None or api_base is not None):
         raise click.UsageError("--effort and --api-base require --llm NAME")
-    stored = load(run)
+    found = asked_about(run, requirement)
     chat = None
     if llm is not None:
         from falsifier.llm.connect import connect
 
         chat = connect(llm, effort=effort, api_base=api_base)
-    with _problem(stored) as problem:
-        explanation = explain_violation(problem, _simulated(stored, problem))
+    with _subject(found) as (problem, evaluation):
+        explanation = explain_violation(problem, evaluation)
+        picture = draw_nearest_miss(found, problem, evaluation) if isinstance(found, NearestMiss) else None
     words = narrate(explanation, chat) if chat else None
     if as_json:
         effects = [{**asdict(e), "needed": e.needed} for e in explanation.effects]
         told = {"llm": llm, "words": words} if words else None
-        content = {"text": explanation.text, "effects": effects, "told_by": told}
+        content = {"violated": explanation.violated, "text": explanation.text, "effects": effects}
+        content |= {"told_by": told, "picture": picture and str(picture)}
         say(json.dumps(content, indent=2))
         return
+    if isinstance(found, NearestMiss):
+        say(one_line(nearest_miss_line(found)))
     say(explanation.text)
     if words is not None:
         say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
+    if picture is not None:
+        say(f"picture: {picture}")
 
 
 @click.command()
@@ -203,33 +263,46 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
 )
 @click.option("--grid", type=int, default=21, show_default=True, help="Points per side of the map.")
 @seed_option()
+@_requirement_option
 @out_option("Picture to write; default: robustness-map.png in RUN's directory.")
 @json_option
 def robustness_map(
-    *, run: Path, radius: float, samples: int, grid: int, seed: int, out: Path | None, as_json: bool
+    *,
+    run: Path,
+    radius: float,
+    samples: int,
+    grid: int,
+    seed: int,
+    requirement: str | None,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Change the inputs of a counterexample at random and plot where they still violate.
 
-    RUN is a run directory or a counterexample file.
+    RUN is a run directory or a counterexample file. Of a run that falsified nothing, the inputs that came
+    nearest to a violation are changed.
     """
     from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
-    stored = load(run)
-    picture = out or _beside(run, "robustness-map.png")
-    with _problem(stored) as problem:
-        found = robustness_map(
-            problem, _simulated(stored, problem), radius=radius, samples=samples, points=grid, seed=seed
-        )
+    about, name = asked_about(run, requirement), "robustness-map.png"
+    beside = about.beside(name) if isinstance(about, NearestMiss) else _beside(about[0], name)
+    picture = out or beside
+    with _subject(about) as (problem, evaluation):
+        found = robustness_map(problem, evaluation, radius=radius, samples=samples, points=grid, seed=seed)
     save_figure(plot_robustness_map(found, problem.name), picture)
     if as_json:
         content = {
+            "original": found.original,
+            "smallest": found.smallest,
             "persistence": [{"size": size, "share": share} for size, share in found.persistence],
             "deciding": [found.coordinates[i].label for i in found.axes],
             "picture": str(picture),
         }
         say(json.dumps(content, indent=2))
         return
+    if isinstance(about, NearestMiss):
+        say(one_line(nearest_miss_line(about)))
     say(f"{problem.name}: {found.text}")
     say(f"  picture        {picture}")
 
@@ -249,6 +322,20 @@ def _problem(stored: StoredCounterexample) -> Iterator[Problem]:
         yield problem
     finally:
         problem.model.close()
+
+
+@contextmanager
+def _subject(found: Subject) -> Iterator[tuple[Problem, Evaluation]]:
+    """Load the problem of what was asked about, simulate that again, and close the model at the end."""
+    if isinstance(found, NearestMiss):
+        problem = found.problem()
+        try:
+            yield problem, found.simulated(problem)
+        finally:
+            problem.model.close()
+        return
+    with _problem(found[1]) as problem:
+        yield problem, _simulated(found[1], problem)
 
 
 def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:

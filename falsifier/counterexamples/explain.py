@@ -1,4 +1,4 @@
-"""Why a counterexample violates: what decided it, and which inputs and parameters are necessary.
+"""Why a counterexample violates, or a near miss does not: what decided it, and which inputs matter.
 
 The monitor provides the path from the formula to the deciding predicate. Ablation shows which inputs matter:
 each signal, each of its stretches and each parameter is reset to rest, one at a time, and the model is
@@ -7,6 +7,7 @@ simulated again.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,10 +27,11 @@ if TYPE_CHECKING:
     from falsifier.llm.messages import Chat
 
 _NARRATOR = (
-    "You explain to a control engineer why a simulated system violates a requirement. Describe in one short "
-    "paragraph of plain text what happens over time and which inputs cause it. Use only the information "
-    "given, and mark assumptions as such."
+    "You explain to a control engineer {what}. Describe in one short paragraph of plain text what happens "
+    "over time and which inputs cause it. Use only the information given, and mark assumptions as such."
 )
+_VIOLATES = "why a simulated system violates a requirement"
+_HOLDS = "how near a simulated system comes to violating a requirement, which it does not violate"
 # Rows of the trajectory shown to a language model, in addition to the critical one.
 _ROWS = 21
 # Maximum number of stretches of one signal that are reset one at a time; the longest are chosen.
@@ -64,11 +66,11 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Why a counterexample violates.
+    """Why a counterexample violates, or how near a simulation comes to it.
 
     Attributes:
-        problem: the problem whose requirement is violated.
-        evaluation: the counterexample.
+        problem: the problem with the requirement.
+        evaluation: the counterexample, or the nearest miss.
         diagnosis: the path from the formula to the deciding predicate.
         effects: effects of resetting parts: whole signals and parameters, then stretches.
     """
@@ -83,12 +85,44 @@ class Explanation:
         """The explanation in one paragraph."""
         requirement = self.problem.requirement
         demand = requirement.description or in_words(requirement.formula)
+        robustness = self.diagnosis.robustness
+        found = f"It is violated by {-robustness:.5g}"
+        if not self.violated:
+            found = f"It is not violated here; {robustness:.5g} is missing to a violation"
         sentences = [
             f"{self.problem.name} requires: {demand.rstrip('.')}.",
-            f"It is violated by {-self.diagnosis.robustness:.5g}: {self.diagnosis.text}",
-            *self._effect_sentences(),
+            f"{found}: {self.diagnosis.text}",
+            *(self._effect_sentences() if self.violated else self._miss_sentences()),
         ]
         return " ".join(sentences)
+
+    @property
+    def violated(self) -> bool:
+        """Whether the requirement is violated; otherwise the simulation is a near miss."""
+        return self.diagnosis.robustness < 0
+
+    def _miss_sentences(self) -> Iterator[str]:
+        """What brings the simulation near a violation, strongest first, then what does not."""
+        here = self.diagnosis.robustness
+        whole = [e for e in self.effects if e.span is None]
+        for e in sorted(whole, key=lambda e: -inf if e.robustness is None else -e.robustness):
+            part, instead = self._part(e), self._instead(e)
+            if e.robustness is None:
+                yield f"With {e.name} {instead} the simulation fails."
+            elif e.robustness < 0:
+                yield (
+                    f"With {e.name} {instead} the requirement would be violated by {-e.robustness:.4g}, "
+                    "which is not confirmed yet."
+                )
+            elif e.robustness > here:
+                yield f"{part} brings it near: {instead} robustness would be {e.robustness:+.4g}."
+            elif e.robustness == here:
+                yield f"{part} makes no difference: {instead} robustness would be the same."
+            else:
+                yield f"{part} keeps it away: {instead} robustness would be {e.robustness:+.4g}, nearer."
+        for name in dict.fromkeys(e.name for e in whole if (e.robustness or 0.0) > here):
+            spans = [e for e in self.effects if e.name == name and e.span is not None]
+            yield from map(self._stretch, sorted(spans, key=lambda e: -(e.robustness or 0.0))[:1])
 
     def _effect_sentences(self) -> Iterator[str]:
         whole = [e for e in self.effects if e.span is None]
@@ -131,7 +165,7 @@ class Explanation:
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
-    """Diagnose a counterexample and reset its parts one at a time.
+    """Diagnose a counterexample, or a near miss, and reset its parts one at a time.
 
     Raises:
         SpecError: if no evaluation is given.
@@ -155,7 +189,7 @@ def narrate(explanation: Explanation, chat: "Chat") -> str:
     from falsifier.llm.messages import ChatRequest, Message
 
     messages = (
-        Message(role="system", content=_NARRATOR),
+        Message(role="system", content=_NARRATOR.format(what=_VIOLATES if explanation.violated else _HOLDS)),
         Message(role="user", content=_findings(explanation)),
     )
     return converse(chat, ChatRequest(messages=messages), str.strip, lambda exchange: None)

@@ -45,12 +45,16 @@ def best_of_run(directory: Path, requirement: str | None = None) -> Candidate:
         SpecError: if every simulation failed, or there was none.
     """
     names = manifest.read(directory).names
-    judged_by = requirement if requirement in names else names[0]
-    evaluations = recorded_evaluations(directory, read_journal(directory), judged_by).values()
-    judged = [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
+    judged = judged_candidates(directory, requirement if requirement in names else names[0])
     if not judged:
         raise SpecError(f"{directory}: no simulation of this run has a verdict; choose another run")
     return min(judged, key=lambda pair: pair[0])[1]
+
+
+def judged_candidates(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:
+    """Return the robustness and the candidate of each recorded simulation with a verdict, in order."""
+    evaluations = recorded_evaluations(directory, read_journal(directory), requirement).values()
+    return [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
 
 
 def _contained(place: Path, problem: Problem) -> Candidate:

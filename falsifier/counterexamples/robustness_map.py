@@ -1,4 +1,4 @@
-"""The neighbourhood of a counterexample: how far its inputs may change before the violation disappears.
+"""The neighbourhood of a simulation: how far a violation extends, or whether one is near.
 
 The values of each input, one per stretch of equal values, and the parameters are changed; times and
 interpolation are not. The size of a change is the largest share of a range by which any value changes.
@@ -30,7 +30,7 @@ class Coordinate:
         first: index of the stretch's first control point; None for a parameter.
         end: index after its last control point; None for a parameter.
         time: time of the first control point in s; None for a parameter or a constant signal.
-        value: value in the counterexample.
+        value: value without a change.
         low: lower bound.
         high: upper bound.
         unit: unit of the value.
@@ -54,10 +54,10 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobustnessMap:
-    """Simulations around a counterexample.
+    """Simulations around a counterexample or a near miss.
 
     Attributes:
-        original: robustness of the counterexample.
+        original: robustness of the counterexample; not negative for a near miss.
         coordinates: the values that are changed.
         radius: largest change as a share of the range.
         values: values of the coordinates, shape (samples, coordinates).
@@ -87,14 +87,36 @@ class RobustnessMap:
         return tuple((size, float((r < 0).mean())) for size, r in zip(sizes, within, strict=True) if r.size)
 
     @property
+    def smallest(self) -> float | None:
+        """Smallest robustness of a change; None if all simulations failed."""
+        known = self.robustness[np.isfinite(self.robustness)]
+        return float(known.min()) if known.size else None
+
+    @property
     def text(self) -> str:
-        """How far the violation extends, in words."""
+        """How far the violation extends, or whether one is near, in words."""
+        if self.original >= 0:
+            return self._near_miss
         (size, share), *larger = self.persistence
         shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
         shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
-        names = listed([self.coordinates[i].label for i in self.axes])
         changes = counted(len(self.robustness), "random change")
-        return f"{shares} ({changes} of all inputs at once). Most influential: {names}."
+        return f"{shares} ({changes} of all inputs at once). {self._influential}"
+
+    @property
+    def _near_miss(self) -> str:
+        """Whether changes of a near miss violate, in words."""
+        tried = (
+            f"{counted(len(self.robustness), 'random change')} of up to {_percent(self.radius)} of the range"
+        )
+        violating = int((self.robustness < 0).sum())
+        found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
+        least = "" if self.smallest is None else f"; the smallest robustness is {self.smallest:+.4g}"
+        return f"{found}{least}, without a change it is {self.original:+.4g}. {self._influential}"
+
+    @property
+    def _influential(self) -> str:
+        return f"Most influential: {listed([self.coordinates[i].label for i in self.axes])}."
 
 
 def robustness_map(
@@ -106,11 +128,11 @@ def robustness_map(
     points: int = 21,
     seed: int = 0,
 ) -> RobustnessMap:
-    """Simulate around a counterexample.
+    """Simulate around a counterexample or a near miss.
 
     Args:
-        problem: the problem whose requirement is violated.
-        evaluation: the counterexample.
+        problem: the problem with the requirement.
+        evaluation: the counterexample, or the nearest miss.
         radius: largest change as a share of the range.
         samples: simulations with all coordinates changed at once, from a scrambled Sobol sequence.
         points: grid points along each of the two most influential coordinates.

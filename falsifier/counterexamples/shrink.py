@@ -7,8 +7,10 @@ shrinks to the same result.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import inf
 
 from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
@@ -25,6 +27,8 @@ Progress = Callable[[Evaluation, int], None]
 
 # Share of the original's margin that a simpler counterexample keeps, unless another margin is demanded.
 KEPT_SHARE = 0.5
+# Share of its robustness by which a simpler near miss may be farther from a violation, unless stated.
+GIVEN_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +36,12 @@ class Shrunk:
     """Result of shrinking.
 
     Attributes:
-        original: the counterexample before shrinking.
-        evaluation: the simplest violation found; the original if nothing simpler violates.
+        original: the counterexample, or the near miss, before shrinking.
+        evaluation: the simplest one found; the original if nothing simpler will do.
         simulations: number of simulations used.
         minimal: whether no pass can make it simpler; False if the budget ended first.
-        least_margin: the margin that every simpler counterexample had to keep.
+        least_margin: the margin that every simpler one had to keep; negative for a near miss: minus the
+            largest robustness that was allowed.
     """
 
     original: Evaluation
@@ -69,26 +74,68 @@ def shrink(
         SpecError: if the evaluation does not violate by that margin.
     """
     instance("shrink", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
-    hunt = _Hunt(problem, budget, margin or 0.0)
-    start = hunt.violation(problem.space.admit(evaluation.candidate))
-    if start is None:
+    hunt = _Hunt(problem, budget, margin or 0.0, demands_violation=True)
+    start = hunt.kept(problem.space.admit(evaluation.candidate))
+    if start is None or start.robustness is None:
         violated = f"violated by {margin:g} or more" if margin else "violated"
         raise SpecError(f"nothing to shrink: {problem.name} is not {violated}")
-    if margin is None and start.robustness is not None:
+    if margin is None:
         hunt.margin = KEPT_SHARE * -start.robustness
+    with suppress(_BudgetUsedUpError):
+        hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
+    return _descend(hunt, evaluation, start, progress)
+
+
+def shrink_miss(
+    problem: Problem,
+    evaluation: Evaluation,
+    *,
+    budget: int = 500,
+    within: float | None = None,
+    progress: Progress = lambda evaluation, simulations: None,
+) -> Shrunk:
+    """Make an input that nearly violates as simple as possible such that it still comes about as near.
+
+    A simpler one that violates is preferred from then on; confirm it.
+
+    Args:
+        problem: the problem whose requirement is not violated.
+        evaluation: the simulation that came nearest to a violation.
+        budget: maximum number of simulations.
+        within: the robustness may grow by this value; default: a tenth of the original's.
+        progress: called with each simpler input and the number of simulations so far.
+
+    Raises:
+        SpecError: if the simulation fails or violates, or ``within`` is negative.
+    """
+    if within is not None and not within >= 0:
+        raise SpecError(f"within: expected a number that is not negative, got {within!r}")
+    hunt = _Hunt(problem, budget, -inf)
+    start = hunt.kept(problem.space.admit(evaluation.candidate))
+    if start is None or start.robustness is None or start.violated:
+        how = "the simulation fails" if start is None else "it violates the requirement: use shrink"
+        raise SpecError(f"{problem.name}: no near miss to shrink: {how}")
+    allowed = GIVEN_SHARE * start.robustness if within is None else within
+    hunt.margin = -(start.robustness + allowed)
+    return _descend(hunt, evaluation, start, progress)
+
+
+def _descend(hunt: "_Hunt", original: Evaluation, start: Evaluation, progress: Progress) -> Shrunk:
+    """Replace the start by simpler ones until no pass finds any."""
     best, minimal = start, False
     try:
-        hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
         while not minimal:
             minimal = True
             for propose in PASSES:
                 while (simpler := hunt.first(propose, best)) is not None:
                     best, minimal = simpler, False
                     progress(best, hunt.simulations)
+                    if best.violated and not hunt.demands_violation:
+                        hunt.demands_violation, hunt.margin = True, 0.0
     except _BudgetUsedUpError:
         minimal = False
     unchanged = best.candidate.key == start.candidate.key
-    return Shrunk(evaluation, evaluation if unchanged else best, hunt.simulations, minimal, hunt.margin)
+    return Shrunk(original, original if unchanged else best, hunt.simulations, minimal, hunt.margin)
 
 
 class _BudgetUsedUpError(Exception):
@@ -102,34 +149,40 @@ class _Hunt:
     problem: Problem
     budget: int
     margin: float
-    simulations: int = 0
+    demands_violation: bool = False
     demands_half_step: bool = False
-    _known: dict[object, Evaluation | None] = field(default_factory=dict)
+    simulations: int = 0
+    _known: dict[object, Evaluation] = field(default_factory=dict)
+    _halved: dict[object, bool] = field(default_factory=dict)
 
     def first(self, propose: Pass, best: Evaluation) -> Evaluation | None:
-        """Find the first violation among the simpler candidates that a pass proposes."""
+        """Find the first that keeps what is demanded among the simpler candidates that a pass proposes."""
         limit = simplicity(self.problem, best.candidate)
         for proposal in propose(self.problem, best.candidate):
             try:
                 candidate = self.problem.space.admit(proposal)
             except CandidateError:  # passes may propose values outside the problem's ranges
                 continue
-            if simplicity(self.problem, candidate) < limit and (found := self.violation(candidate)):
+            if simplicity(self.problem, candidate) < limit and (found := self.kept(candidate)):
                 return replace(found, candidate=replace(candidate, origin="shrink", rationale=""))
         return None
 
-    def violation(self, candidate: Candidate) -> Evaluation | None:
-        """Simulate a candidate; return its evaluation if it violates by the margin, and at half the step."""
+    def kept(self, candidate: Candidate) -> Evaluation | None:
+        """Simulate a candidate; return its evaluation if it keeps the margin and all that is demanded."""
         if candidate.key not in self._known:
-            found = self._simulate(self.problem, candidate)
-            violated = found.violated and found.robustness is not None and found.robustness <= -self.margin
-            if violated and self.demands_half_step:
-                violated = self.violates_at_half_step(candidate)
-            self._known[candidate.key] = found if violated else None
-        return self._known[candidate.key]
+            self._known[candidate.key] = self._simulate(self.problem, candidate)
+        found = self._known[candidate.key]
+        if found.robustness is None or found.robustness > -self.margin:
+            return None
+        if self.demands_violation and not found.violated:
+            return None
+        return None if self.demands_half_step and not self.violates_at_half_step(candidate) else found
 
     def violates_at_half_step(self, candidate: Candidate) -> bool:
-        return self._simulate(half_step(self.problem), candidate).violated
+        if candidate.key not in self._halved:
+            halved = self._simulate(half_step(self.problem), candidate)
+            self._halved[candidate.key] = halved.violated
+        return self._halved[candidate.key]
 
     def _simulate(self, problem: Problem, candidate: Candidate) -> Evaluation:
         if self.simulations >= self.budget:

@@ -196,7 +196,8 @@ def counterexample_file(path: Path) -> Path:
         )
     if not found:
         raise SpecError(
-            "contains no confirmed counterexample; expected the directory of a run that found one",
+            "contains no confirmed counterexample; expected the directory of a run that found one. Of "
+            "others, falsifier explain, shrink and robustness-map take the nearest miss",
             file=str(path),
         )
     return found[0]

@@ -67,4 +67,4 @@ class CMA(BoxEngine):
         told = [cost for cost in self._costs if cost is not None]
         if self._generation and len(told) == len(self._generation):
             self._strategy.tell(self._generation, told)
-            self._generation = []
+            self._generation, self._next = [], 0

@@ -22,12 +22,14 @@ class Registered:
             name.
         is_free: whether it chooses control points itself if the space allows it; the others search the fixed
             parameterization.
+        uses_robustness: whether what it suggests depends on the robustness that it is told.
     """
 
     target: str
     summary: str
     extra: str = ""
     is_free: bool = False
+    uses_robustness: bool = True
 
     def load(self) -> Any:
         """Import the engine's class.
@@ -58,10 +60,17 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             "falsifier.engines.coverage:Coverage",
             "goes on from inputs that reached something new; does not use robustness",
             is_free=True,
+            uses_robustness=False,
         ),
-        "uniform": Registered("falsifier.engines.uniform:Uniform", "uniform random points"),
-        "sobol": Registered("falsifier.engines.sobol:Sobol", "scrambled Sobol sequence"),
-        "corners": Registered("falsifier.engines.corners:Corners", "constant extremes first, then random"),
+        "uniform": Registered(
+            "falsifier.engines.uniform:Uniform", "uniform random points", uses_robustness=False
+        ),
+        "sobol": Registered(
+            "falsifier.engines.sobol:Sobol", "scrambled Sobol sequence", uses_robustness=False
+        ),
+        "corners": Registered(
+            "falsifier.engines.corners:Corners", "constant extremes first, then random", uses_robustness=False
+        ),
         "annealing": Registered("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
         "cma": Registered("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(

@@ -5,8 +5,8 @@ from typing import Literal
 
 # parameterization: only fixed control points were searched; condition: that of an implication never held;
 # disjunct: one side of an ``or`` always held; threshold: a predicate was never near its threshold;
-# constant: the robustness was the same in all simulations.
-FindingKind = Literal["parameterization", "condition", "disjunct", "threshold", "constant"]
+# constant: the robustness was the same in all simulations; effect: an input or parameter had none.
+FindingKind = Literal["parameterization", "condition", "disjunct", "threshold", "constant", "effect"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,7 +16,7 @@ class Finding:
     Attributes:
         kind: what it is about.
         text: what it is, and what would have to happen, in words.
-        part: the part of the formula that it is about; empty if it is not about one.
+        part: the part of the formula, or the input or parameter, that it is about; empty if it is about none.
         margin: how far the part was from changing its truth; None if that has no meaning.
         time: when it came closest, in s; None if that has no meaning.
         simulation: index of the evaluation in which it came closest; None if that has no meaning.
@@ -32,4 +32,4 @@ class Finding:
     @property
     def vacuous(self) -> bool:
         """Whether a part of the requirement was not tested, so that the answer says less than it seems to."""
-        return self.kind != "parameterization"
+        return self.kind not in ("parameterization", "effect")

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from falsifier.engines import DEFAULT_ENGINE, check_engine, make_engine
+from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
+from falsifier.engines.aiming import Aiming, can_aim
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError
 from falsifier.llm.messages import Chat
@@ -19,6 +20,8 @@ _LLM_ENGINES = ("llm", "hybrid")
 # Distance between the seeds of the engines in one search, so that they do not draw the same points; larger
 # than the consecutive seeds that users choose.
 _SEED_STRIDE = 1_000_003
+# The same for the engine that aims at a condition beside one that searches for a violation.
+_AIM_SEED = 500_009
 
 
 def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
@@ -37,9 +40,17 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
     check_names(request)
     if request.llm is None:
         engine = request.engine or DEFAULT_ENGINE
-        return [make_engine(engine, p, seed=request.seed + i * _SEED_STRIDE) for i, p in enumerate(problems)]
+        return [_numerical(engine, p, request.seed + i * _SEED_STRIDE) for i, p in enumerate(problems)]
     chat = chat or _open_chat(request, request.llm)
     return [_led_by_llm(request, request.llm, problem, chat) for problem in problems]
+
+
+def _numerical(name: str, problem: Problem, seed: int) -> Engine:
+    """Make an engine without a language model; if it uses robustness, it also aims at conditions that never hold."""
+    engine = make_engine(name, problem, seed=seed)
+    if not ENGINES[name].uses_robustness or not can_aim(problem):
+        return engine
+    return Aiming(engine, problem, lambda aim: make_engine(name, aim, seed=seed + _AIM_SEED))
 
 
 def check_names(request: RunRequest) -> None:

@@ -2,7 +2,7 @@
 
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -12,7 +12,8 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.model import Variable
+from falsifier.core.space import InputRange, ParameterRange, ValueKind
 from falsifier.errors import JournalError, rejected
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
@@ -37,6 +38,16 @@ class InputRecord(_Strict):
     high: float
     unit: str = ""
     description: str = ""
+    kind: ValueKind = "real"
+    items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
+
+
+class ModeRecord(_Strict):
+    """One recorded signal of the model that is not real."""
+
+    name: str
+    kind: ValueKind
+    items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
 
 
 class RequirementRecord(_Strict):
@@ -74,6 +85,7 @@ class Manifest(_Strict):
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
+    modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
     stop_time: float = Field(description="End of each simulation in s.")
     hashes: dict[str, str] = Field(description="SHA-256 of the FMU and the spec, by path.")
     sum: str = Field("", description="Checksum of the file up to here.")
@@ -140,6 +152,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
+        modes=tuple(_modes(problem)),
         stop_time=space.stop_time,
         hashes=file_hashes(problem),
     )
@@ -186,7 +199,16 @@ def _range_record(range_: InputRange | ParameterRange) -> InputRecord:
         high=range_.high,
         unit=range_.unit,
         description=range_.description,
+        kind=range_.kind,
+        items=range_.items,
     )
+
+
+def _modes(problem: Problem) -> Iterator[ModeRecord]:
+    for name in problem.experiment.outputs:
+        variable = problem.info[name] if name in problem.info else Variable(name)
+        if variable.kind in ("integer", "boolean", "enumeration"):
+            yield ModeRecord(name=name, kind=variable.kind, items=tuple(variable.literals.items()))
 
 
 def _version(package: str) -> str | None:

@@ -35,6 +35,7 @@ class Margin:
         simulations: number of simulations of all searches together, without confirmations.
         searches: the thresholds that were searched, in order, and whether a violation was confirmed.
         complete: whether the two are close enough; False: the budget was used up before.
+        interrupted: whether the user stopped it; the thresholds are what was known by then.
     """
 
     falsified: float | None
@@ -42,6 +43,7 @@ class Margin:
     simulations: int
     searches: tuple[tuple[float, bool], ...]
     complete: bool
+    interrupted: bool = False
 
     @property
     def text(self) -> str:
@@ -56,6 +58,10 @@ class Margin:
             found = f"not falsified in the whole range, not even at {self.unfalsified:.6g}"
         else:
             found = f"falsified at {self.falsified:.6g}, not falsified at {self.unfalsified:.6g}"
+        if self.interrupted:
+            ends = [] if self.falsified is None else [f"falsified at {self.falsified:.6g}"]
+            ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.6g}"]
+            return f"{', '.join(ends) or 'nothing is known yet'} ({effort}); stopped by the user"
         more = "" if self.complete else "; a larger budget narrows it"
         return f"{found} ({effort}){more}"
 
@@ -84,6 +90,9 @@ def margin(
         seed: seed of the engines.
         searched: called after each search with the threshold, whether it was falsified, and the number of
             simulations so far.
+
+    Returns:
+        The thresholds. Ctrl-C ends the searches early; then they are what was known by then.
 
     Raises:
         SpecError: if the formula, the range or a number is not valid, or the threshold changes nothing.
@@ -117,6 +126,8 @@ class _Bisection:
     budget: int
     seed: int
     searched: Searched
+    falsified: float | None = None
+    unfalsified: float | None = None
     history: list[Evaluation] = field(default_factory=list)
     searches: list[tuple[float, bool]] = field(default_factory=list)
 
@@ -133,25 +144,35 @@ class _Bisection:
 
     def run(self, easy: float, hard: float) -> Margin:
         """Search at both ends, then between the hardest falsified threshold and the easiest other one."""
+        try:
+            complete = self._bisected(easy, hard)
+        except KeyboardInterrupt:
+            return replace(self._ended(complete=False), interrupted=True)
+        return self._ended(complete=complete)
+
+    def _bisected(self, easy: float, hard: float) -> bool:
+        """Narrow what is known, as far as the budget goes; return whether it is close enough."""
         width = abs(hard - easy)
         steps = 2 + ceil(log2(1 / RESOLUTION))
         if self._falsified(hard, steps):
-            return self._ended(hard, None, complete=True)
-        falsified, unfalsified = self._confirmed(easy, hard), hard
-        if falsified is None:
+            self.falsified = hard
+            return True
+        self.unfalsified, self.falsified = hard, self._confirmed(easy, hard)
+        if self.falsified is None:
             if not self._falsified(easy, steps - 1):
-                return self._ended(None, easy, complete=True)
-            falsified = self._confirmed(easy, hard) or easy
-        while abs(unfalsified - falsified) > RESOLUTION * width and self._left > 0:
-            remaining = ceil(log2(abs(unfalsified - falsified) / (RESOLUTION * width)))
-            middle = (falsified + unfalsified) / 2
+                self.unfalsified = easy
+                return True
+            self.falsified = easy
+            self.falsified = self._confirmed(easy, hard) or easy
+        while abs(self.unfalsified - self.falsified) > RESOLUTION * width and self._left > 0:
+            remaining = ceil(log2(abs(self.unfalsified - self.falsified) / (RESOLUTION * width)))
+            middle = (self.falsified + self.unfalsified) / 2
             if self._falsified(middle, remaining):
-                falsified = self._confirmed(middle, unfalsified) or middle
+                self.falsified = middle
+                self.falsified = self._confirmed(middle, self.unfalsified) or middle
             else:
-                unfalsified = middle
-        return self._ended(
-            falsified, unfalsified, complete=abs(unfalsified - falsified) <= RESOLUTION * width
-        )
+                self.unfalsified = middle
+        return abs(self.unfalsified - self.falsified) <= RESOLUTION * width
 
     @property
     def _left(self) -> int:
@@ -201,8 +222,9 @@ class _Bisection:
         problem = at_threshold(self.problem, self.vary, found[0])
         return found[0] if confirm(problem, found[1]).outcome == "confirmed" else None
 
-    def _ended(self, falsified: float | None, unfalsified: float | None, *, complete: bool) -> Margin:
-        return Margin(falsified, unfalsified, len(self.history), tuple(self.searches), complete)
+    def _ended(self, *, complete: bool) -> Margin:
+        found = self.falsified, self.unfalsified
+        return Margin(*found, len(self.history), tuple(self.searches), complete)
 
 
 def _robustness(evaluation: Evaluation) -> float:

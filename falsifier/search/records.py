@@ -115,7 +115,7 @@ class FindingRecord(BaseModel):
 
     kind: FindingKind
     text: str
-    part: str = Field("", description="Part of the formula that it is about.")
+    part: str = Field("", description="Part of the formula, or input, that it is about.")
     margin: float | None = Field(None, allow_inf_nan=False, description="How far the part was from changing.")
     time: float | None = Field(None, description="When it came closest, in s.")
     simulation: int | None = Field(None, description="Index of the evaluation in which it came closest.")

@@ -1,5 +1,6 @@
 """Which parts of a requirement a whole search did not test, collected simulation by simulation."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 from falsifier.core.words import counted, listed
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
-from falsifier.search.findings import Finding
+from falsifier.search.effects import Effects
+from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.expression import Number
-from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Or, Predicate, Until
+from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Not, Or, Predicate, Until
 
 # A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
 _FAR = 3.0
@@ -43,7 +45,9 @@ class Vacuity:
         self._highs = np.full(len(self._parts), -np.inf)
         self._lowest: list[_Moment | None] = [None] * len(self._parts)
         self._highest: list[_Moment | None] = [None] * len(self._parts)
+        self._effects = Effects(problem)
         self._count = 0
+        self._aimed: Counter[str] = Counter()
         self._robustness: set[float] = set()
         self._first: dict[str, NDArray[np.float64]] = {}
         self._moved: set[str] = set()
@@ -54,6 +58,8 @@ class Vacuity:
         if verdict is None or trajectory is None:
             return
         self._count += 1
+        self._aimed[evaluation.candidate.aim] += 1
+        self._effects.see(evaluation.candidate, trajectory)
         if len(self._robustness) <= 1:
             self._robustness.add(verdict.robustness)
         for name in set(self._problem.requirement.formula.signals) - self._moved:
@@ -86,7 +92,9 @@ class Vacuity:
         # A requirement whose signals do not move at all has no predicate that could be nearer.
         far = [] if constant else [self._far(i) for i in self._of(Predicate) if self._is_far(i, said)]
         unique = {(finding.kind, finding.part): finding for finding in (*conditions, *disjuncts, *far)}
-        return (*constant, *unique.values())
+        # If nothing moves the requirement's signals, that has been said of everything that was searched.
+        idle = self._effects.findings() if self._moved else ()
+        return (*constant, *unique.values(), *idle)
 
     def _of(self, kind: type[Formula]) -> list[int]:
         """Return the watched parts that belong to formulas of this kind."""
@@ -137,54 +145,71 @@ class Vacuity:
         yield Finding(kind="constant", text=text, part=str(self._problem.requirement.formula), margin=value)
 
     def _condition(self, i: int) -> Finding:
-        watched, moment = self._parts[i], self._highest[i]
-        assert moment is not None
-        near = _reached(watched.part.formula, moment.values) or f"it was false by {-self._highs[i]:.6g}"
-        return Finding(
-            kind="condition",
-            text=(
-                f"The condition {watched.part.formula} never held {self._in_all()}, so "
-                f"{watched.formula} was not tested. It must hold at some time; at the closest, {near} "
-                f"{_when(moment)}."
-            ),
-            part=str(watched.part.formula),
-            margin=float(-self._highs[i]),
-            time=moment.time,
-            simulation=moment.simulation,
+        watched = self._parts[i]
+        return self._untested(
+            "condition",
+            i,
+            f"The condition {watched.part.formula} never held {self._in_all()}, so {watched.formula} was not "
+            "tested. It must hold at some time",
+            "it was false",
+            aim=watched.part.formula,
         )
 
     def _disjunct(self, i: int) -> Finding:
-        watched, moment = self._parts[i], self._lowest[i]
-        assert moment is not None
-        near = _reached(watched.part.formula, moment.values) or f"it held by {self._lows[i]:.6g}"
-        return Finding(
-            kind="disjunct",
-            text=(
-                f"{watched.part.formula} always held {self._in_all()}, so the other side "
-                f"of {watched.formula} was not tested. It must fail at some time; at the closest, {near} "
-                f"{_when(moment)}."
-            ),
-            part=str(watched.part.formula),
-            margin=float(self._lows[i]),
-            time=moment.time,
-            simulation=moment.simulation,
+        watched = self._parts[i]
+        return self._untested(
+            "disjunct",
+            i,
+            f"{watched.part.formula} always held {self._in_all()}, so the other side of {watched.formula} "
+            "was not tested. It must fail at some time",
+            "it held",
+            held=True,
+            aim=Not(watched.part.formula),
         )
 
     def _far(self, i: int) -> Finding:
-        watched = self._parts[i]
-        is_held = self._lows[i] > 0
-        moment = self._lowest[i] if is_held else self._highest[i]
-        assert moment is not None
-        margin = float(self._lows[i] if is_held else -self._highs[i])
-        near = _reached(watched.part.formula, moment.values) or f"it was off by {margin:.6g}"
+        held = bool(self._lows[i] > 0)
+        margin = self._lows[i] if held else -self._highs[i]
+        return self._untested(
+            "threshold",
+            i,
+            f"{self._parts[i].formula} was never near its threshold {self._in_all()}: it moved by "
+            f"{self._highs[i] - self._lows[i]:.6g} and stayed {margin:.6g} away",
+            "it was off",
+            held=held,
+        )
+
+    def _untested(
+        self,
+        kind: FindingKind,
+        i: int,
+        what: str,
+        off: str,
+        *,
+        held: bool = False,
+        aim: Formula | None = None,
+    ) -> Finding:
+        """Return the finding about a part: what was not tested, and how close the part came to changing.
+
+        Args:
+            kind: what it is about.
+            i: index of the part.
+            what: what was not tested, in words.
+            off: how its margin is said if its values are not telling.
+            held: whether it was always true; otherwise it never was.
+            aim: what a search that aims at the part makes true.
+        """
+        formula = self._parts[i].part.formula
+        moment = (self._lowest if held else self._highest)[i]
+        assert moment is not None, "a part is judged after it has been seen"
+        margin = float(self._lows[i] if held else -self._highs[i])
+        near = _reached(formula, moment.values) or f"{off} by {margin:.6g}"
+        aimed = self._aimed[str(aim)]
         return Finding(
-            kind="threshold",
-            text=(
-                f"{watched.formula} was never near its threshold {self._in_all()}: it moved by "
-                f"{self._highs[i] - self._lows[i]:.6g} and stayed {margin:.6g} away; at the closest, {near} "
-                f"{_when(moment)}."
-            ),
-            part=str(watched.formula),
+            kind=kind,
+            text=f"{what}; at the closest, {near} {_when(moment)}."
+            + (f" {counted(aimed, 'simulation')} aimed at it." if aimed else ""),
+            part=str(formula),
             margin=margin,
             time=moment.time,
             simulation=moment.simulation,

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
-from falsifier.search.events import Confirmed, Evaluated, Event, Exchanged, Listener, RunEnded, RunStarted
+from falsifier.search.events import (
+    Asked,
+    Confirmed,
+    Evaluated,
+    Event,
+    Exchanged,
+    Listener,
+    RunEnded,
+    RunStarted,
+)
 from falsifier.search.parameterization import parameterization_note
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
@@ -43,7 +52,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     progress = Progress(*columns, console=console, transient=True)
     with moving(progress):
         task = progress.add_task("starting", total=None, note="")
-        warn = FailureWarning()
+        warn, aims = FailureWarning(), AimNote()
 
         def show(event: Event) -> None:
             match event:
@@ -52,6 +61,9 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                     for line in _notes(event):
                         progress.console.print(line, highlight=False, markup=False)
                     progress.update(task, description=_title(event), total=total)
+                case Asked():
+                    for line in aims(event):
+                        progress.console.print(one_line(line), highlight=False, markup=False)
                 case Evaluated():
                     if warning := warn(event):
                         progress.console.print(warning, highlight=False, markup=False)
@@ -81,6 +93,7 @@ class PlainDisplay:
     def __init__(self, console: "Console") -> None:
         self._console = console
         self._warn = FailureWarning()
+        self._aims = AimNote()
 
     def __call__(self, event: Event) -> None:
         """Print a line if the event deserves one."""
@@ -92,6 +105,9 @@ class PlainDisplay:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
                 for line in _notes(event):
+                    self._line(line)
+            case Asked():
+                for line in self._aims(event):
                     self._line(line)
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 how = "timed out" if evaluation.status == "timeout" else evaluation.status
@@ -127,6 +143,19 @@ class FailureWarning:
             f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run counts as "
             "failed if more than half do"
         )
+
+
+class AimNote:
+    """Tells once of each condition that never held that the search now aims at it."""
+
+    def __init__(self) -> None:
+        self._told: set[str] = set()
+
+    def __call__(self, event: Asked) -> list[str]:
+        """Return the lines to print; none if there is nothing to tell."""
+        new = {c.aim: c for c in event.candidates if c.aim and c.aim not in self._told}
+        self._told |= new.keys()
+        return [f"{event.problem.name}: {c.rationale.partition(': ')[0]}" for c in new.values()]
 
 
 def note(event: Evaluated) -> str:

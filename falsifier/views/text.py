@@ -43,6 +43,8 @@ def result_text(result: Result) -> str:
             lines.append(f"  picture        {_picture(result)}")
         if _can_continue(result):
             lines.append(_continue_line(result.directory))
+        elif result.status == "not falsified" and result.best is not None:
+            lines.append(_closer_line(result.directory))
     return "\n".join(map(one_line, lines))
 
 
@@ -141,7 +143,10 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "upper_bound": found.bound,
         "interval": found.interval,
         "smallest": evaluation_json(found.smallest),
+        "tail": found.tail and asdict(found.tail),
         "estimate": found.splitting and asdict(found.splitting),
+        "optimum": found.optimum,
+        "interrupted": found.interrupted,
     }
 
 
@@ -149,6 +154,12 @@ def _can_continue(result: Result) -> bool:
     if not result.evaluations or result.spent.has_mostly_failed:
         return False
     return result.status in ("interrupted", "failed")
+
+
+def _closer_line(directory: Path) -> str:
+    place = shlex.quote(str(directory))
+    nearest = f"falsifier explain {place} (the nearest miss)"
+    return f"to look closer: {nearest}, falsifier coverage {place} (what was tried)"
 
 
 def _continue_line(directory: Path) -> str:

@@ -41,3 +41,13 @@ def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
     for wrong in (["--between", "100"], ["--between", "0:3", "--stl", "x <= 1"]):
         done = falsifier("margin", NEVER, "--vary", "G[0,10] (x <= {limit})", *wrong, cwd=tmp_path)
         assert done.code == 2 and ("--between 100" in done.err or "drop --stl" in done.err)
+
+
+def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path) -> None:
+    falsifier("run", NEVER, "--engine", "corners", "--budget", "5", "--out", "r", "--quiet", cwd=tmp_path)
+    done = falsifier("assess", "r", "--budget", "20", "--json", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert done.json["requirement"] == "NEVER" and done.json["drawn"] == 20
+    assert 0.99 < done.json["optimum"] < 1.01
+    refused = falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path)
+    assert refused.code == 2 and "drop stl" in refused.err

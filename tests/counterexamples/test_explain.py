@@ -82,3 +82,22 @@ def test_a_language_model_is_given_the_findings_and_its_words_are_returned() -> 
     ):
         assert part in f"{told}\n"
     assert len(told.splitlines()) < 50
+
+
+def test_of_a_near_miss_is_said_what_brings_it_near_and_what_keeps_it_away() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", inputs=2)
+    candidate = problem.space.decode([1.0] * 4 + [-0.5] * 4)
+    found = explain(problem, evaluate(problem, candidate))
+    assert not found.violated
+    assert "It is not violated here; " in found.text
+    assert "u brings it near: at rest (0 V) robustness would be +2." in found.text
+    assert "v keeps it away: at rest (0 V) robustness would be +1, nearer." in found.text
+    assert "counterexample" not in found.text
+
+
+def test_a_violation_that_explaining_meets_is_told() -> None:
+    bias = ParameterRange("bias", -1.0, 1.0, nominal=-1.0)
+    problem = lag_problem("G[0,10] (x >= -0.5)", parameters=[bias])
+    told = explain(problem, evaluate(problem, problem.space.decode([0.0, 0.0, 0.0, 0.0, 0.5]))).text
+    assert "With bias at its nominal value (-1) the requirement would be violated by 0.5" in told
+    assert "which is not confirmed yet" in told

@@ -7,7 +7,7 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
-from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
+from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink, shrink_miss
 from falsifier.counterexamples.simplicity import digits, simplicity
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import half_step
@@ -174,3 +174,28 @@ def test_f16_shrinks_its_idle_parameter_only() -> None:
     assert shrunk.minimal
     assert (found["roll"], found["pitch"]) == (roll.high, pitch.low)
     assert digits(found["yaw"]) == 1
+
+
+def test_a_near_miss_becomes_simple_and_stays_as_near() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    start = evaluate(problem, problem.space.decode([0.91, 0.97, 1.0, 0.99]))
+    assert start.robustness is not None
+    found = shrink_miss(problem, start)
+    assert found.minimal
+    assert found.evaluation.candidate.signals["u"].values == (1.0,) * 4
+    near = shrink_miss(problem, start, within=0.0)
+    assert near.evaluation.robustness is not None
+    assert near.evaluation.robustness <= start.robustness
+    assert near.least_margin == -start.robustness
+
+
+def test_a_near_miss_may_become_a_violation() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.99)")
+    start = evaluate(problem, problem.space.decode([0.95, 0.95, 0.95, 0.97]))
+    assert not start.violated
+    found = shrink_miss(problem, start)
+    assert found.evaluation.violated
+    with pytest.raises(SpecError, match="use shrink"):
+        shrink_miss(problem, found.evaluation)
+    with pytest.raises(SpecError, match="within"):
+        shrink_miss(problem, start, within=-1.0)

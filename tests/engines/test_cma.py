@@ -50,3 +50,12 @@ def test_a_single_coordinate_can_be_searched() -> None:
     engine = make_engine("cma", problem, seed=0)
     values = [c.signals["u"].values[0] for c in drive(engine, lambda c: evaluate(problem, c), rounds=40)]
     assert max(values) == pytest.approx(1.0, abs=0.1), "x is highest where u is"
+
+
+def test_it_is_told_of_others_candidates_after_a_generation_is_complete() -> None:
+    problem = box_problem()
+    engine, other = (make_engine("cma", problem, seed=s) for s in (0, 1))
+    own = [c for c in engine.ask(20) if c.rationale.startswith("generation 1 ")]
+    engine.tell([bowl(problem, c) for c in own])
+    engine.tell([bowl(problem, c) for c in other.ask(2)])
+    assert engine.ask()[0].rationale.startswith("generation 2 ")

@@ -63,3 +63,20 @@ def test_wrong_questions_are_refused(vary: str, between: tuple[float, float], sa
 def test_a_model_that_fails_is_an_error() -> None:
     with pytest.raises(SimulationError, match="out of order"):
         margin(lag_problem(response=never), "G[0,10] (x <= {limit})", (0, 1), engine="corners")
+
+
+def test_what_is_known_when_the_user_stops_is_the_answer() -> None:
+    searched: list[float] = []
+
+    def stop(threshold: float, falsified: bool, count: int) -> None:
+        searched.append(threshold)
+        if len(searched) == 3:
+            raise KeyboardInterrupt
+
+    found = margin(
+        lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60, searched=stop
+    )
+    assert found.interrupted and not found.complete
+    assert found.unfalsified is not None and found.falsified is not None
+    assert found.falsified < 1.0 < found.unfalsified
+    assert found.text.endswith("stopped by the user")

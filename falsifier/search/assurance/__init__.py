@@ -2,5 +2,6 @@
 
 from falsifier.search.assurance.assess import Assurance, assess
 from falsifier.search.assurance.splitting import Splitting
+from falsifier.search.assurance.tail import Tail
 
-__all__ = ["Assurance", "Splitting", "assess"]
+__all__ = ["Assurance", "Splitting", "Tail", "assess"]

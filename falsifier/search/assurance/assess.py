@@ -18,6 +18,7 @@ from falsifier.problem.problem import Problem, check_limits
 from falsifier.search.assurance.bounds import interval, upper_bound
 from falsifier.search.assurance.distribution import distribution_text
 from falsifier.search.assurance.splitting import Splitting, least_budget, split
+from falsifier.search.assurance.tail import Tail, tail
 
 Progress = Callable[[int], None]
 
@@ -36,7 +37,10 @@ class Assurance:
         bound: upper confidence bound on the probability of a violation, exact.
         interval: exact two-sided confidence interval of that probability; None without violations.
         smallest: the drawn evaluation with the smallest robustness, without its trajectory.
+        tail: estimate of the probability by extreme value theory; None if the draws do not allow one.
         splitting: estimate of the probability by splitting; None if it was not asked for.
+        optimum: smallest robustness that a search found; None if none was given.
+        interrupted: whether the user stopped it; everything refers to what was drawn by then.
     """
 
     problem: Problem
@@ -48,7 +52,10 @@ class Assurance:
     bound: float
     interval: tuple[float, float] | None
     smallest: Evaluation
+    tail: Tail | None
     splitting: Splitting | None
+    optimum: float | None = None
+    interrupted: bool = False
 
     @property
     def text(self) -> str:
@@ -65,10 +72,16 @@ class Assurance:
             lines.append(
                 f"{counted(self.failures, 'simulation')} failed; the bound counts them as violations."
             )
-        lines.append(f"The smallest robustness was {self.smallest.robustness:+.6g}.")
+        lines.append(f"The smallest robustness of these was {self.smallest.robustness:+.6g}.")
+        if self.optimum is not None:
+            lines.append(_optimum_text(self.optimum, _robustness(self.smallest)))
+        if self.tail is not None:
+            lines.append(_tail_text(self.tail, share))
         if self.splitting is not None:
             lines.append(_splitting_text(self.splitting, share))
         lines.append(f"Probability means a share of what was drawn: {self.distribution}.")
+        if self.interrupted:
+            lines.append("Stopped by the user: more simulations would give a lower bound.")
         return "\n".join(lines)
 
 
@@ -79,6 +92,7 @@ def assess(
     seed: int = 0,
     confidence: float = 0.95,
     splitting: int | None = None,
+    optimum: float | None = None,
     progress: Progress | None = None,
 ) -> Assurance:
     """Bound the probability of a violation by random simulations.
@@ -93,7 +107,12 @@ def assess(
         confidence: confidence of the bound and the intervals, between 0 and 1.
         splitting: how many simulations of the budget are for splitting; default: half, if that is enough for
             an estimate, otherwise none.
+        optimum: smallest robustness that a search of the same space found, to be stated beside the bound.
         progress: called with the number of simulations so far.
+
+    Returns:
+        What the draws say. Ctrl-C ends them early, and what was drawn by then counts; before the first
+        simulation with a verdict, KeyboardInterrupt is raised.
 
     Raises:
         SpecError: if a number is out of range, there is nothing to vary, or a range exceeds the model's
@@ -110,13 +129,21 @@ def assess(
     rest = _for_splitting(budget, splitting)
     count = _Counted(problem, progress or (lambda _: None))
     engine = Uniform(problem, seed=seed)
-    drawn = [count(engine.ask()[0]) for _ in range(budget - rest)]
+    drawn, interrupted = _drawn(count, engine, budget - rest)
     judged = [e for e in drawn if e.robustness is not None]
     if not judged:
+        if interrupted:
+            raise KeyboardInterrupt
         raise SimulationError(f"{problem.name}: every simulation failed; the last error: {drawn[-1].reason}")
     violations, failures = sum(e.violated for e in drawn), len(drawn) - len(judged)
     low, _ = interval(violations, len(drawn), confidence)
     _, high = interval(violations + failures, len(drawn), confidence)
+    divided: Splitting | None = None
+    if rest and not interrupted:
+        try:
+            divided = _split(problem, count, rest, seed=seed, confidence=confidence)
+        except KeyboardInterrupt:
+            interrupted = True
     return Assurance(
         problem=problem,
         distribution=distribution_text(problem.space),
@@ -127,8 +154,22 @@ def assess(
         bound=upper_bound(violations + failures, len(drawn), confidence),
         interval=(low, high) if violations else None,
         smallest=min(judged, key=_robustness),
-        splitting=_split(problem, count, rest, seed=seed, confidence=confidence) if rest else None,
+        tail=tail([_robustness(e) for e in judged], confidence=confidence, seed=seed),
+        splitting=divided,
+        optimum=optimum,
+        interrupted=interrupted,
     )
+
+
+def _drawn(count: "_Counted", engine: Uniform, wanted: int) -> tuple[list[Evaluation], bool]:
+    """Simulate random candidates; return their evaluations, and whether the user stopped that."""
+    drawn: list[Evaluation] = []
+    try:
+        while len(drawn) < wanted:
+            drawn.append(count(engine.ask()[0]))
+    except KeyboardInterrupt:
+        return drawn, True
+    return drawn, False
 
 
 @dataclass(slots=True)
@@ -171,6 +212,26 @@ def _split(problem: Problem, count: _Counted, budget: int, *, seed: int, confide
 
 def _robustness(evaluation: Evaluation) -> float:
     return inf if evaluation.robustness is None else evaluation.robustness
+
+
+def _optimum_text(optimum: float, smallest: float) -> str:
+    if optimum < 0:
+        return f"A search found a violation, with robustness {optimum:+.6g}."
+    nearer = "which came nearer" if optimum < smallest else "which came no nearer"
+    return f"A search, {nearer}, found {optimum:+.6g}."
+
+
+def _tail_text(found: Tail, share: str) -> str:
+    if found.is_poor:
+        return (
+            f"Extreme value theory gives no estimate: its distribution does not fit the {found.points} "
+            f"smallest values (p = {found.fit:.2g})."
+        )
+    effort = f"extreme value theory, the {found.points} smallest values; fit p = {found.fit:.2g}"
+    return (
+        f"Estimate, not a bound ({effort}): probability {found.probability:.2g}, {share} confidence interval "
+        f"{found.low:.2g} to {found.high:.2g}."
+    )
 
 
 def _splitting_text(found: Splitting, share: str) -> str:

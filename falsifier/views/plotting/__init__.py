@@ -7,6 +7,7 @@ needs a display.
 from typing import TYPE_CHECKING
 
 from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_iteration_times, plot_rates
+from falsifier.views.plotting.coverage import plot_coverage
 from falsifier.views.plotting.diagnosis import plot_diagnosis
 from falsifier.views.plotting.evaluation import (
     plot,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "plot",
     "plot_comparison",
+    "plot_coverage",
     "plot_diagnosis",
     "plot_evaluation",
     "plot_history",

@@ -1,4 +1,4 @@
-"""Figure of the neighbourhood of a counterexample."""
+"""Figure of the neighbourhood of a counterexample or a near miss."""
 
 from typing import TYPE_CHECKING
 
@@ -25,15 +25,23 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         _plot_map(right, found)
     else:
         _plot_line(right, found)
-    figure.suptitle(f"{caption(title)}: robustness around the counterexample".removeprefix(": "))
+    figure.suptitle(f"{caption(title)}: robustness around the {_centre(found)}".removeprefix(": "))
     return figure
+
+
+def _centre(found: RobustnessMap) -> str:
+    return "counterexample" if found.original < 0 else "nearest miss"
+
+
+def _colour(found: RobustnessMap) -> str:
+    return _VIOLATES if found.original < 0 else _HOLDS
 
 
 def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
     violates = found.robustness < 0
     for mask, color, label in ((violates, _VIOLATES, "violated"), (~violates, _HOLDS, "satisfied")):
         ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
-    ax.plot(0.0, found.original, "o", color=_VIOLATES, label="counterexample")
+    ax.plot(0.0, found.original, "o", color=_colour(found), label=_centre(found))
     ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
     ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
     ax.legend()
@@ -55,6 +63,6 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
 def _plot_line(ax: "Axes", found: RobustnessMap) -> None:
     coordinate = found.coordinates[found.axes[0]]
     ax.plot(found.grid[0], found.surface[0], color=_HOLDS, linewidth=1.2)
-    ax.plot(coordinate.value, found.original, "o", color=_VIOLATES)
+    ax.plot(coordinate.value, found.original, "o", color=_colour(found))
     ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
     ax.set(xlabel=caption(coordinate.label), ylabel="robustness")

@@ -63,4 +63,12 @@ def _case(label: str, run: Run) -> ElementTree.Element:
         ElementTree.SubElement(case, "error", message=plain(run.reason), type="failed")
     elif not run.finished:
         ElementTree.SubElement(case, "skipped", message=run.status)
+    if run.findings:
+        properties = ElementTree.Element("properties")
+        case.insert(0, properties)
+        for finding in run.findings:
+            name = plain(f"falsifier.{finding.kind}")
+            ElementTree.SubElement(properties, "property", name=name, value=plain(finding.text))
+        note = ElementTree.SubElement(case, "system-out")
+        note.text = plain("\n".join(f"what this does not show: {finding.text}" for finding in run.findings))
     return case

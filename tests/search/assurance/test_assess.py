@@ -38,7 +38,7 @@ def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
     for part in (
         "0 of 100 random simulations violate",
         "With 99 % confidence, the probability of a violation is at most 0.045",
-        "smallest robustness was +1.0",
+        "smallest robustness of these was +1.0",
         "bias uniform in [-1, 1]",
     ):
         assert part in found.text
@@ -79,3 +79,33 @@ def test_numbers_out_of_range_are_refused(options: dict[str, float], said: str) 
 def test_a_problem_with_nothing_to_vary_is_refused() -> None:
     with pytest.raises(SpecError, match="nothing to vary"):
         assess(lag_problem(inputs=0), budget=5)
+
+
+def test_what_was_drawn_when_the_user_stopped_counts() -> None:
+    def stop(count: int) -> None:
+        if count == 7:
+            raise KeyboardInterrupt
+
+    found = assess(system(5.0), budget=50, progress=stop)
+    # The simulation that was just counted is lost; nothing else is.
+    assert (found.drawn, found.interrupted) == (6, True)
+    assert found.bound == upper_bound(0, 6, 0.95)
+    assert "Stopped by the user" in found.text
+    with pytest.raises(KeyboardInterrupt):
+        assess(system(5.0), budget=50, progress=lambda count: stop(7))
+
+
+def test_what_a_search_found_is_stated_beside_the_bound() -> None:
+    found = assess(system(5.0), budget=10, optimum=0.25)
+    assert "A search, which came nearer, found +0.25." in found.text
+    assert (
+        "A search found a violation, with robustness -0.5."
+        in assess(system(5.0), budget=5, optimum=-0.5).text
+    )
+
+
+def test_a_tail_is_estimated_from_enough_draws() -> None:
+    assert assess(system(5.0), budget=20).tail is None
+    found = assess(system(1.001), budget=200)
+    assert found.tail is not None and found.tail.points == 20
+    assert "xtreme value theory" in found.text

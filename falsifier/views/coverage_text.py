@@ -1,0 +1,162 @@
+"""What a run has tried, as a table for terminals or as JSON."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from falsifier.core.literals import one_line
+from falsifier.core.words import counted, listed
+from falsifier.search.coverage import (
+    FAST,
+    PACES,
+    SLOW,
+    Coverage,
+    ModeCoverage,
+    PairCoverage,
+    RangeCoverage,
+)
+
+# Lists are cut after this many entries; JSON has all.
+_SHOWN = 8
+
+
+def coverage_text(found: Coverage, name: str) -> str:
+    """Format coverage as tables: what was searched, what of it was not tried, what the system did.
+
+    Args:
+        found: what was tried.
+        name: of the requirement or the run.
+    """
+    failed = f", and {counted(found.failures, 'failed one')}" if found.failures else ""
+    lines = [f"{name}: what {counted(found.simulations, 'simulation')} tried{failed}"]
+    if found.ranges:
+        header = ("searched", "range", "tried", "parts tried", "changes")
+        lines += _aligned([header, *map(_range_row, found.ranges)])
+        lines += _legend(found)
+    gaps = [*_gap_rows(found), *_pair_rows(found.pairs)]
+    if gaps and found.simulations:
+        lines += ["never tried", *_aligned(gaps)]
+    if found.outputs:
+        lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
+        lines += _aligned(
+            [
+                (_named(o.name, o.unit), f"{o.low:.6g} to {o.high:.6g}")
+                for o in sorted(found.outputs, key=lambda o: o.name)
+            ]
+        )
+    if found.modes:
+        lines += ["modes", *_aligned([_mode_row(m) for m in found.modes])]
+    return "\n".join(map(one_line, lines))
+
+
+def coverage_json(found: Coverage) -> dict[str, Any]:
+    """Convert coverage to a value that can be dumped as one JSON object."""
+    return {
+        "simulations": found.simulations,
+        "failures": found.failures,
+        "trajectories": found.trajectories,
+        "searched": [
+            {
+                "name": r.searched.name,
+                "unit": r.searched.unit,
+                "range": [r.searched.low, r.searched.high],
+                "tried": None if r.low is None else [r.low, r.high],
+                "parts": r.parts.tolist(),
+                "gaps": [list(gap) for gap in r.gaps],
+                "changes": dict(r.paces),
+                "fastest": r.rate,
+                "shortest_between_changes": r.apart,
+            }
+            for r in found.ranges
+        ],
+        "pairs": [
+            {"names": [p.first, p.second], "combinations": p.tried.size, "tried": p.count}
+            for p in found.pairs
+        ],
+        "outputs": [{"name": o.name, "unit": o.unit, "reached": [o.low, o.high]} for o in found.outputs],
+        "modes": [
+            {
+                "name": m.name,
+                "seen": [_label(m, value) for value in sorted(m.seen)],
+                "never": [_label(m, value) for value in m.unseen],
+                "changes": [[_label(m, a), _label(m, b)] for a, b in sorted(m.changes)],
+            }
+            for m in found.modes
+        ],
+    }
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+        yield f"  {'  '.join(cells)}".rstrip()
+
+
+def _range_row(r: RangeCoverage) -> tuple[str, ...]:
+    tried = "nothing" if r.low is None else f"{r.low:.6g} to {r.high:.6g}"
+    return (
+        _named(r.searched.name, r.searched.unit),
+        f"{r.searched.low:.6g} to {r.searched.high:.6g}",
+        tried,
+        f"{r.tried} of {len(r.parts)}",
+        _changes(r) if r.paces else "parameter",
+    )
+
+
+def _changes(r: RangeCoverage) -> str:
+    kinds = ", ".join(f"{pace} in {r.paces[pace]}" for pace in PACES if r.paces[pace])
+    fastest = [f"{r.rate:.4g} per s at most"] if r.rate else []
+    fastest += [f"{r.apart:.4g} s apart at least"] if r.apart is not None else []
+    return "; ".join([kinds, *fastest])
+
+
+def _legend(found: Coverage) -> Iterator[str]:
+    yield "  A part is a tenth of the range, or one of a few whole numbers."
+    if any(r.paces for r in found.ranges):
+        yield (
+            "  Changes of an input in a simulation, by its fastest; slow: the range takes "
+            f"{SLOW * found.stop_time:.4g} s or more; fast: {FAST * found.stop_time:.4g} s or less."
+        )
+
+
+def _gap_rows(found: Coverage) -> Iterator[tuple[str, str]]:
+    for r in found.ranges:
+        if r.gaps:
+            gaps = [f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}" for low, high in r.gaps]
+            yield r.searched.name, f"values {listed(gaps)}"
+        missing = [pace for pace in PACES if r.paces and not r.paces[pace]]
+        if missing:
+            yield r.searched.name, f"changes: {listed(missing)}"
+
+
+def _pair_rows(pairs: Iterable[PairCoverage]) -> Iterator[tuple[str, str]]:
+    partly = [p for p in pairs if p.count < p.tried.size]
+    for p in partly[:_SHOWN]:
+        missing = p.tried.size - p.count
+        yield f"{p.first} with {p.second}", f"{missing} of {p.tried.size} combinations at the same time"
+    if len(partly) > _SHOWN:
+        yield "", f"and some combinations of {counted(len(partly) - _SHOWN, 'more pair')}; --json has all"
+
+
+def _mode_row(mode: ModeCoverage) -> tuple[str, str]:
+    text = _cut([_label(mode, value) for value in sorted(mode.seen)]) or "nothing recorded"
+    if mode.changes:
+        changes = [f"{_label(mode, a)} to {_label(mode, b)}" for a, b in sorted(mode.changes)]
+        text += f"; changes {_cut(changes)}"
+    elif mode.seen:
+        text += "; no changes"
+    never = [_label(mode, value) for value in mode.unseen]
+    return mode.name, text + (f"; never {_cut(never)}" if never else "")
+
+
+def _cut(entries: Sequence[str]) -> str:
+    more = [f"{len(entries) - _SHOWN} more"] if len(entries) > _SHOWN else []
+    return ", ".join([*entries[:_SHOWN], *more])
+
+
+def _label(mode: ModeCoverage, value: int) -> str:
+    return mode.labels.get(value, str(value))
+
+
+def _named(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit not in ("", "1") else name

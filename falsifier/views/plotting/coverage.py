@@ -1,0 +1,114 @@
+"""Figure of what a run has tried: values over time, combinations, and what outputs reached."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.words import counted
+from falsifier.search.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
+from falsifier.views.plotting.axes import caption
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# What was never tried is red, as gaps must strike the eye; the more simulations, the darker the blue.
+_NEVER, _OUTPUT, _TRIED = "#f2b8b0", "#1f5fa8", "#9dbbe0"
+# A figure has at most this many panels of each kind: inputs, parameters, pairs, outputs.
+_PANELS = 8
+_COLUMNS = 4
+
+
+def plot_coverage(found: Coverage, title: str = "") -> "Figure":
+    """Plot what was tried of inputs over time, of parameters and of pairs, and the band of each output.
+
+    Of each kind, the first eight are drawn; the pairs are the least tried ones.
+
+    Args:
+        found: what was tried.
+        title: title of the figure.
+    """
+    from matplotlib.figure import Figure
+
+    drawn = _panels(found)
+    columns = min(_COLUMNS, max(1, len(drawn)))
+    rows = max(1, -(-len(drawn) // columns))
+    figure = Figure(figsize=(3.4 * columns + 0.6, 2.7 * rows + 0.5), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, draw in zip(axes, drawn, strict=False):
+        draw(ax)
+    for ax in axes[len(drawn) :]:
+        ax.set_axis_off()
+    tried = counted(found.simulations, "simulation")
+    figure.suptitle(f"{caption(title)}: what {tried} tried (red: never)".removeprefix(": "), fontsize=11)
+    return figure
+
+
+def _panels(found: Coverage) -> "list[Callable[[Axes], None]]":
+    by_name = {r.searched.name: r for r in found.ranges}
+    inputs = [r for r in found.ranges if r.times is not None]
+    parameters = [r for r in found.ranges if r.times is None]
+    return [
+        *(partial(_plot_input, r=r, stop_time=found.stop_time) for r in inputs[:_PANELS]),
+        *(partial(_plot_parameter, r=r) for r in parameters[:_PANELS]),
+        *(partial(_plot_pair, p=p, by_name=by_name) for p in found.pairs[:_PANELS]),
+        *(partial(_plot_output, o=o) for o in found.outputs[:_PANELS]),
+    ]
+
+
+def _plot_input(ax: "Axes", r: RangeCoverage, stop_time: float) -> None:
+    assert r.times is not None
+    _heat(ax, np.linspace(0.0, stop_time, len(r.times) + 1), _ends(r), r.times.T)
+    ax.set(xlabel="time [s]", ylabel=_label(r), title="simulations by value and time")
+    ax.title.set_fontsize(9)
+
+
+def _plot_parameter(ax: "Axes", r: RangeCoverage) -> None:
+    ends = _ends(r)
+    for low, high, count in zip(ends, ends[1:], r.parts, strict=False):
+        if count:
+            ax.bar((low + high) / 2, count, width=high - low, color=_TRIED, edgecolor="white")
+        else:
+            ax.axvspan(low, high, color=_NEVER, linewidth=0)
+    ax.set(xlabel=_label(r), ylabel="simulations", xlim=(ends[0], ends[-1]))
+
+
+def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -> None:
+    first, second = by_name[p.first], by_name[p.second]
+    _heat(ax, _ends(first), _ends(second), p.tried.T.astype(np.intp))
+    ax.set(xlabel=_label(first), ylabel=_label(second))
+    ax.set_title(f"{p.count} of {p.tried.size} combinations", fontsize=9)
+
+
+def _plot_output(ax: "Axes", o: OutputCoverage) -> None:
+    ax.fill_between(o.times, o.lows, o.highs, color=_TRIED, linewidth=0)
+    for line in (o.lows, o.highs):
+        ax.plot(o.times, line, color=_OUTPUT, linewidth=0.8)
+    ax.set(xlabel="time [s]", ylabel=caption(f"{o.name} [{o.unit}]" if o.unit else o.name))
+    ax.set_title("smallest and largest value", fontsize=9)
+
+
+def _heat(ax: "Axes", xs: NDArray[np.float64], ys: NDArray[np.float64], counts: NDArray[np.intp]) -> None:
+    """Draw counts by cell: never tried red, otherwise a blue that darkens with the count."""
+    from matplotlib import colormaps
+
+    colours = colormaps["Blues"].with_extremes(under=_NEVER)
+    # From below 0: a single simulation must be told from the white of the paper.
+    largest = max(1.0, float(counts.max(initial=0)))
+    shown = np.where(counts > 0, counts / largest + 0.3, -1.0)
+    ax.pcolormesh(xs, ys, shown, cmap=colours, vmin=0.0, vmax=1.3, edgecolors="white", linewidth=0.3)
+
+
+def _ends(r: RangeCoverage) -> NDArray[np.float64]:
+    """Return the ends of the parts, shape (parts + 1,); whole numbers stand in the middle of theirs."""
+    edges = np.array(r.edges)
+    if len(edges) == 1 or edges[0, 0] == edges[0, 1]:
+        return np.array([*(edges[:, 0] - 0.5), edges[-1, 1] + 0.5])
+    return np.array([*edges[:, 0], edges[-1, 1]])
+
+
+def _label(r: RangeCoverage) -> str:
+    return caption(f"{r.searched.name} [{r.searched.unit}]" if r.searched.unit else r.searched.name)

@@ -1,0 +1,57 @@
+from pathlib import Path
+
+import pytest
+
+from falsifier import falsify
+from falsifier.counterexamples.nearest_miss import NearestMiss, asked_about, nearest_miss
+from falsifier.errors import JournalError, SpecError
+from falsifier.testing import lag_problem
+from tests.problems import easy, hard, impossible
+
+
+def test_the_nearest_miss_has_the_smallest_robustness_of_the_run(tmp_path: Path) -> None:
+    result = falsify(impossible(), "corners", budget=5, directory=tmp_path)
+    found = nearest_miss(tmp_path)
+    assert result.best is not None
+    assert found.candidate.key == result.best.candidate.key
+    assert (found.robustness, found.simulations) == (result.best.robustness, 5)
+    problem = impossible()
+    assert found.simulated(problem).robustness == result.best.robustness
+    assert found.beside("a.png") == tmp_path / "a.png"
+
+
+def test_a_run_with_a_counterexample_is_asked_about_that(tmp_path: Path) -> None:
+    falsify(easy(), "corners", budget=5, directory=tmp_path)
+    found = asked_about(tmp_path)
+    assert not isinstance(found, NearestMiss)
+    assert found[1].robustness < 0
+    assert asked_about(found[0]) == found
+
+
+def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:
+    problems = [hard(), impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")]
+    falsify(problems, "corners", budget=5, directory=tmp_path)
+    # The only counterexample needs no name.
+    assert not isinstance(asked_about(tmp_path), NearestMiss)
+    found = asked_about(tmp_path, "FAR")
+    assert isinstance(found, NearestMiss)
+    assert found.requirement == "FAR"
+    assert found.beside("a.png").name == "a-FAR.png"
+    with pytest.raises(JournalError, match="this run searched HARD, NEVER, FAR, not OTHER"):
+        asked_about(tmp_path, "OTHER")
+    with pytest.raises(SpecError, match="this is none"):
+        asked_about(tmp_path / "counterexample-HARD.json", "FAR")
+
+
+def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) -> None:
+    falsify(
+        [impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")], "corners", budget=2, directory=tmp_path
+    )
+    with pytest.raises(SpecError, match="searched NEVER, FAR; choose one with --requirement NAME"):
+        asked_about(tmp_path)
+
+
+def test_a_system_that_violates_now_is_said_to_have_changed(tmp_path: Path) -> None:
+    falsify(impossible(), "corners", budget=2, directory=tmp_path)
+    with pytest.raises(SpecError, match="now violates"):
+        nearest_miss(tmp_path).simulated(lag_problem("G[0,10] (x <= 0.1)", name="NEVER"))
