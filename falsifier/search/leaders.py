@@ -46,7 +46,7 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
 
 
 def _numerical(name: str, problem: Problem, seed: int) -> Engine:
-    """Make an engine without a language model; if it uses robustness, it also aims at conditions that never hold."""
+    """Make an engine without a language model; one that uses robustness also aims at unmet conditions."""
     engine = make_engine(name, problem, seed=seed)
     if not ENGINES[name].uses_robustness or not can_aim(problem):
         return engine

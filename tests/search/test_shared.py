@@ -102,7 +102,8 @@ def test_reports_have_each(directory: Path, runs: dict[str, Run]) -> None:
     for name, run in runs.items():
         part = page.partition(f'id="requirement-{name}"')[2].partition("</section>")[0]
         assert run.manifest.requirement.formula.replace("<", "&lt;") in part
-        assert f"counterexample at simulation {run.simulations}," in part or not run.falsified
+        violated = f"{run.simulations}" if run.falsified else "–"
+        assert f"<td>{violated}</td></tr>" in part, "as the number of the simulation that violated it"
         assert run.verdict is not None
         assert f"robustness {run.verdict.robustness:+.6g}" in part
     markdown = markdown_report(directory)
