@@ -38,6 +38,7 @@ _PARTS: Mapping[Part, str] = {
     "freedom": "control points and interpolation may be chosen, if the spec allows it",
     "observations": "per sample: course of all signals, what decided, robustness of the parts of the formula",
     "selection": "the best and the most different samples beside the most recent ones",
+    "circumstances": "the budget and what is left of it, the outputs at time 0",
     "failures": "samples that could not be simulated, with the reason",
 }
 

@@ -18,6 +18,7 @@ from falsifier.cli.options import (
 )
 from falsifier.cli.output import say
 from falsifier.core.words import counted
+from falsifier.errors import JournalError
 from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
@@ -29,13 +30,19 @@ if TYPE_CHECKING:
 @variant_option()
 @anonymous_option
 @click.option(
-    "--run",
+    "--after",
     "directory",
     type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Run whose samples the prompt contains; default: none, as at the start of a run.",
+    metavar="RUN",
+    help="Run whose samples the prompt contains, whichever engine made them; default: none.",
 )
-@click.option("--samples", type=int, help="With --run: use only its first samples.")
+@click.option("--samples", type=click.IntRange(min=0), help="With --after: use only its first samples.")
+@click.option(
+    "--at",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="TARGET is a run directory: print what was sent when sample N was asked for, and the reply.",
+)
 @click.option(  # only these two engines write prompts
     "--engine",
     type=click.Choice(["llm", "hybrid"]),
@@ -50,27 +57,70 @@ def prompt(
     anonymous: bool,
     directory: Path | None,
     samples: int | None,
+    at: int | None,
     engine: str,
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Print exactly what would be sent to a language model next, without sending it."""
+    """Print exactly what would be sent to a language model next, without sending it.
+
+    With --at, print what a run sent.
+    """
     from falsifier.engines.hybrid import Settings as HybridSettings
     from falsifier.engines.llm import preview, preview_tool
     from falsifier.search.journal import read_journal, recorded_evaluations
+    from falsifier.search.questions import doubtful_confirmations
 
+    if at is not None:
+        say(_sent(Path(options["target"]), at, as_json=as_json))
+        return
     if samples is not None and directory is None:
-        raise click.UsageError("--samples requires --run DIR")
+        raise click.UsageError("--samples requires --after RUN")
     problem = load_source(problem_source(options))
-    evaluations = recorded_evaluations(directory, read_journal(directory)) if directory else {}
+    records = read_journal(directory) if directory else []
+    evaluations = recorded_evaluations(directory, records) if directory else {}
     told = list(evaluations.values())[:samples]
     settings = HybridSettings()
     count = 1 if engine == "llm" else settings.count if told else settings.opening
-    messages = preview(problem, variant=variant, evaluations=told, count=count, anonymous=anonymous)
+    messages = preview(
+        problem,
+        variant=variant,
+        evaluations=told,
+        count=count,
+        anonymous=anonymous,
+        simulations=_limit(directory),
+        doubtful=doubtful_confirmations(problem, records, evaluations),
+    )
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
         tools = (preview_tool(problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous),)
     say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
+
+
+def _limit(directory: Path | None) -> int | None:
+    """Maximum number of simulations of a run, or of one with the usual budget."""
+    from falsifier.search import manifest
+    from falsifier.search.budget import DEFAULT_SIMULATIONS
+
+    return manifest.read(directory).request.budget.simulations if directory else DEFAULT_SIMULATIONS
+
+
+def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
+    """The last question that was asked before a sample of a run was simulated, and its reply."""
+    from falsifier.search.journal import read_journal
+    from falsifier.search.questions import exchange_before
+
+    exchange = exchange_before(read_journal(directory), sample - 1)
+    if exchange is None:
+        raise JournalError(f"{directory}: no language model was asked before sample {sample}")
+    if as_json:
+        return exchange.model_dump_json(indent=2)
+    parts = [f"--- {message.role} ---\n{message.content}" for message in exchange.messages]
+    answer = "(none)" if exchange.reply is None else exchange.reply.text
+    parts.append(f"--- reply of {exchange.llm} ---\n{answer}")
+    if exchange.problem:
+        parts.append(f"--- rejected ---\n{exchange.problem}")
+    return "\n\n".join(parts)
 
 
 def _as_json(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
@@ -91,7 +141,20 @@ def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
         f"arguments: {json.dumps(tool.parameters)}"
         for tool in tools
     ]
+    parts.append(f"--- size ---\n{_size(messages)}")
     return "\n\n".join(parts)
+
+
+def _size(messages: Sequence["Message"]) -> str:
+    """Tokens, and how many of them a provider can keep from question to question."""
+    from falsifier.llm.tokens import count_tokens
+
+    constant, changing = (sum(count_tokens(m.content) for m in part) for part in (messages[:1], messages[1:]))
+    total = constant + changing
+    return (
+        f"{counted(total, 'token')}; the first {constant} of them ({constant / total:.0%}) are the same in "
+        "every question of a run"
+    )
 
 
 @click.group()

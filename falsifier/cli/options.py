@@ -178,6 +178,12 @@ def asking_options(command: Function) -> Function:
             metavar="SENT:RECEIVED",
             help="US dollars per 1000 tokens sent and received, if the price is not known.",
         ),
+        click.option(
+            "--timeout",
+            type=click.FloatRange(min=0, min_open=True),
+            metavar="SECONDS",
+            help="Maximum time to wait for a reply of the language model; default: 600.",
+        ),
         anonymous_option,
         click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
         click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
@@ -206,7 +212,7 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
     Raises:
         click.UsageError: if a value is invalid, or one is given although no language model is named.
     """
-    given = {key: options.pop(key) for key in ("api_base", "fallback", "anonymous")}
+    given = {key: options.pop(key) for key in ("api_base", "timeout", "fallback", "anonymous")}
     price, pairs = options.pop("price"), options.pop("llm_options")
     cache = not options.pop("no_cache")
     if not named:

@@ -8,6 +8,7 @@ not improve the result, the surrogate continues alone, with changes near the cri
 does not improve the result or its predictions fail, the LLM is asked again and told why.
 """
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -15,14 +16,18 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines.adviser import Adviser
+from falsifier.engines.protocol import FollowsRun
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.conversation import OnExchange
+from falsifier.llm.conversation import NoValidReplyError, OnExchange
 from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
+
+_LOG = logging.getLogger(__name__)
 
 # The LLM's first candidates replace the constant extremes; one switching or stepping input is still
 # informative.
@@ -95,11 +100,22 @@ class Hybrid:
         """Connect the adviser, which has the chat, to a run."""
         self.adviser.attach(on_exchange, wrap)
 
+    def begin(self, simulations: int | None) -> None:
+        """Tell the adviser the maximum number of simulations."""
+        if isinstance(self.adviser, FollowsRun):
+            self.adviser.begin(simulations)
+
+    def doubt(self, confirmation: Confirmation) -> None:
+        """Tell the adviser that a violation does not count."""
+        if isinstance(self.adviser, FollowsRun):
+            self.adviser.doubt(confirmation)
+
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates of the LLM or the surrogate, whichever has its turn.
 
         Raises:
-            ChatError: if the first question is not answered; later the surrogate continues without the LLM.
+            ChatError: if the LLM cannot be reached for the first question; later, and if its replies are not
+                valid, the surrogate continues without it.
         """
         return [self._ask_one() for _ in range(max(n, 1))]
 
@@ -117,8 +133,11 @@ class Hybrid:
     def _ask_one(self) -> Candidate:
         if not self._is_opened:
             self._is_opened = True
-            opening = self.adviser.propose(self.settings.opening).candidates
-            self._turn = _Turn(opening[: self.settings.opening], self._best)
+            try:
+                opening = self.adviser.propose(self.settings.opening).candidates
+                self._turn = _Turn(opening[: self.settings.opening], self._best)
+            except NoValidReplyError as error:
+                _LOG.warning("%s. Continuing with the surrogate.", error)
         elif self._turn is None and (reason := self._reason_to_ask()):
             self._consult(reason)
         if self._turn is not None:
@@ -137,14 +156,14 @@ class Hybrid:
             return ""
         if self.surrogate.misses >= self.settings.misses:
             return (
-                f"A numerical model of the dynamics predicted a violation {self.surrogate.misses} times in a "
-                "row and was wrong each time: do not rely on small changes of the best sample, try another "
-                "structure."
+                "A numerical optimiser shares this search and fits a model to the samples above. It "
+                f"predicted a violation {self.surrogate.misses} times in a row and was wrong each time: do "
+                "not rely on small changes of the best sample, try another structure."
             )
         return (
-            f"The last {self._since_best} simulations, most of them by a numerical optimiser, brought no new "
-            "best: suggest other structures (which parts of the time low, high or switching); numbers are "
-            "tuned later."
+            f"The last {self._since_best} simulations, most of them chosen by a numerical optimiser that "
+            "shares this search, brought no new best: suggest other structures (which parts of the time low, "
+            "high or switching); numbers are tuned later."
         )
 
     def _consult(self, reason: str) -> None:
@@ -207,15 +226,18 @@ class Hybrid:
         self._numeric = self._numeric or self.surrogate.ask(1)[0]
         predictions = self._trusted_predictions([self._numeric])
         if predictions is None:
-            return ["The numerical model's recent predictions were poor; rely on the trajectories only."]
+            return ["The optimiser's recent predictions were poor; rely on the samples only."]
         told = self.adviser.describe(self._numeric)
-        return [f"The numerical model expects robustness {predictions[0]:.4g} of its own best input: {told}."]
+        return [
+            f"The optimiser would simulate this next, if you propose nothing better: {told}. The model that "
+            f"it fits to the samples predicts robustness {predictions[0]:.4g}; predictions can be wrong."
+        ]
 
     def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
         """Return the predictions of the LLM's candidates, one line each, in words for the LLM."""
         lines = [
-            f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; its predicted robustness is "
-            f"{p:.4g}."
+            f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; the optimiser's model of "
+            f"the samples predicts robustness {p:.4g}."
             for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
         ]
         return [*lines, "None is predicted to violate the requirement: revise them, or insist with a reason."]

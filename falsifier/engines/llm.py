@@ -1,15 +1,20 @@
 """A language model as a search engine."""
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import in_one_line
 from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
+from falsifier.engines.random_change import random_change
 from falsifier.errors import ChatError
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.initial import start_values
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, Tool
@@ -23,16 +28,21 @@ from falsifier.llm.prompts import (
     trimmed,
     variant_named,
 )
+from falsifier.llm.prompts.context import Context, in_doubt
 from falsifier.llm.prompts.what_if import what_if_tool
 from falsifier.llm.replies import ReplyForm
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.problem.problem import Problem
 
 T = TypeVar("T")
+StartValues = Mapping[str, tuple[float, float]]
 
 # Number of latest and best evaluations whose trajectories are kept in memory; prompts show few older samples.
 _KEPT_RECENT = 40
 _KEPT_BEST = 10
+# Questions in a row without a valid answer after which an LLM is not worth its money.
+_MOST_WITHOUT_ANSWER = 3
+_LOG = logging.getLogger(__name__)
 
 
 class LLMEngine:
@@ -48,6 +58,8 @@ class LLMEngine:
         anonymous: whether the LLM gets neutral names instead of real ones.
         fallback: engine to switch to if the LLM cannot be reached or gives no valid reply; None: the error
             ends the run.
+        start: called once, before the first question, for the smallest and largest value of each output at
+            time 0; only if the variant tells them.
     """
 
     def __init__(
@@ -61,6 +73,7 @@ class LLMEngine:
         prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
         anonymous: bool = False,
         fallback: Engine | None = None,
+        start: Callable[[], StartValues] = dict,
     ) -> None:
         self._disguise = Disguise.of(view) if anonymous else None
         self._view = self._disguise.view if self._disguise else view
@@ -73,6 +86,11 @@ class LLMEngine:
         self._handed_over = False
         self._evaluations: list[Evaluation] = []
         self._pending: list[Candidate] = []
+        self._start = start
+        self._context: Context | None = None
+        self._simulations: int | None = None
+        self._doubts: dict[Hashable, str] = {}
+        self._without_answer = 0
 
     @property
     def name(self) -> str:
@@ -84,6 +102,17 @@ class LLMEngine:
         self._on_exchange = on_exchange
         self._chat = wrap(self._chat)
 
+    def begin(self, simulations: int | None) -> None:
+        """Be told the maximum number of simulations of the run, which prompts state."""
+        self._simulations = simulations
+
+    def doubt(self, confirmation: Confirmation) -> None:
+        """Be told that a violation does not count, which prompts state with the reason."""
+        shown = confirmation.candidate
+        if self._disguise:
+            shown = self._disguise.hidden_candidate(shown)
+        self._doubts[shown.key] = in_doubt(confirmation)
+
     @property
     def handed_over(self) -> bool:
         """Whether the engine has permanently switched to the fallback."""
@@ -93,7 +122,8 @@ class LLMEngine:
         """Return n new candidates.
 
         Raises:
-            ChatError: if the LLM cannot be reached or gives no valid reply, and there is no fallback.
+            ChatError: if there is no fallback, and the LLM cannot be reached or gave no valid reply to
+                several questions in a row; after a single one a random change of the best sample is returned.
         """
         candidates: list[Candidate] = []
         while len(candidates) < n:
@@ -101,6 +131,9 @@ class LLMEngine:
                 return candidates + self._fallback.ask(n - len(candidates))
             try:
                 found = self._ask_once(n - len(candidates), dispensable=self._fallback is not None)
+                self._without_answer = 0
+            except NoValidReplyError as error:
+                found = self._replaced(error)
             except ChatError:
                 if self._fallback is None:
                     raise
@@ -109,6 +142,27 @@ class LLMEngine:
             self._pending += found
             candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
         return candidates
+
+    def _replaced(self, error: NoValidReplyError) -> list[Candidate]:
+        """Return what is simulated in place of an answer; nothing if the fallback takes over.
+
+        Raises:
+            NoValidReplyError: if several questions in a row had no valid answer.
+        """
+        self._without_answer += 1
+        if self._fallback is not None:
+            self._handed_over = True
+            return []
+        if self._without_answer >= _MOST_WITHOUT_ANSWER:
+            raise error
+        judged = [e for e in self._evaluations if e.robustness is not None]
+        best = min(judged, key=lambda e: e.robustness or 0.0).candidate if judged else None
+        seed = (self._sample, len(self._evaluations), len(self._pending))
+        what = "a random change of the best sample" if best else "a random sample"
+        _LOG.warning("%s. Continuing with %s.", error, what)
+        changed = random_change(self._view.space, best, seed=seed)
+        rationale = f"{what}, because {self._chat.llm} gave no valid reply"
+        return [replace(changed, origin="random change", rationale=rationale)]
 
     def propose(
         self,
@@ -166,10 +220,16 @@ class LLMEngine:
         variant = self._variant
         form = _form(self._view, variant, count=count)
         prompt = build_prompt(
-            self._view, variant, self._evaluations, pending=self._pending, notes=notes, count=count
+            self._view,
+            variant,
+            self._evaluations,
+            pending=self._pending,
+            notes=notes,
+            count=count,
+            context=self._circumstances(),
         )
         request = ChatRequest(
-            messages=render(trimmed(prompt, self._prompt_tokens)),
+            messages=render(trimmed(prompt, self._prompt_tokens, self._chat.llm)),
             reply_schema=form.schema(),
             tools=() if tool is None else (tool.offer,),
             sample=self._sample,
@@ -188,6 +248,12 @@ class LLMEngine:
             if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
                 self._on_exchange(_unanswered(self._chat, request, error))
             raise
+
+    def _circumstances(self) -> Context:
+        if self._context is None:
+            start = self._start() if self._variant.has("circumstances") else {}
+            self._context = Context(start=self._disguise.hidden_values(start) if self._disguise else start)
+        return replace(self._context, simulations=self._simulations, doubts=self._doubts)
 
     def _new(self, candidates: list[Candidate]) -> list[Candidate]:
         """Return the candidates that are neither evaluated nor pending.
@@ -238,6 +304,7 @@ def make_llm_engine(
         prompt_tokens=prompt_tokens,
         anonymous=anonymous,
         fallback=fallback,
+        start=partial(start_values, problem),
     )
 
 
@@ -249,13 +316,30 @@ def preview(
     count: int = 1,
     prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
     anonymous: bool = False,
+    simulations: int | None = None,
+    doubtful: Sequence[Confirmation] = (),
 ) -> tuple[Message, ...]:
-    """Return the messages that would be sent next, without sending them."""
-    view = View.of(problem)
+    """Return the messages that would be sent next, without sending them.
+
+    Args:
+        problem: the problem to search.
+        variant: name of the prompt variant; None: the default one.
+        evaluations: what was simulated so far, in order.
+        count: number of candidates to ask for.
+        prompt_tokens: maximum number of tokens of a prompt.
+        anonymous: whether the LLM gets neutral names instead of real ones.
+        simulations: maximum number of simulations of the run; None: no limit.
+        doubtful: violations among the evaluations that do not count.
+    """
+    told = variant_named(variant)
+    view, start = View.of(problem), start_values(problem) if told.has("circumstances") else {}
+    doubts: dict[Hashable, str] = {c.candidate.key: in_doubt(c) for c in doubtful}
     if anonymous:
         disguise = Disguise.of(view)
+        doubts = {disguise.hidden_candidate(c.candidate).key: in_doubt(c) for c in doubtful}
         view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
-    prompt = build_prompt(view, variant_named(variant), evaluations, count=count)
+        start = disguise.hidden_values(start)
+    prompt = build_prompt(view, told, evaluations, count=count, context=Context(simulations, start, doubts))
     return render(trimmed(prompt, prompt_tokens))
 
 

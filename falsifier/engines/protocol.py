@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from falsifier.core.candidate import Candidate
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
@@ -31,6 +32,19 @@ class Engine(Protocol):
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Learn from evaluations, including failed ones and those of candidates that it did not propose."""
+        ...
+
+
+@runtime_checkable
+class FollowsRun(Protocol):
+    """An engine that wants to know more of its run than the evaluations."""
+
+    def begin(self, simulations: int | None) -> None:
+        """Be told the maximum number of simulations, before the first ``ask``; None: no limit."""
+        ...
+
+    def doubt(self, confirmation: Confirmation) -> None:
+        """Be told that a violation does not count, before its evaluation is told."""
         ...
 
 

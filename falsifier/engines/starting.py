@@ -4,7 +4,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.protocol import AsksLLM, Engine
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
@@ -37,6 +38,16 @@ class Starting:
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Tell the other engine."""
         self.engine.tell(evaluations)
+
+    def begin(self, simulations: int | None) -> None:
+        """Tell the other engine the maximum number of simulations if it wants to know."""
+        if isinstance(self.engine, FollowsRun):
+            self.engine.begin(simulations)
+
+    def doubt(self, confirmation: Confirmation) -> None:
+        """Tell the other engine that a violation does not count if it wants to know."""
+        if isinstance(self.engine, FollowsRun):
+            self.engine.doubt(confirmation)
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the other engine to a run if it asks a language model."""

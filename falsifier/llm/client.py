@@ -136,6 +136,7 @@ class LiteLLMChat:
             finish_reason="refusal" if refused else choice.finish_reason or "",
             usage=usage_of(
                 getattr(response, "usage", None),
+                llm=self.llm,
                 request=request,
                 text="".join((text, *(call.arguments for call in calls))),
                 price=self.price,

@@ -96,6 +96,10 @@ class Disguise:
             values=self._by_neutral_name(verdict.values),
         )
 
+    def hidden_values(self, values: Mapping[str, T]) -> dict[str, T]:
+        """Return values under neutral names, without those of signals that are not shown."""
+        return self._by_neutral_name(values)
+
     def hidden_candidate(self, candidate: Candidate) -> Candidate:
         """Return a candidate under neutral names."""
         return Candidate(

@@ -79,7 +79,7 @@ class Usage(_Value):
     )
     cost: float | None = Field(default=None, description="US dollars; None if the price is unknown.")
     estimated: bool = Field(
-        default=False, description="The provider sent no counts; estimated at four characters per token."
+        default=False, description="The provider sent no counts; counted with a usual tokenizer."
     )
 
     @property

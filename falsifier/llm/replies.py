@@ -23,7 +23,7 @@ from pydantic import (
 from falsifier.core.candidate import Candidate
 from falsifier.core.printable import printable
 from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
-from falsifier.core.space import SearchSpace
+from falsifier.core.space import Dimension, InputRange, ParameterRange, SearchSpace
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
 
@@ -39,6 +39,8 @@ _LONGEST_RUN = 100_000
 _LONGEST_RATIONALE = 2000
 # More candidates than any question asks for; those beyond are not read.
 _MOST_CANDIDATES = 1000
+# Share of a range by which a value may exceed it.
+_ROUNDING = 1e-3
 # How often the text of a reply may be read again in search of JSON, counted in its length.
 _READINGS = 20
 
@@ -124,13 +126,20 @@ class ReplyForm:
 
     def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:
         if reply.point is not None:
-            return self._decoded(_unrolled(reply.point), reply.rationale, origin)
+            numbers = _unrolled(reply.point)
+            if len(numbers) == len(self.space.dimensions):
+                numbers = [_clamped(v, d) for v, d in zip(numbers, self.space.dimensions, strict=True)]
+            return self._decoded(numbers, reply.rationale, origin)
         signals = {}
         for signal in reply.signals:
             if signal.name in signals:
                 raise RejectedReplyError(f"input {_shown(signal.name)} is given twice")
             signals[signal.name] = self._signal(signal)
-        parameters = {p.name: p.value for p in reply.parameters}
+        ranges = {p.name: p for p in self.space.parameters}
+        parameters = {
+            p.name: _clamped(p.value, ranges[p.name]) if p.name in ranges else p.value
+            for p in reply.parameters
+        }
         return self._admitted(Candidate(signals, parameters, origin, reply.rationale))
 
     def _allowed(self) -> SearchSpace:
@@ -145,12 +154,15 @@ class ReplyForm:
             near = did_you_mean(reply.name[:_LONGEST_NUMBER], ranges)
             raise RejectedReplyError(f"unknown input {_shown(reply.name)}; {near}")
         chosen = ranges[reply.name]
-        values = _unrolled(reply.values)
+        values = [_clamped(v, chosen) for v in _unrolled(reply.values)]
         times = reply.times or ()
         interpolation = reply.interpolation or chosen.interpolation
         if not values:
             raise RejectedReplyError(f"input {_shown(reply.name)} has no values")
         try:
+            if len(values) == 1 and len(times) <= 1:
+                constant = tuple(values * chosen.control_points)
+                return Signal(self.space.fixed_times(chosen), constant, chosen.interpolation, chosen.hold)
             if times:
                 return Signal(tuple(times), tuple(values), interpolation, chosen.hold)
             return Signal.evenly(
@@ -170,6 +182,14 @@ class ReplyForm:
             return self._allowed().admit(candidate)
         except CandidateError as error:
             raise RejectedReplyError(str(error)) from None
+
+
+def _clamped(value: float, ranged: InputRange | ParameterRange | Dimension) -> float:
+    """The value, or the limit that it exceeds by a rounding: prompts show values with few digits."""
+    slack = _ROUNDING * (ranged.high - ranged.low)
+    if ranged.low - slack <= value <= ranged.high + slack:
+        return min(max(value, ranged.low), ranged.high)
+    return value
 
 
 _TEXT = {"type": "string"}

@@ -7,9 +7,8 @@ from typing import Any
 
 from falsifier.errors import SpecError
 from falsifier.llm.messages import ChatRequest, Usage
+from falsifier.llm.tokens import count_tokens
 
-# Rule of thumb for English text; for prompt limits, and for providers that send no counts.
-_CHARACTERS_PER_TOKEN = 4
 # More than any request can have; a larger count is as wrong as a negative one.
 _MOST_TOKENS = 10**9
 
@@ -45,13 +44,14 @@ class Price:
         return f"{self.prompt:.4g} US dollars per 1000 tokens sent, {self.completion:.4g} received"
 
 
-def estimate_tokens(text: str) -> int:
-    """Estimate the number of tokens of a text, rounded up."""
-    return -(-len(text) // _CHARACTERS_PER_TOKEN)
-
-
 def usage_of(
-    response_usage: Any, *, request: ChatRequest, text: str, price: Price | None, reported_cost: float | None
+    response_usage: Any,
+    *,
+    llm: str,
+    request: ChatRequest,
+    text: str,
+    price: Price | None,
+    reported_cost: float | None,
 ) -> Usage:
     """Usage of one answered request.
 
@@ -60,7 +60,8 @@ def usage_of(
 
     Args:
         response_usage: as the provider sent it, with OpenAI's field names; None or zeros: no counts, and
-            tokens are estimated.
+            tokens are counted here.
+        llm: name of the LLM.
         request: what was sent.
         text: what was received, including tool calls.
         price: price stated by the user; overrides any reported cost.
@@ -72,9 +73,9 @@ def usage_of(
     reasoning = _count(getattr(details, "reasoning_tokens", None)) or 0
     estimated = not prompt and not completion
     if prompt is None or estimated:
-        prompt, estimated = sum(estimate_tokens(part) for part in _sent(request)), True
+        prompt, estimated = sum(count_tokens(part, llm) for part in _sent(request)), True
     if completion is None or estimated:
-        completion, estimated = estimate_tokens(text), True
+        completion, estimated = count_tokens(text, llm), True
     if price is not None:
         cost: float | None = price.cost(prompt, completion)
     else:

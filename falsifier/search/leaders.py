@@ -78,6 +78,7 @@ def check_names(request: RunRequest) -> None:
 def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
     """Make the chat with a request's language model; nothing is sent."""
     from falsifier.llm.cache import default_cache_directory
+    from falsifier.llm.client import DEFAULT_TIMEOUT
     from falsifier.llm.connect import connect, preflight
     from falsifier.llm.litellm_import import listed_price
     from falsifier.llm.usage import Price
@@ -95,6 +96,7 @@ def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
         api_base=llm.api_base,
         options=llm.options,
         price=price,
+        timeout=llm.timeout or DEFAULT_TIMEOUT,
         gate=_gate(llm.name, llm.api_base),
         cache=default_cache_directory() if llm.cache else None,
     )

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
-from falsifier.engines.protocol import AsksLLM, Engine
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
@@ -218,6 +218,8 @@ class _Loop:
         for target in self.targets:
             if isinstance(target.engine, AsksLLM):
                 target.engine.attach(self.exchanged, wrap)
+            if isinstance(target.engine, FollowsRun):
+                target.engine.begin(self.budget.simulations)
 
     def run(self, batch: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
@@ -325,6 +327,8 @@ class _Loop:
             target.counterexample, target.spent = confirmation, spent
         else:
             target.doubtful.append(confirmation)
+            if isinstance(target.engine, FollowsRun):
+                target.engine.doubt(confirmation)
         event = Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
         if all(t.counterexample is not None for t in self.targets):
             self.emit_last(event)

@@ -9,7 +9,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
 
-Effort = Literal["low", "medium", "high"]
+Effort = Literal["none", "minimal", "low", "medium", "high"]
 # A negative price, or one that is not a number, would switch off the limit on the cost.
 _Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
@@ -32,6 +32,9 @@ class LLMSettings(_Strict):
     price: tuple[_Price, _Price] | None = Field(
         default=None,
         description="US dollars per 1000 tokens sent, and per 1000 received; default: litellm's table.",
+    )
+    timeout: float | None = Field(
+        default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."
     )
     anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")

@@ -97,6 +97,17 @@ class Monitor:
         self._spare.append(buffer)
         return found
 
+    def window(self, part: Formula) -> tuple[float, float]:
+        """Return the first and last time in s at which a sub-formula matters to the robustness at time 0.
+
+        Raises:
+            FormulaError: if it is no part of the formula.
+        """
+        places = [found.place for found in self._program.root.walk() if found.formula == part]
+        if not places:
+            raise FormulaError(f"{part} is no part of {self.formula}")
+        return min(p.first for p in places) * self.step, max(p.last for p in places) * self.step
+
     def robustness(self, trajectory: Trajectory, time: float = 0.0) -> dict[Formula, float]:
         """Return the robustness of every distinct sub-formula at one time in s.
 

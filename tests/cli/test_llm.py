@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
@@ -19,9 +20,23 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
         falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
         sent = server.received[1].body["messages"]
     printed = falsifier(
-        *("prompt", "AT1", "--variant", "MP4", "--run", "run", "--samples", "1", "--json"), cwd=tmp_path
+        *("prompt", "AT1", "--variant", "MP4", "--after", "run", "--samples", "1", "--json"), cwd=tmp_path
     )
     assert json.loads(printed.out) == sent
+    at = falsifier("prompt", "run", "--at", "2", cwd=tmp_path)
+    assert sent[1]["content"] in at.out and "--- reply of openai/" in at.out
+    none = falsifier("prompt", "run", "--at", "3", cwd=tmp_path)
+    assert (none.code, "the run has no sample 3" in none.err) == (2, True)
+
+
+def test_a_printed_prompt_says_how_much_of_it_stays_the_same(tmp_path: Path) -> None:
+    text = falsifier("prompt", "F16", cwd=tmp_path).out
+    assert (
+        "100 simulations may be spent" in text
+        and "altitude above the ground; at t = 0: 2338" in text.replace("Altitude", "altitude")
+    )
+    tokens, constant = (int(n) for n in re.findall(r"(\d+) tokens; the first (\d+) of them", text)[0])
+    assert 500 < constant < tokens < 1000
 
 
 def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
@@ -29,7 +44,7 @@ def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path
     assert "Propose the first 2 different samples" in first.out
     assert "--- tool" not in first.out
     falsifier("run", "AT1", "--engine", "corners", "--out", "run", cwd=tmp_path)
-    later = ("prompt", "AT1", "--engine", "hybrid", "--run", "run", "--anonymous")
+    later = ("prompt", "AT1", "--engine", "hybrid", "--after", "run", "--anonymous")
     text = falsifier(*later, cwd=tmp_path).out
     assert "Propose the next 5 different samples" in text
     assert "--- tool predict, offered while" in text and "At most 3 calls" in text
@@ -43,7 +58,7 @@ def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path
 
 def test_a_prompt_of_fewer_samples_needs_a_run(tmp_path: Path) -> None:
     done = falsifier("prompt", "AT1", "--samples", "1", cwd=tmp_path)
-    assert (done.code, "--run" in done.err) == (2, True)
+    assert (done.code, "--after" in done.err) == (2, True)
 
 
 def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:

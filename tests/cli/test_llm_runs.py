@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.search.journal import read_journal, write_manifest
-from falsifier.search.records import ExchangeRecord
+from falsifier.search.records import AskedRecord, ExchangeRecord
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
 from tests.llm.server import Step, serving
@@ -50,15 +50,19 @@ def test_bad_replies_are_answered_with_what_was_wrong(tmp_path: Path) -> None:
     assert "'throttle' at t = 0 s: 120 is outside its range [0, 100]" in third
 
 
-def test_three_bad_replies_end_the_run_with_everything_kept(tmp_path: Path) -> None:
+def test_after_three_bad_replies_the_run_goes_on_with_a_random_change(tmp_path: Path) -> None:
     repeated = reply(BRAKE_LATE)
-    with serving(repeated, repeated, repeated, repeated) as server:
+    with serving(repeated, repeated, repeated, repeated, reply(FULL)) as server:
         done = falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
-        assert len(server.received) == 4
-    assert done.code == 3
-    assert "repeats sample 1" in done.out
-    kinds = [r.kind for r in read_journal(tmp_path / "run")]
-    assert kinds == ["exchange", "asked", "evaluated", "exchange", "exchange", "exchange", "ended"]
+        assert len(server.received) == 5
+    assert done.code == 1, done.err
+    records = read_journal(tmp_path / "run")
+    one = ["asked", "evaluated"]
+    assert [r.kind for r in records] == [
+        *("exchange", *one), *("exchange",) * 3, *one, *("exchange", *one), "confirmed", "ended"
+    ]  # fmt: skip
+    changed = [c["origin"] for r in records if isinstance(r, AskedRecord) for c in r.candidates]
+    assert changed[1] == "random change"
 
 
 def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:

@@ -116,7 +116,7 @@ def test_a_later_answer_is_ranked_before_one_is_simulated() -> None:
     assert later, "the model was not asked again"
     assert later[0].signals["u"].values[0] == pytest.approx(1.5, abs=0.01)
     assert "predicted robustness" in later[0].rationale
-    assert any("predicted robustness" in line for notes in script.notes for line in notes)
+    assert any("predicts robustness" in line for notes in script.notes for line in notes)
 
 
 def test_the_model_is_told_of_a_stall_and_is_asked_ever_more_rarely() -> None:

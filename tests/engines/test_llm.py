@@ -13,9 +13,11 @@ from falsifier.engines import make_engine
 from falsifier.engines.llm import make_llm_engine, preview
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
+from falsifier.llm.conversation import NoValidReplyError
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
@@ -105,8 +107,12 @@ def test_the_road_to_a_valid_reply() -> None:
         chat = RetryingChat(LadderChat(client), Gate(), first_delay=0.01)
         engine = make_llm_engine(problem, chat, variant="MP4", on_exchange=exchanges.append)
         engine.tell([evaluate(problem, *engine.ask())])
-        with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
-            engine.ask()
+        (instead,) = engine.ask()
+        assert (instead.origin, instead.rationale) == (
+            "random change",
+            "a random change of the best sample, because openai/m gave no valid reply",
+        )
+        engine.tell([evaluate(problem, instead)])
         assert evaluate(problem, *engine.ask()).violated
         assert len(server.received) == 7
     problems = [e.problem for e in exchanges]
@@ -115,6 +121,44 @@ def test_the_road_to_a_valid_reply() -> None:
     assert "'u' at t = 10 s: 7 is outside its range [-1, 1]" in (problems[2] or "")
     assert problems[3] == "it repeats sample 1"
     assert exchanges[1].reply is not None and exchanges[1].reply.attempts == 3
+
+
+def test_an_llm_that_never_answers_validly_is_given_up() -> None:
+    problem = lag_problem()
+    engine = make_llm_engine(problem, ScriptedChat(lambda _: "nothing"))
+    changed = [*engine.ask(), *engine.ask()]
+    assert len({c.key for c in changed}) == 2
+    assert changed[0].rationale.startswith("a random sample")
+    with pytest.raises(NoValidReplyError, match="no valid reply in 3 attempts"):
+        engine.ask()
+
+
+def test_a_violation_that_does_not_count_is_told_with_the_reason() -> None:
+    problem = lag_problem()
+    for anonymous in (False, True):
+        name = '"u1"' if anonymous else '"u"'
+        chat = ScriptedChat([reply(v).replace('"u"', name) for v in ([1, 1, 1, 1], [0, 1, 1, 1])])
+        engine = make_llm_engine(problem, chat, anonymous=anonymous)
+        engine.begin(20)
+        (found,) = engine.ask()
+        evaluation = evaluate(problem, found)
+        assert evaluation.violated
+        engine.doubt(
+            Confirmation(
+                problem=problem,
+                evaluation=evaluation,
+                outcome="fragile",
+                robustness=evaluation.robustness,
+                reference=evaluation.robustness,
+                reason="",
+                halved=0.5,
+            )
+        )
+        engine.tell([evaluation])
+        engine.ask()
+        asked = chat.requests[-1].messages[1].content
+        assert "does not count as a violation, it is fragile" in asked
+        assert "1 of 20 simulations spent, 19 left" in asked
 
 
 def test_several_candidates_at_a_time() -> None:
@@ -130,9 +174,9 @@ def test_several_candidates_at_a_time() -> None:
     engine = make_llm_engine(problem, chat, variant="MP4")
     candidates = engine.ask(3)
     assert [c.signals["u"].values[0] for c in candidates] == [0.1, 0.2, 0.3]
-    assert "Already proposed" in chat.requests[1].messages[-1].content
+    assert "Proposed earlier" in chat.requests[1].messages[-1].content
     engine.tell([evaluate(problem, c) for c in candidates])
-    assert "Already proposed" not in preview_of(chat, engine)
+    assert "Proposed earlier" not in preview_of(chat, engine)
 
 
 def preview_of(chat: ScriptedChat, engine: Engine) -> str:
@@ -144,7 +188,7 @@ def preview_of(chat: ScriptedChat, engine: Engine) -> str:
 def test_neutral_names_go_out_and_real_ones_come_back() -> None:
     problem = lag_problem()
     hidden = json.dumps({"rationale": "raise u1", "signals": [{"name": "u1", "values": [1] * 4}]})
-    chat = ScriptedChat([hidden, "", "", ""])
+    chat = ScriptedChat([hidden])
     engine = make_llm_engine(problem, chat, variant="MP5", anonymous=True)
     (candidate,) = engine.ask()
     assert candidate.signals["u"].values == (1, 1, 1, 1)
@@ -326,8 +370,10 @@ def test_free_parameterizations_come_from_mp5_only() -> None:
     text = json.dumps({"rationale": "", "signals": [signal]})
     (candidate,) = make_llm_engine(problem, ScriptedChat([text]), variant="MP5").ask()
     assert candidate.signals["u"].times == (0, 2)
-    with pytest.raises(ChatError, match="expected 4 evenly spaced"):
-        make_llm_engine(problem, ScriptedChat([text] * 3), variant="MP4").ask()
+    said: list[Exchange] = []
+    chat = ScriptedChat([text] * 3)
+    make_llm_engine(problem, chat, variant="MP4", on_exchange=said.append).ask()
+    assert all("expected 4 evenly spaced" in (e.problem or "") for e in said) and len(said) == 3
 
 
 def counting_script(seed: int) -> Callable[[ChatRequest], str]:

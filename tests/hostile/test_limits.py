@@ -78,7 +78,7 @@ def test_whatever_is_reported_the_usage_is_possible(
         completion_tokens=received,
         completion_tokens_details=SimpleNamespace(reasoning_tokens=reasoning),
     )
-    usage = usage_of(reported, request=REQUEST, text="a reply", price=None, reported_cost=cost)
+    usage = usage_of(reported, llm="", request=REQUEST, text="a reply", price=None, reported_cost=cost)
     assert usage.prompt_tokens >= 0 and usage.completion_tokens >= 0
     assert usage.prompt_tokens + usage.completion_tokens > 0
     assert 0 <= usage.reasoning_tokens <= usage.completion_tokens
@@ -88,7 +88,9 @@ def test_whatever_is_reported_the_usage_is_possible(
 @pytest.mark.parametrize("count", WRONG_COUNTS)
 def test_a_count_that_cannot_be_true_is_estimated(count: Any) -> None:
     reported = SimpleNamespace(prompt_tokens=count, completion_tokens=count)
-    usage = usage_of(reported, request=REQUEST, text="x" * 40, price=Price(1.0, 1.0), reported_cost=None)
+    usage = usage_of(
+        reported, llm="", request=REQUEST, text="x" * 40, price=Price(1.0, 1.0), reported_cost=None
+    )
     assert (usage.prompt_tokens, usage.completion_tokens, usage.estimated) == (6, 10, True)
     assert usage.cost == pytest.approx(0.016)
 

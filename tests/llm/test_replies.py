@@ -11,6 +11,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.replies import ReplyForm
+from falsifier.testing import START, lag_problem
 
 FREE = Freedom(max_control_points=200, min_interval=0.1)
 SPACE = SearchSpace(
@@ -248,3 +249,33 @@ def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
         assert str(rejection)
     else:
         assert found and all(SPACE.admit(c).key == c.key for c in found)
+
+
+def test_a_value_beyond_its_range_by_a_rounding_is_clamped_and_by_more_is_told_with_the_range() -> None:
+    form = ReplyForm(lag_problem(parameters=[START]).space)
+
+    def text(u: float, x0: float) -> str:
+        return json.dumps(
+            {
+                "signals": [{"name": "u", "values": [u, 0, 0, 0]}],
+                "parameters": [{"name": "x0", "value": x0}],
+            }
+        )
+
+    (near,) = form.read(text(1.001, -1.0005))
+    assert near.signals["u"].values[0] == 1.0
+    assert near.parameters["x0"] == -1.0
+    with pytest.raises(RejectedReplyError, match=r"1\.1 is outside its range \[-1, 1\]"):
+        form.read(text(1.1, 0.0))
+    with pytest.raises(RejectedReplyError, match=r"'x0': -2 is outside its range \[-1, 1\]"):
+        form.read(text(0.0, -2.0))
+    (point,) = ReplyForm(form.space, named=False).read('{"point": [1.001, 0, 0, -1.001, 1.0]}')
+    assert point.signals["u"].values == (1.0, 0.0, 0.0, -1.0)
+
+
+@pytest.mark.parametrize("times", ["", ', "times": []', ', "times": [0]', ', "times": [5]'])
+@pytest.mark.parametrize("free", [False, True])
+def test_one_value_is_a_constant_with_or_without_times(times: str, free: bool) -> None:
+    form = ReplyForm(lag_problem(free=FREE if free else None).space, free=free)
+    (found,) = form.read(f'{{"signals": [{{"name": "u", "values": [0.5]{times}}}]}}')
+    assert found.signals["u"].values == (0.5,) * 4

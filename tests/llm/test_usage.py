@@ -4,7 +4,8 @@ from typing import Any
 import pytest
 
 from falsifier.llm.messages import ChatRequest, Message, Usage
-from falsifier.llm.usage import Price, estimate_tokens, usage_of
+from falsifier.llm.tokens import count_tokens
+from falsifier.llm.usage import Price, usage_of
 from tests.llm.support import QUESTION
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="x" * 400),))
@@ -15,7 +16,7 @@ PRICE = Price(prompt=0.25, completion=2.0)
 
 
 def usage(response: Any, *, price: Price | None = None, reported: float | None = None) -> Usage:
-    return usage_of(response, request=REQUEST, text="y" * 41, price=price, reported_cost=reported)
+    return usage_of(response, llm="", request=REQUEST, text="y" * 41, price=price, reported_cost=reported)
 
 
 def test_counts_and_cost_are_the_providers() -> None:
@@ -37,19 +38,16 @@ def test_an_unknown_price_is_none_and_never_zero() -> None:
 )
 def test_missing_counts_are_estimated_and_only_a_price_of_ones_own_makes_a_cost_of_them(sent: Any) -> None:
     found = usage(sent, reported=0.0)
-    assert (found.prompt_tokens, found.completion_tokens, found.estimated) == (100, 11, True)
+    counted = (count_tokens("x" * 400), count_tokens("y" * 41))
+    assert (found.prompt_tokens, found.completion_tokens, found.estimated) == (*counted, True)
     assert found.cost is None
-    assert usage(sent, price=PRICE).cost == pytest.approx(PRICE.cost(100, 11))
+    assert usage(sent, price=PRICE).cost == pytest.approx(PRICE.cost(*counted))
 
 
 def test_tools_and_calls_are_sent_too() -> None:
     plain = QUESTION.model_copy(update={"tools": ()})
     with_tools, without = (
-        usage_of(None, request=r, text="", price=None, reported_cost=None).prompt_tokens
+        usage_of(None, llm="", request=r, text="", price=None, reported_cost=None).prompt_tokens
         for r in (QUESTION, plain)
     )
     assert with_tools > without + 20
-
-
-def test_tokens_are_estimated_by_characters() -> None:
-    assert [estimate_tokens(text) for text in ("", "abc", "abcd", "abcde")] == [0, 1, 1, 2]

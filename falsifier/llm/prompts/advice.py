@@ -3,35 +3,44 @@
 from falsifier.llm.prompts.blocks import AdviceBlock
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
-from falsifier.stl.formula import Implies
+from falsifier.stl.formula import Always, And, Formula, Implies
 
 
 def advice(view: View, variant: Variant) -> AdviceBlock:
-    """Advice that fits what the variant shows and how the requirement is built."""
-    lines = ["Use the output values of the earlier samples to work out how each input affects the outputs."]
+    """Advice that fits what the variant shows, how the requirement is built and what is chosen."""
+    what = view.chosen
+    samples = [
+        f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs."
+    ]
     if variant.has("critical"):
-        lines.append(
-            "Look at the time that decided each robustness value, and change the inputs so that the signals "
+        samples.append(
+            f"Look at the time that decided each robustness value, and change the {what} so that the signals "
             "at that time move towards violating the requirement."
         )
-    if variant.has("observations"):
-        lines += _on_observations(view)
-    if variant.has("freedom") and any(r.free for r in view.space.inputs):
-        lines.append(
-            "Choose the signal shape that a violation needs: constant interpolation with your own times for "
-            "steps and short pulses, few control points for slow changes, pieces of half a period to excite "
-            "a resonance."
-        )
-    return AdviceBlock(lines=tuple(lines))
+    if not variant.has("observations"):
+        return AdviceBlock(lines=tuple(samples))
+    samples.append(
+        "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
+        "strategy."
+    )
+    return AdviceBlock(lines=tuple(_at_any_time(view, variant)), on_samples=tuple(samples))
 
 
-def _on_observations(view: View) -> list[str]:
-    lines = [
-        "The limits of the ranges are good first samples; for signals, so is a single switch between them."
-    ]
+def _at_any_time(view: View, variant: Variant) -> list[str]:
+    """Advice that needs no earlier sample."""
     formula = view.requirement.formula
-    units = {view.unit(name) for name in formula.signals}
-    if len(formula.predicates) > 1 and len(units) > 1:
+    lines = ["The limits of the ranges are good first samples."]
+    if view.space.inputs:
+        lines = [
+            "The limits of the ranges are good first samples, and so is a single switch from one limit to "
+            "the other."
+        ]
+    if _is_conjunction(formula):
+        lines.append(
+            "The requirement is a conjunction: it is violated as soon as any one of its conjuncts is. Its "
+            "robustness is the smallest of theirs; choose the one that is easiest to violate."
+        )
+    if len(formula.predicates) > 1 and len({view.unit(name) for name in formula.signals}) > 1:
         lines.append(
             "Robustness values of different parts are in the units of their signals: a small value in one "
             "unit may be harder to change than a large value in another."
@@ -41,8 +50,16 @@ def _on_observations(view: View) -> list[str]:
             "An implication is violated only if its condition is true and its consequence fails: make the "
             "condition true first."
         )
-    lines.append(
-        "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
-        "strategy."
-    )
+    if variant.has("freedom") and any(r.free for r in view.space.inputs):
+        lines.append(
+            "Choose the signal shape that a violation needs: constant interpolation with your own times for "
+            "steps and short pulses, few control points for slow changes, pieces of half a period to excite "
+            "a resonance."
+        )
     return lines
+
+
+def _is_conjunction(formula: Formula) -> bool:
+    while isinstance(formula, Always):
+        formula = formula.operand
+    return isinstance(formula, And)

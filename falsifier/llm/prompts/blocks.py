@@ -13,6 +13,7 @@ class TaskBlock(_Block):
     """The task."""
 
     knows_requirement: bool
+    chosen: str = Field(default="inputs", description="What is chosen: inputs, or parameters alone.")
     count: int = Field(description="Number of candidates wanted.")
 
 
@@ -41,12 +42,14 @@ class SignalLine(_Block):
     unit: str = ""
     description: str = ""
     kind: str = "real"
+    start: str = Field(default="", description="Its value at time 0.")
 
 
 class OutputsBlock(_Block):
     """Signals that are recorded."""
 
     signals: tuple[SignalLine, ...]
+    legend: str = Field(default="", description="How signals over time are written.")
 
 
 class DimensionLine(_Block):
@@ -70,6 +73,7 @@ class InputLine(_Block):
     high: str
     control_points: int
     times: tuple[str, ...]
+    every: str = Field(default="", description="Distance of evenly spaced times in s; empty: see times.")
     interpolation: Interpolation
     hold: float | None = None
     max_control_points: int | None = Field(default=None, description="None: the control points are fixed.")
@@ -105,6 +109,7 @@ class SampleLines(_Block):
     mark: str = Field(default="", description="Why an old sample is shown: 'best so far', ...")
     inputs: tuple[str, ...]
     robustness: str = Field(default="", description="Empty if there is no verdict.")
+    doubt: str = Field(default="", description="Why a violation does not count.")
     failure: str = ""
     facts: tuple[str, ...] = Field(default=(), description="Observations, one line each.")
     details: tuple[str, ...] = Field(
@@ -121,10 +126,18 @@ class HistoryBlock(_Block):
     notes: tuple[str, ...] = ()
 
 
+class BudgetBlock(_Block):
+    """Simulations of the run."""
+
+    used: int
+    limit: int
+
+
 class AdviceBlock(_Block):
     """How to use the rest of the prompt."""
 
     lines: tuple[str, ...]
+    on_samples: tuple[str, ...] = Field(default=(), description="Told once there are samples.")
 
 
 class ReplyBlock(_Block):
@@ -144,5 +157,6 @@ class Prompt(_Block):
     outputs: OutputsBlock | None = None
     inputs: InputsBlock
     history: HistoryBlock | None = None
+    budget: BudgetBlock | None = None
     advice: AdviceBlock | None = None
     reply: ReplyBlock

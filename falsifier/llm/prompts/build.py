@@ -1,7 +1,7 @@
 """From a problem and its evaluations to a prompt: selects what is shown and arranges it in blocks."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
@@ -9,6 +9,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
+    BudgetBlock,
     DimensionLine,
     HistoryBlock,
     InputLine,
@@ -23,6 +24,7 @@ from falsifier.llm.prompts.blocks import (
     SystemBlock,
     TaskBlock,
 )
+from falsifier.llm.prompts.context import Context
 from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
 from falsifier.llm.prompts.published import published_facts
 from falsifier.llm.prompts.variants import Variant
@@ -31,6 +33,7 @@ from falsifier.stl import in_words
 
 # Control-point times listed individually; of longer lists the first ones and the last.
 _MAX_TIMES = 25
+_FEW_TIMES = 5
 
 
 def build_prompt(
@@ -41,6 +44,7 @@ def build_prompt(
     pending: Sequence[Candidate] = (),
     notes: Sequence[str] = (),
     count: int = 1,
+    context: Context | None = None,
 ) -> Prompt:
     """Build the prompt for the next candidates.
 
@@ -51,15 +55,18 @@ def build_prompt(
         pending: candidates without an evaluation yet.
         notes: lines about the search as a whole, from the engine that leads it.
         count: number of candidates wanted.
+        context: what is known of the run; default: nothing.
     """
+    context = context or Context()
     return Prompt(
         variant=variant.name,
-        task=TaskBlock(knows_requirement=variant.has("requirement"), count=count),
+        task=TaskBlock(knows_requirement=variant.has("requirement"), chosen=view.chosen, count=count),
         system=_system(view) if variant.has("system") else None,
         requirement=_requirement(view, variant) if variant.has("requirement") else None,
-        outputs=_outputs(view, variant) if variant.has("outputs") else None,
+        outputs=_outputs(view, variant, context) if variant.has("outputs") else None,
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
-        history=_history(view, variant, evaluations, pending, notes),
+        history=_history(view, variant, evaluations, pending, notes, context),
+        budget=_budget(variant, evaluations, context),
         advice=advice(view, variant) if variant.has("advice") else None,
         reply=_reply(view, variant, count),
     )
@@ -84,18 +91,43 @@ def _requirement(view: View, variant: Variant) -> RequirementBlock:
     )
 
 
-def _outputs(view: View, variant: Variant) -> OutputsBlock:
+def _budget(variant: Variant, evaluations: Sequence[Evaluation], context: Context) -> BudgetBlock | None:
+    if context.simulations is None or not variant.has("circumstances"):
+        return None
+    return BudgetBlock(used=len(evaluations), limit=max(context.simulations, len(evaluations)))
+
+
+def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
     if not variant.has("system"):
         return OutputsBlock(signals=tuple(SignalLine(name=name) for name in view.formula_outputs))
     others = [n for n in view.experiment.outputs if n not in view.formula_outputs]
     return OutputsBlock(
         signals=tuple(
             SignalLine(
-                name=name, unit=view.unit(name), description=view.description(name), kind=view.kind(name)
+                name=name,
+                unit=view.unit(name),
+                description=view.description(name),
+                kind=view.kind(name),
+                start=_start(variant, context, name),
             )
             for name in (*view.formula_outputs, *others)
-        )
+        ),
+        legend=_LEGEND if variant.has("observations") else "",
     )
+
+
+_LEGEND = (
+    "Signals over time are written as time:value, time in s; between these points they run in straight "
+    "lines. Up to 3 % of a signal's span is rounded off, except around the time that decided."
+)
+
+
+def _start(variant: Variant, context: Context, name: str) -> str:
+    """Value at time 0; a range if it depends on what is chosen."""
+    if name not in context.start or not variant.has("circumstances"):
+        return ""
+    low, high = (number(value, 5) for value in context.start[name])
+    return low if low == high else f"{low} to {high}, depending on what you choose"
 
 
 def _dimensions(view: View, variant: Variant) -> InputsBlock:
@@ -125,6 +157,9 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     times = tuple(number(round(t, 6)) for t in view.space.fixed_times(r))
     if len(times) > _MAX_TIMES:
         times = (*times[:3], "...", times[-1])
+    fixed = view.space.fixed_times(r)
+    gap = fixed[1] - fixed[0] if len(fixed) > _FEW_TIMES else 0.0
+    is_even = gap > 0 and all(abs(t - k * gap) < 1e-6 * view.space.stop_time for k, t in enumerate(fixed))
     freedom = r.free if free else None
     return InputLine(
         name=r.name,
@@ -136,6 +171,7 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
         high=high,
         control_points=r.control_points,
         times=times,
+        every=number(gap, 6) if is_even and free else "",
         interpolation=r.interpolation,
         hold=r.hold,
         max_control_points=freedom and freedom.max_control_points,
@@ -168,23 +204,37 @@ def _history(
     evaluations: Sequence[Evaluation],
     pending: Sequence[Candidate],
     notes: Sequence[str],
+    context: Context,
 ) -> HistoryBlock | None:
     if variant.has("selection"):
         chosen = selection.recent_best_and_different(view, evaluations)
+        depths = selection.depths(chosen, evaluations)
     else:
         chosen = selection.recent(evaluations)
+        depths = {}
     if not chosen and not pending and not notes:
         return None
     judged = sum(e.verdict is not None or variant.has("failures") for e in evaluations)
     return HistoryBlock(
-        samples=tuple(_sample(view, variant, i, mark, evaluations[i]) for i, mark in chosen.items()),
+        samples=tuple(
+            _sample(view, variant, i, mark, evaluations[i], depths.get(i, "close"), context)
+            for i, mark in chosen.items()
+        ),
         omitted=judged - len(chosen),
         pending=tuple("; ".join(_chosen(view, variant, c)) for c in pending),
         notes=(*(_notes(view, evaluations) if variant.has("observations") else ()), *notes),
     )
 
 
-def _sample(view: View, variant: Variant, index: int, mark: str, evaluation: Evaluation) -> SampleLines:
+def _sample(
+    view: View,
+    variant: Variant,
+    index: int,
+    mark: str,
+    evaluation: Evaluation,
+    depth: selection.Depth,
+    context: Context,
+) -> SampleLines:
     inputs = _chosen(view, variant, evaluation.candidate)
     if evaluation.robustness is None:
         return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
@@ -195,11 +245,22 @@ def _sample(view: View, variant: Variant, index: int, mark: str, evaluation: Eva
         mark=mark,
         inputs=inputs,
         robustness=signed(evaluation.robustness, digits),
+        doubt=context.doubts.get(evaluation.candidate.key, ""),
         facts=tuple(
-            observations.facts(view, evaluation) if rich else published_facts(view, variant, evaluation)
+            _observed(view, evaluation, depth) if rich else published_facts(view, variant, evaluation)
         ),
-        details=tuple(observations.details(view, evaluation)) if rich else (),
+        details=(
+            tuple(observations.details(view, evaluation, close=depth == "close"))
+            if rich and depth != "summary"
+            else ()
+        ),
     )
+
+
+def _observed(view: View, evaluation: Evaluation, depth: selection.Depth) -> Iterator[str]:
+    if depth == "summary":
+        return observations.summary(evaluation)
+    return observations.facts(view, evaluation, close=depth == "close")
 
 
 def _failure(evaluation: Evaluation) -> str:
@@ -231,32 +292,54 @@ def _reply(view: View, variant: Variant, count: int) -> ReplyBlock:
     one: dict[str, object] = {"rationale": "why these values"}
     free = variant.has("freedom") and any(r.free for r in space.inputs)
     if not variant.has("names"):
-        one["point"] = [_middle(d.low, d.high) for d in space.dimensions]
+        one["point"] = _spread([(d.low, d.high) for d in space.dimensions])
     else:
         if space.inputs:
-            one["signals"] = [_example(r, free=free) for r in space.inputs]
+            one["signals"] = [_example(view, r, k, free=free) for k, r in enumerate(space.inputs)]
         if space.parameters:
-            one["parameters"] = [{"name": p.name, "value": _middle(p.low, p.high)} for p in space.parameters]
+            values = _spread([(p.low, p.high) for p in space.parameters])
+            one["parameters"] = [
+                {"name": p.name, "value": nearest_value(p, value)}
+                for p, value in zip(space.parameters, values, strict=True)
+            ]
     example = json.dumps(one if count == 1 else {"candidates": [one]})
     return ReplyBlock(example=example, notes=_FREE_NOTES if free else ())
 
 
 _FREE_NOTES = (
     'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
-    "there are; with constant interpolation they are pieces of equal length.",
+    "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
     'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
     "stop time.",
     'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
 )
+# Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
+_PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
+# Share of the stop time at which the pieces of an example begin.
+_BEGINNINGS = (0.0, 0.24, 0.62)
 
 
-def _example(r: InputRange, *, free: bool) -> dict[str, object]:
-    middle = nearest_value(r, _middle(r.low, r.high))
-    values = [middle] * min(r.control_points, _MAX_TIMES)
+def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
+    limits = [(r.low, r.high)]
     if not free:
-        return {"name": r.name, "values": [middle] * r.control_points}
-    return {"name": r.name, "interpolation": r.interpolation, "times": [], "values": values}
+        values = [nearest_value(r, v) for v in _spread(limits * r.control_points, position)]
+        return {"name": r.name, "values": values}
+    times: list[float] = []
+    interpolation: str = r.interpolation
+    count = min(r.control_points, len(_PLACES))
+    stepping = r.free and r.free.max_control_points >= len(_BEGINNINGS)
+    if stepping and r.free and position == 0 and r.free.min_interval <= view.space.stop_time / 5:
+        times = [float(f"{share * view.space.stop_time:.3g}") for share in _BEGINNINGS]
+        interpolation, count = "constant", len(times)
+    elif r.free is None:
+        count = r.control_points
+    values = [nearest_value(r, v) for v in _spread(limits * count, position)]
+    return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
 
 
-def _middle(low: float, high: float) -> float:
-    return float(f"{(low + high) / 2:.4g}")
+def _spread(limits: Sequence[tuple[float, float]], first: int = 0) -> list[float]:
+    """Numbers within their limits that differ from each other."""
+    places = (_PLACES[(first + k) % len(_PLACES)] for k in range(len(limits)))
+    return [
+        float(f"{low + place * (high - low):.4g}") for place, (low, high) in zip(places, limits, strict=True)
+    ]

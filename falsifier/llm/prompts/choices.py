@@ -1,14 +1,19 @@
 """The inputs and parameters of a sample, written the way an LLM would write them in a reply."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal, even_times
 from falsifier.core.space import InputRange
-from falsifier.llm.prompts.numbers import number, runs
+from falsifier.llm.prompts.numbers import decimals_for, number, plain, runs
 from falsifier.llm.prompts.view import View
+
+# Digits of the width of a range to which values of signals and parameters are shown.
+_DIGITS_OF_RANGE = 4
+_DIGITS_OF_PARAMETER = 7
 
 
 def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
@@ -28,11 +33,18 @@ def as_signals(view: View, candidate: Candidate) -> tuple[str, ...]:
     """Each input with its own control points and interpolation, and parameters."""
     return (
         *(
-            f"{r.name}: {signal_text(candidate.signals[r.name], stop_time=view.space.stop_time)}"
+            f"{r.name}: {_signal_text_in(r, candidate.signals[r.name], view.space.stop_time)}"
             for r in view.space.inputs
         ),
         *_parameters(view, candidate),
     )
+
+
+def _signal_text_in(r: InputRange, signal: Signal, stop_time: float) -> str:
+    """Parameterization with values rounded to some thousandths of the range."""
+    decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
+    rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
+    return signal_text(rounded, stop_time=stop_time)
 
 
 def signal_text(signal: Signal, *, stop_time: float) -> str:
@@ -64,4 +76,6 @@ def _fixed_values(view: View, r: InputRange, signal: Signal) -> tuple[float, ...
 
 
 def _parameters(view: View, candidate: Candidate) -> Iterator[str]:
-    return (f"{p.name} = {number(candidate.parameters[p.name])}" for p in view.space.parameters)
+    for p in view.space.parameters:
+        decimals = decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
+        yield f"{p.name} = {plain(candidate.parameters[p.name], decimals)}"

@@ -1,15 +1,15 @@
-"""Signals over time in words: lists of changes, extrema, intervals, oscillations, sampled values.
+"""Signals over time in words: lists of changes, extrema, intervals, breakpoints, oscillations.
 
 Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.llm.prompts.numbers import decimals_for, plain
+from falsifier.llm.prompts.shapes import Course, Points, Swing
 
 Array = NDArray[np.float64]
 
@@ -17,10 +17,6 @@ Array = NDArray[np.float64]
 _MAX_LEVELS = 12
 # Changes listed individually; of longer lists the beginning and the end.
 _SHOWN_CHANGES = 16
-# Turning points closer to their neighbours than this share of the signal's span are ripple.
-_RIPPLE_SHARE = 0.02
-# Fewer turning points are a transient, not an oscillation.
-_MIN_TURNS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,23 +26,6 @@ class Piece:
     value: float
     start: float
     end: float
-
-
-@dataclass(frozen=True, slots=True)
-class Oscillation:
-    """Fast oscillation of a signal.
-
-    Attributes:
-        start: in s.
-        end: in s.
-        period: median period in s.
-        swing: median distance from one turning point to the next.
-    """
-
-    start: float
-    end: float
-    period: float
-    swing: float
 
 
 def is_discrete(column: Array, *, kind: str) -> bool:
@@ -114,17 +93,6 @@ def dwell_list(times: Array, column: Array, *, clock: int) -> str:
     return "; ".join(words)
 
 
-def extrema(times: Array, column: Array, *, decimals: int, clock: int) -> str:
-    """Smallest and largest value with their times, or that the signal is constant."""
-    low, high = int(column.argmin()), int(column.argmax())
-    if column[low] == column[high]:
-        return f"constant {plain(float(column[low]), decimals)}"
-    return (
-        f"min {plain(float(column[low]), decimals)} at {plain(float(times[low]), clock)} s, "
-        f"max {plain(float(column[high]), decimals)} at {plain(float(times[high]), clock)} s"
-    )
-
-
 def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, float] | None:
     """Start and end in s of the longest uninterrupted interval in which this is true; None if it never is."""
     edges = np.diff(np.concatenate(([0], wrong.astype(np.int8), [0])))
@@ -135,30 +103,45 @@ def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, floa
     return float(times[starts[longest]]), float(times[ends[longest]])
 
 
-def oscillation(times: Array, column: Array, *, slower_than: float) -> Oscillation | None:
-    """The oscillating part of a signal that samples ``slower_than`` s apart cannot resolve, if any."""
-    turns = _turning_points(column)
-    if len(turns) < _MIN_TURNS:
-        return None
-    gaps = np.diff(times[turns])
-    fast = longest_stretch(times[turns][:-1], gaps < slower_than)
-    if fast is None:
-        return None
-    inside = [k for k in turns if fast[0] <= times[k] <= fast[1]]
-    if len(inside) < _MIN_TURNS:
-        return None
-    return Oscillation(
-        start=fast[0],
-        end=fast[1],
-        period=2 * float(np.median(np.diff(times[inside]))),
-        swing=float(np.median(np.abs(np.diff(column[inside])))),
+def course_text(drawn: Course, *, decimals: int, clock: int) -> str:
+    """Breakpoints as ``time:value``; for oscillations their envelopes and periods.
+
+    Args:
+        drawn: the signal.
+        decimals: decimals of values.
+        clock: decimals of times.
+
+    >>> course_text(Course((((0.0, 1.0), (2.5, 3.0)),), (), 0.1), decimals=1, clock=1)
+    '0:1 2.5:3'
+    """
+    parts = [(points[0][0], _pairs(points, decimals, clock)) for points in drawn.lines]
+    parts += [(swing.start, _swing(swing, decimals, clock)) for swing in drawn.swings]
+    return "; ".join(text for _, text in sorted(parts, key=lambda part: part[0]))
+
+
+def coarse_clock(stop_time: float) -> int:
+    """Decimals of times that show a hundredth of the stop time, or less.
+
+    >>> coarse_clock(50.0), coarse_clock(100.0), coarse_clock(3.0)
+    (1, 1, 2)
+    """
+    return decimals_for(stop_time / 2, 3)
+
+
+def _pairs(points: Points, decimals: int, clock: int) -> str:
+    texts = [f"{plain(t, clock)}:{plain(v, decimals)}" for t, v in points]
+    return " ".join(dict.fromkeys(texts))
+
+
+def _swing(swing: Swing, decimals: int, clock: int) -> str:
+    first, *later = swing.phases
+    period = f"{first.period:.2g} s" + "".join(
+        f", {phase.period:.2g} s from {plain(phase.start, clock)} s" for phase in later
     )
-
-
-def samples_at(times: Array, column: Array, moments: Sequence[float], *, decimals: int) -> str:
-    """Values at the samples nearest to these times in s, separated by commas."""
-    indices = np.interp(moments, times, np.arange(len(times))).round().astype(int)
-    return ", ".join(plain(float(column[k]), decimals) for k in indices)
+    return (
+        f"oscillates from {plain(swing.start, clock)} to {plain(swing.end, clock)} s with period {period}, "
+        f"between {_pairs(swing.lower, decimals, clock)} and {_pairs(swing.upper, decimals, clock)}"
+    )
 
 
 def column_decimals(column: Array, *, margin: float | None = None) -> int:
@@ -168,19 +151,6 @@ def column_decimals(column: Array, *, margin: float | None = None) -> int:
         return usual
     limit = decimals_for(float(np.abs(column).max()), 9)
     return min(max(usual, decimals_for(margin, 3)), limit)
-
-
-def _turning_points(column: Array) -> list[int]:
-    """Indices of extrema that differ from their neighbours by more than ripple."""
-    least = _RIPPLE_SHARE * float(np.ptp(column))
-    slopes = np.sign(np.diff(column))
-    moving = np.flatnonzero(slopes)
-    candidates = moving[1:][slopes[moving[1:]] != slopes[moving[:-1]]].tolist()
-    turns: list[int] = []
-    for k in candidates:
-        if not turns or abs(column[k] - column[turns[-1]]) > least:
-            turns.append(k)
-    return turns
 
 
 def _times(count: int) -> str:

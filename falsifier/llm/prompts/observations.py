@@ -1,8 +1,7 @@
 """Everything observed in one sample: what decided it, the parts of the formula, all signals over time."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from math import ceil, floor, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +10,15 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import (
     change_list,
+    coarse_clock,
     column_decimals,
+    course_text,
     dwell_list,
-    extrema,
     is_discrete,
     longest_stretch,
-    oscillation,
-    samples_at,
 )
 from falsifier.llm.prompts.numbers import decimals_for, number, plain, signed
+from falsifier.llm.prompts.shapes import MOST_BREAKPOINTS, Course, course, oscillations
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
 from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
@@ -28,56 +27,96 @@ Array = NDArray[np.float64]
 
 # Digits of robustness values: the search depends on small differences between samples.
 ROBUSTNESS_DIGITS = 5
-# Maximum number of values of each signal over the whole simulation.
-_GRID_VALUES = 21
-# A burst is a densely sampled interval around the critical time: its share of the stop time, its usual number
-# of steps, its maximum number of values, and the values per period if the signal oscillates.
-_BURST_SHARE = 1 / 25
-_BURST_STEPS = 20
-_BURST_VALUES = 40
-_VALUES_PER_PERIOD = 8
+# Distance from a signal that its course may have, as a share of its span: of those compared, of others.
+_TOLERANCE = 0.02
+_TOLERANCE_OF_OTHERS = 0.04
+# Oscillations with a shorter period than this share of the stop time are told by their envelopes.
+_SLOWEST_OSCILLATION = 1 / 20
+# The interval around the critical time that is told more exactly: its share of the stop time, its number of
+# periods if the signal oscillates, and its tolerance as a share of the span there.
+_CLOSE_SHARE = 1 / 12
+_CLOSE_PERIODS = 2.5
+_CLOSE_TOLERANCE = 0.01
+# Breakpoints of signals that the formula does not compare, and of samples that are told in short.
+_FEWER_BREAKPOINTS = 12
+# Steps of an input at which the course of an output always has a breakpoint, so that its response is seen.
+_MOST_STEPS = 8
 # Maximum number of signals shown over time; those of the formula come first.
 _MAX_SIGNALS = 16
 
 
-def facts(view: View, evaluation: Evaluation) -> Iterator[str]:
-    """The most important lines: what decided, all values at that time, robustness of the parts, stays."""
-    verdict, trajectory = evaluation.verdict, evaluation.trajectory
+def summary(evaluation: Evaluation) -> Iterator[str]:
+    """One line: when and by which predicate the robustness was decided."""
+    verdict = evaluation.verdict
     assert verdict is not None
+    yield f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
+
+
+def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator[str]:
+    """The most important lines: what decided, robustness of the parts, stays.
+
+    Args:
+        view: the problem.
+        evaluation: a judged sample.
+        close: whether to add all values at the critical time, and when each predicate was false.
+    """
+    trajectory = evaluation.trajectory
     if trajectory is None:
-        yield f"decided at t = {number(verdict.critical_time)} s by {verdict.predicate}"
+        yield from summary(evaluation)
         return
     monitor = monitor_for(view)
     diagnosis = monitor.diagnose(trajectory)
     clock = _clock(view)
     yield f"why: {diagnosis.text}"
-    there = []
-    for name, value in trajectory.at(diagnosis.critical_time).items():
-        decimals = _decimals(view, trajectory[name], name, verdict.robustness)
-        there.append(f"{name} = {plain(value, decimals)}{_unit(view, name)}")
-    yield f"all signals at t = {plain(diagnosis.critical_time, clock)} s: {', '.join(there)}"
+    if close:
+        yield _values_there(view, trajectory, diagnosis)
     yield from _parts(view, monitor, diagnosis, trajectory)
     for name in view.formula_outputs:
         if is_discrete(trajectory[name], kind=view.kind(name)):
             yield f"{name}: {change_list(trajectory.times, trajectory[name], clock=clock)}"
             if stays := dwell_list(trajectory.times, trajectory[name], clock=clock):
                 yield f"{name} stays: {stays}"
-    for predicate in view.requirement.formula.predicates:
-        yield _predicate(predicate, monitor.course(trajectory, predicate), trajectory, clock)
+    if close:
+        for predicate in view.requirement.formula.predicates:
+            yield _predicate(view, monitor, predicate, trajectory)
 
 
-def details(view: View, evaluation: Evaluation) -> Iterator[str]:
-    """Lines on all signals and terms of the formula over time, densely sampled around the critical time."""
+def details(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator[str]:
+    """Lines on signals and terms of the formula over time.
+
+    Args:
+        view: the problem.
+        evaluation: a sample.
+        close: whether to tell all signals, and the deciding ones more exactly around the critical time;
+            otherwise only the terms that the formula compares.
+    """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     if verdict is None or trajectory is None:
         return
-    step = grid_step(view.space.stop_time)
-    grid = np.arange(0.0, view.space.stop_time * (1 + 1e-9), step)
-    columns = _shown_columns(view, trajectory)
-    yield f"values every {number(step)} s from t = 0:"
+    times = trajectory.times
+    steps = _input_steps(evaluation) if close else ()
+    compared = _compared(view, trajectory)
+    if not close:
+        compared = {name: column for name, column in compared.items() if name in _deciding(view, verdict)}
+    columns = _shown_columns(view, trajectory, compared) if close else compared
     for name, column in columns.items():
-        yield from _course(view, name, column, trajectory.times, grid, verdict.robustness)
-    yield from _burst(view, columns, trajectory.times, verdict)
+        if is_discrete(column, kind=view.kind(name)):
+            if name not in view.formula_outputs:  # facts() shows those
+                yield f"{name}: {change_list(times, column, clock=_clock(view))}"
+        else:
+            most = MOST_BREAKPOINTS if close and name in compared else _FEWER_BREAKPOINTS
+            kept = steps if name in compared else ()
+            yield f"{name}: {_drawn(view, name, column, times, kept, most)}"
+    if close:
+        yield from _close_up(view, compared, times, verdict)
+
+
+def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
+    there = []
+    for name, value in trajectory.at(diagnosis.critical_time).items():
+        decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
+        there.append(f"{name} = {plain(value, decimals)}{_unit(view, name)}")
+    return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
 
 
 def monitor_for(view: View) -> Monitor:
@@ -88,18 +127,6 @@ def monitor_for(view: View) -> Monitor:
 @lru_cache(maxsize=64)
 def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
     return Monitor(formula, step=step, samples=samples)
-
-
-def grid_step(stop_time: float) -> float:
-    """Round step in s that divides the simulated time into at most twenty parts.
-
-    >>> grid_step(50.0), grid_step(40.0), grid_step(0.3)
-    (2.5, 2.0, 0.02)
-    """
-    least = stop_time / (_GRID_VALUES - 1)
-    power = 10.0 ** floor(log10(least))
-    chosen = next(m for m in (1, 2, 2.5, 5, 10) if m * power >= least * (1 - 1e-9))
-    return float(f"{chosen * power:.3g}")
 
 
 def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
@@ -139,25 +166,29 @@ def _scale(view: View, part: Formula) -> str:
     return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
 
 
-def _predicate(predicate: Predicate, margin: Array, trajectory: Trajectory, clock: int) -> str:
-    times = trajectory.times[: len(margin)]
+def _predicate(view: View, monitor: Monitor, predicate: Predicate, trajectory: Trajectory) -> str:
+    """When a predicate was false, among the times at which the requirement asks for it."""
+    clock = _clock(view)
+    start, end = monitor.window(predicate)
+    first, last = round(start / trajectory.step), round(end / trajectory.step)
+    margin = monitor.course(trajectory, predicate)[first : last + 1]
+    times = trajectory.times[first : last + 1]
+    said = f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s"
     wrong = margin < 0
     stretch = longest_stretch(times, wrong)
     nearest = int(np.abs(margin).argmin())
     if stretch is None:
         near = int(margin.argmin())
-        return (
-            f"{predicate}: always true, smallest margin {_short(margin[near])} "
-            f"at {plain(float(times[near]), clock)} s"
-        )
+        at = plain(float(times[near]), clock)
+        return f"{said}: always true, smallest margin {_short(margin[near])} at {at} s"
     if wrong.all():
         return (
-            f"{predicate}: never true, closest at {plain(float(times[nearest]), clock)} s, "
+            f"{said}: never true, closest at {plain(float(times[nearest]), clock)} s, "
             f"off by {_short(-margin[nearest])}"
         )
     step = trajectory.step
     return (
-        f"{predicate}: false for {number(round(float(wrong.sum()) * step, 6))} s in total, longest from "
+        f"{said}: false for {number(round(float(wrong.sum()) * step, 6))} s in total, longest from "
         f"{plain(stretch[0], clock)} to {plain(stretch[1], clock)} s"
     )
 
@@ -166,77 +197,107 @@ def _short(margin: float) -> str:
     return f"{margin:.5g}"
 
 
-def _shown_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
-    """Signals of the formula, its terms, then other recorded signals; the LLM knows the searched inputs."""
+def _compared(view: View, trajectory: Trajectory) -> dict[str, Array]:
+    """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
     formula = view.requirement.formula
-    terms = {str(e): e.evaluate(trajectory.columns) for e in formula.expressions}
-    others = [n for n in view.experiment.outputs if n in trajectory.columns and n not in formula.signals]
-    columns = {n: trajectory[n] for n in view.formula_outputs} | {
-        text: np.broadcast_to(column, trajectory.times.shape) for text, column in terms.items()
+    sides = {str(side): side for p in formula.predicates for side in (p.left, p.right)}
+    columns = {
+        text: np.broadcast_to(side.evaluate(trajectory.columns), trajectory.times.shape)
+        for text, side in sides.items()
+        if set(side.signals) & set(view.formula_outputs)
     }
-    columns |= {n: trajectory[n] for n in others[: max(0, _MAX_SIGNALS - len(columns))]}
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
 
 
-def _course(
-    view: View, name: str, column: Array, times: Array, grid: Array, robustness: float
-) -> Iterator[str]:
-    clock = _clock(view)
-    if is_discrete(column, kind=view.kind(name)):
-        if name not in view.formula_outputs:  # facts() shows those
-            yield f"{name}: {change_list(times, column, clock=clock)}"
-        return
-    decimals = _decimals(view, column, name, robustness)
-    seen = extrema(times, column, decimals=decimals, clock=clock)
-    if seen.startswith("constant"):
-        yield f"{name}: {seen}"
-        return
-    usual = column_decimals(column)
-    yield f"{name}: {samples_at(times, column, grid.tolist(), decimals=usual)}; {seen}"
-    fast = oscillation(times, column, slower_than=float(grid[1] - grid[0]))
-    if fast is not None:
-        span = f"from {plain(fast.start, clock)} to {plain(fast.end, clock)} s"
-        yield (
-            f"{name} oscillates {span} with a period of about {fast.period:.2g} s and a peak-to-peak "
-            f"amplitude of about {fast.swing:.2g}; the values above are too far apart to show it"
+def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array]) -> dict[str, Array]:
+    """What is compared, then the recorded signals; of a problem without input signals, only integers.
+
+    Its parameters act at the start alone, so that the course of everything else decides nothing.
+    """
+    recorded = (*view.formula_outputs, *(n for n in view.experiment.outputs if n not in view.formula_outputs))
+    others = [n for n in recorded if n in trajectory.columns and n not in compared]
+    if not view.space.inputs:
+        others = [n for n in others if is_discrete(trajectory[n], kind=view.kind(n))]
+    columns = compared | {n: trajectory[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
+    return {text: column for text, column in columns.items() if np.isfinite(column).all()}
+
+
+def drawn_course(
+    view: View,
+    name: str,
+    column: Array,
+    times: Array,
+    steps: Sequence[float] = (),
+    most: int = MOST_BREAKPOINTS,
+) -> Course:
+    """What is told of a signal over the whole simulation."""
+    in_formula = name in view.requirement.formula.signals or name not in view.info
+    share = _TOLERANCE if in_formula else _TOLERANCE_OF_OTHERS
+    slowest = _SLOWEST_OSCILLATION * view.space.stop_time
+    tolerance = share * float(np.ptp(column))
+    return course(times, column, tolerance=tolerance, slower_than=slowest, kept=steps, most=most)
+
+
+def course_line(view: View, drawn: Course, column: Array) -> str:
+    """The text of such a course."""
+    decimals = decimals_for(_TOLERANCE * float(np.ptp(column)), 1)
+    return course_text(drawn, decimals=decimals, clock=coarse_clock(view.space.stop_time))
+
+
+def _drawn(view: View, name: str, column: Array, times: Array, steps: Sequence[float], most: int) -> str:
+    if np.ptp(column) == 0:
+        return f"constant {plain(float(column[0]), column_decimals(column))}"
+    return course_line(view, drawn_course(view, name, column, times, steps, most), column)
+
+
+def _close_up(view: View, compared: Mapping[str, Array], times: Array, verdict: Verdict) -> Iterator[str]:
+    """What the deciding predicate compares, more exactly around the critical time."""
+    for name, column in compared.items():
+        if name not in _deciding(view, verdict) or is_discrete(column, kind=view.kind(name)):
+            continue
+        reach = _CLOSE_SHARE / 2 * view.space.stop_time
+        swings = oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * view.space.stop_time)
+        around = [s for s in swings if s.start <= verdict.critical_time <= s.end]
+        if around:
+            reach = _CLOSE_PERIODS / 2 * around[0].period_at(verdict.critical_time)
+        inside = np.abs(times - verdict.critical_time) <= max(reach, 4 * view.experiment.output_interval)
+        part = column[inside]
+        if np.ptp(part) == 0:
+            continue
+        drawn = course(
+            times[inside],
+            part,
+            tolerance=_CLOSE_TOLERANCE * float(np.ptp(part)),
+            slower_than=0.0,
+            kept=(verdict.critical_time,),
         )
+        decimals = max(
+            _decimals(view, column, name, verdict.robustness),
+            decimals_for(_CLOSE_TOLERANCE * float(np.ptp(part)), 1),
+        )
+        shown = course_text(drawn, decimals=decimals, clock=_clock(view))
+        yield f"{name} around t = {plain(verdict.critical_time, _clock(view))} s: {shown}"
 
 
-def _burst(view: View, columns: Mapping[str, Array], times: Array, verdict: Verdict) -> Iterator[str]:
-    """Signals and terms of the deciding predicate, densely sampled around the critical time."""
-    shown = {
-        name: column
-        for name, column in columns.items()
-        if name in _deciding(view, verdict) and not is_discrete(column, kind=view.kind(name))
-    }
-    if not shown or all(np.ptp(column) == 0 for column in shown.values()):
-        return
-    interval = view.experiment.output_interval
-    step = max(1, round(_burst_step(view, shown, times) / interval)) * interval
-    usual_reach = max(view.space.stop_time * _BURST_SHARE, _BURST_STEPS * step) / 2
-    reach = min(usual_reach, _BURST_VALUES // 2 * step)
-    first = max(0, ceil((verdict.critical_time - reach) / step - 1e-9))
-    last = floor(min(view.space.stop_time, verdict.critical_time + reach) / step + 1e-9)
-    moments = [k * step for k in range(first, last + 1)]
-    yield f"values every {number(step, 6)} s from t = {number(moments[0], 6)} s:"
-    for name, column in shown.items():
-        decimals = _decimals(view, column, name, verdict.robustness)
-        yield f"{name}: {samples_at(times, column, moments, decimals=decimals)}"
-
-
-def _burst_step(view: View, columns: Mapping[str, Array], times: Array) -> float:
-    """Step in s: small enough for the fastest oscillation, otherwise the usual share of the burst."""
-    usual = view.space.stop_time * _BURST_SHARE / _BURST_STEPS
-    found = [oscillation(times, column, slower_than=4 * usual) for column in columns.values()]
-    return min([usual, *(fast.period / _VALUES_PER_PERIOD for fast in found if fast is not None)])
+def _input_steps(evaluation: Evaluation) -> tuple[float, ...]:
+    """Times at which inputs step, if they are few."""
+    found = sorted(
+        {
+            time
+            for signal in evaluation.candidate.signals.values()
+            if signal.interpolation == "constant"
+            for time, before, after in zip(signal.times[1:], signal.values, signal.values[1:], strict=False)
+            if before != after
+        }
+    )
+    return tuple(found) if len(found) <= _MOST_STEPS else ()
 
 
 def _deciding(view: View, verdict: Verdict) -> set[str]:
-    """Names of the signals and terms that the deciding predicate compares."""
+    """What the deciding predicate compares."""
     formula = view.requirement.formula
     deciding = [p for p in formula.predicates if str(p) == verdict.predicate] or list(formula.predicates)
-    sides = {str(side) for p in deciding for side in (p.left, p.right)}
-    return sides | {name for p in deciding for name in p.signals}
+    return {str(side) for p in deciding for side in (p.left, p.right)}
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from falsifier.core.words import counted
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.blocks import (
-    AdviceBlock,
-    HistoryBlock,
+    BudgetBlock,
     InputLine,
     InputsBlock,
     OutputsBlock,
@@ -25,7 +24,7 @@ def render(prompt: Prompt) -> tuple[Message, ...]:
     """Messages of a prompt: the constant part first, what changes last, so that providers can cache it."""
     return (
         Message(role="system", content="\n\n".join(_standing(prompt))),
-        Message(role="user", content="\n\n".join(_changing(prompt.history, prompt.task.count))),
+        Message(role="user", content="\n\n".join(_changing(prompt))),
     )
 
 
@@ -38,8 +37,8 @@ def _standing(prompt: Prompt) -> Iterator[str]:
     if prompt.outputs is not None:
         yield _outputs(prompt.outputs)
     yield _inputs(prompt.inputs)
-    if prompt.advice is not None:
-        yield _advice(prompt.advice)
+    if prompt.advice is not None and prompt.advice.lines:
+        yield "\n".join(prompt.advice.lines)
     yield _reply(prompt.reply, prompt.task.count)
 
 
@@ -51,9 +50,10 @@ def _task(task: TaskBlock) -> str:
             f"its value is negative, in as few simulations as possible. {sign}"
         )
     return (
-        "You search for a counterexample: a system is simulated with inputs that you choose, and a monitor "
-        "returns the robustness, the margin by which the requirement is met. Find inputs for which the "
-        f"requirement below is violated, in as few simulations as possible. {sign}"
+        f"You search for a counterexample: a system is simulated with {task.chosen} that you choose, and a "
+        "monitor returns the robustness, the margin by which the requirement is met. Find "
+        f"{task.chosen} for which the requirement below is violated, in as few simulations as possible. "
+        f"{sign}"
     )
 
 
@@ -77,12 +77,14 @@ def _outputs(block: OutputsBlock) -> str:
         return "Output signals: none; the requirement refers to inputs only."
     if not any(s.unit or s.description or s.kind != "real" for s in block.signals):
         return f"Output signals: {', '.join(s.name for s in block.signals)}"
-    return "\n".join(("Recorded signals:", *(_signal(s) for s in block.signals)))
+    legend = (block.legend,) if block.legend else ()
+    return "\n".join(("Recorded signals:", *(_signal(s) for s in block.signals), *legend))
 
 
 def _signal(line: SignalLine) -> str:
     kind = "" if line.kind == "real" else f", {line.kind}"
-    return f"- {line.name}{_bracketed(line.unit)}{kind}{_described(line.description)}"
+    start = f"; at t = 0: {line.start}" if line.start else ""
+    return f"- {line.name}{_bracketed(line.unit)}{kind}{_described(line.description)}{start}"
 
 
 def _inputs(block: InputsBlock) -> str:
@@ -101,12 +103,11 @@ def _inputs(block: InputsBlock) -> str:
 
 def _input(line: InputLine) -> str:
     one = line.control_points == 1
+    times = f"every {line.every} s from t = 0" if line.every else f"at t = {', '.join(line.times)} s"
     parts = [
         f"- input signal {line.name}{_bracketed(line.unit)}{_described(line.description)}",
         _values(line),
-        "one value for the whole time"
-        if one
-        else f"{line.control_points} control points at t = {', '.join(line.times)} s",
+        "one value for the whole time" if one else f"{line.control_points} control points {times}",
     ]
     if not one:
         parts.append(_INTERPOLATION[line.interpolation])
@@ -146,26 +147,23 @@ def _parameter(line: ParameterLine) -> str:
     )
 
 
-def _advice(block: AdviceBlock) -> str:
-    return "\n".join(block.lines)
-
-
 def _reply(block: ReplyBlock, count: int) -> str:
     many = f" with {count} different candidates" if count > 1 else ""
     return "\n".join(
         (
-            f"Reply with one JSON object{many} in this form, with your own values and one or two sentences "
-            "of rationale:",
+            f"Reply with one JSON object{many} in this form, with one or two sentences of rationale; the "
+            "numbers below only show the form, choose your own:",
             block.example,
             *block.notes,
         )
     )
 
 
-def _changing(block: HistoryBlock | None, count: int) -> Iterator[str]:
+def _changing(prompt: Prompt) -> Iterator[str]:
+    block, count = prompt.history, prompt.task.count
     wanted = f"{count} different samples" if count > 1 else "sample"
     if block is None:
-        yield f"Propose the first {wanted}."
+        yield f"{_first(prompt.budget)}Propose the first {wanted}."
         return
     if block.samples:
         shown = f", {len(block.samples)} of {len(block.samples) + block.omitted}" if block.omitted else ""
@@ -173,14 +171,34 @@ def _changing(block: HistoryBlock | None, count: int) -> Iterator[str]:
         yield from (_sample(s) for s in block.samples)
     yield from block.notes
     if block.pending:
-        yield "\n".join(("Already proposed, no result yet:", *block.pending))
-    yield f"Propose the next {wanted}. Do not repeat an earlier one."
+        yield "\n".join(
+            ("Proposed earlier but not simulated so far, so nothing is known of them:", *block.pending)
+        )
+    if prompt.advice is not None and prompt.advice.on_samples and block.samples:
+        yield "\n".join(prompt.advice.on_samples)
+    yield f"{_left(prompt.budget)}Propose the next {wanted}. Do not repeat an earlier one."
+
+
+def _first(budget: BudgetBlock | None) -> str:
+    if budget is None:
+        return ""
+    return f"Nothing has been simulated yet; {counted(budget.limit, 'simulation')} may be spent. "
+
+
+def _left(budget: BudgetBlock | None) -> str:
+    if budget is None:
+        return ""
+    return (
+        f"{budget.used} of {counted(budget.limit, 'simulation')} spent, {budget.limit - budget.used} left. "
+    )
 
 
 def _sample(sample: SampleLines) -> str:
     mark = f" ({sample.mark})" if sample.mark else ""
     lines = [f"Sample {sample.number}{mark}: {'; '.join(sample.inputs)}"]
     lines.append(f"  robustness {sample.robustness}" if sample.robustness else f"  {sample.failure}")
+    if sample.doubt:
+        lines.append(f"  {sample.doubt}")
     lines += [f"  {line}" for line in (*sample.facts, *sample.details)]
     return "\n".join(lines)
 

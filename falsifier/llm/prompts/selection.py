@@ -1,6 +1,7 @@
 """Which earlier samples a prompt shows: the most recent ones, plus the best and the most different."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,15 @@ from falsifier.llm.prompts.view import View
 
 RECENT = 10
 _BEST = 2
+# Latest samples of which more than one line is told.
+_PLAIN = 3
 _DIFFERENT = 2
 # Times at which input signals are compared; enough to notice a pulse of a twentieth of the stop time.
 _COMPARED_POINTS = 41
+
+
+# How much is told of a sample: everything, also around the critical time; what matters; one line.
+Depth = Literal["close", "plain", "summary"]
 
 
 def recent(evaluations: Sequence[Evaluation]) -> dict[int, str]:
@@ -25,7 +32,8 @@ def recent_best_and_different(view: View, evaluations: Sequence[Evaluation]) -> 
     """Indices of the samples to show, in order, mapped to a mark that says why an old one is shown."""
     chosen = dict.fromkeys(range(max(0, len(evaluations) - RECENT), len(evaluations)), "")
     judged = [(e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None]
-    for rank, (_, i) in enumerate(sorted(judged)[:_BEST]):
+    is_flat = len({value for value, _ in judged}) == 1
+    for rank, (_, i) in enumerate(sorted(judged)[: 0 if is_flat and len(judged) > 1 else _BEST]):
         chosen[i] = "best so far" if rank == 0 else "second best so far"
     others = [i for _, i in judged if i not in chosen]
     points = {i: _features(view, evaluations[i]) for i in (*chosen, *others)} if others else {}
@@ -36,6 +44,15 @@ def recent_best_and_different(view: View, evaluations: Sequence[Evaluation]) -> 
         chosen[farthest] = "shown because it differs most from the others"
         others.remove(farthest)
     return dict(sorted(chosen.items()))
+
+
+def depths(chosen: Iterable[int], evaluations: Sequence[Evaluation]) -> dict[int, Depth]:
+    """How much to tell of each chosen sample: most of the best and the latest one."""
+    judged = [i for i in chosen if evaluations[i].robustness is not None]
+    by_robustness = sorted(judged, key=lambda i: (evaluations[i].robustness, i))
+    close = {*by_robustness[:1], *judged[-1:]}
+    plain = {*by_robustness[1:2], *judged[-_PLAIN:]}
+    return {i: "close" if i in close else "plain" if i in plain else "summary" for i in judged}
 
 
 def _features(view: View, evaluation: Evaluation) -> NDArray[np.float64]:

@@ -5,15 +5,17 @@ from collections.abc import Callable
 from falsifier.errors import ChatError
 from falsifier.llm.prompts.blocks import HistoryBlock, Prompt, SampleLines
 from falsifier.llm.prompts.render import render
-from falsifier.llm.usage import estimate_tokens
+from falsifier.llm.tokens import count_tokens
 
 # Fits LLMs with a context of 32k tokens and leaves room for reasoning.
 DEFAULT_PROMPT_TOKENS = 16_000
+# What a prompt should need; the history gets at least as much as the rest, if the limit allows it.
+USUAL_PROMPT_TOKENS = 6_000
 
 _Change = Callable[[SampleLines], SampleLines | None]
 
 
-def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS) -> Prompt:
+def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS, llm: str = "") -> Prompt:
     """Return the prompt with as much of its history as fits.
 
     The details of old samples are removed first, then their facts, then the samples. The inputs and
@@ -21,28 +23,31 @@ def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS) -> Prompt:
 
     Args:
         prompt: the full prompt.
-        tokens: maximum number of tokens, by estimate.
+        tokens: maximum number of tokens.
+        llm: name of the LLM whose tokens are counted.
 
     Raises:
         ChatError: if it does not fit even without history.
     """
+    bare = size(prompt.model_copy(update={"history": None}), llm)
+    aim = min(tokens, max(USUAL_PROMPT_TOKENS, 2 * bare))
     for change, marked_too in _STAGES:
         position = 0
         while prompt.history is not None and position < len(prompt.history.samples):
-            if size(prompt) <= tokens:
+            if size(prompt, llm) <= aim:
                 return prompt
             prompt, position = _changed(prompt, prompt.history, position, change, marked_too=marked_too)
-    if size(prompt) > tokens:
+    if size(prompt, llm) > tokens:
         raise ChatError(
-            f"the prompt needs about {size(prompt)} tokens without any history, but the limit is {tokens}: "
+            f"the prompt needs {size(prompt, llm)} tokens without any history, but the limit is {tokens}: "
             "raise the limit (prompt_tokens), or choose a plainer prompt variant (--variant)"
         )
     return prompt
 
 
-def size(prompt: Prompt) -> int:
-    """Estimated tokens of a prompt."""
-    return sum(estimate_tokens(m.content) for m in render(prompt))
+def size(prompt: Prompt, llm: str = "") -> int:
+    """Tokens of a prompt."""
+    return sum(count_tokens(m.content, llm) for m in render(prompt))
 
 
 def _without_details(sample: SampleLines) -> SampleLines:

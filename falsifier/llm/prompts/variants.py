@@ -19,6 +19,7 @@ Part = Literal[
     "freedom",  # control points and interpolation may be chosen if the problem allows it
     "observations",  # per sample: all signals over time, what decided, robustness of the parts
     "selection",  # the best and most different samples in addition to the most recent ones
+    "circumstances",  # the budget and what is left of it, the outputs at time 0
     "failures",  # samples that could not be simulated, with the reason
 ]
 
@@ -47,7 +48,7 @@ def _variants() -> Mapping[str, Variant]:
     mp3: frozenset[Part] = mp2 | {"values", "advice"}
     mp4: frozenset[Part] = mp3 | {"critical"}
     more: frozenset[Part] = frozenset(
-        ("system", "reading", "freedom", "observations", "selection", "failures")
+        ("system", "reading", "freedom", "observations", "selection", "circumstances", "failures")
     )
     mp5 = (mp4 - {"values"}) | more
     parts = {"MP1": mp1, "MP2": mp2, "MP3": mp3, "MP4": mp4, "MP5": mp5}

@@ -42,6 +42,11 @@ class View:
         return self.info[name].kind if name in self.info else "real"
 
     @property
+    def chosen(self) -> str:
+        """What is chosen, in one word."""
+        return "inputs" if self.space.inputs else "parameters"
+
+    @property
     def formula_outputs(self) -> tuple[str, ...]:
         """Signals of the formula that are not searched inputs, in order of appearance."""
         return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)

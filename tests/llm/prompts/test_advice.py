@@ -7,13 +7,33 @@ from falsifier.testing import FREE, lag_problem
 
 def lines(variant: str, formula: str = "G[0,10] (x <= 0.9)", *, free: bool = False) -> list[str]:
     view = View.of(lag_problem(formula, free=FREE if free else None))
-    return list(advice(view, VARIANTS[variant]).lines)
+    found = advice(view, VARIANTS[variant])
+    return [*found.on_samples, *found.lines]
 
 
 def test_each_variant_adds_what_it_tells_something_of() -> None:
     counts = [len(lines(name)) for name in ("MP3", "MP4", "MP5")]
     assert counts == sorted(set(counts))
     assert lines("MP4")[: len(lines("MP3"))] == lines("MP3")
+
+
+def test_advice_on_samples_waits_for_the_first() -> None:
+    found = advice(View.of(lag_problem()), VARIANTS["MP5"])
+    assert "earlier samples" in found.on_samples[0]
+    assert not any("sample" in line for line in found.lines if "first samples" not in line)
+
+
+def test_any_conjunct_is_enough_where_there_are_some() -> None:
+    several = ("G[0,9] (x <= 0.9) and G[0,9] (x >= -0.9)", "G[0,9] (x <= 0.9 and x >= -0.9)")
+    one = ("G[0,9] (x <= 0.9)", "F[0,9] (x <= 0.9 and x >= -0.9)", "G[0,9] (x <= 0.9 or x >= 0.5)")
+    assert [any("any one of its conjuncts" in a for a in lines("MP5", f)) for f in several] == [True] * 2
+    assert [any("any one of its conjuncts" in a for a in lines("MP5", f)) for f in one] == [False] * 3
+    assert not any("conjunct" in a for a in lines("MP4", several[0]))
+
+
+def test_parameters_alone_get_no_advice_on_signals() -> None:
+    text = " ".join((*advice(View.of(load_problem("F16")), VARIANTS["MP5"]).lines,))
+    assert "switch" not in text and "input" not in text
 
 
 def test_advice_on_shapes_is_given_where_shapes_may_be_chosen() -> None:

@@ -7,8 +7,10 @@ import pytest
 
 from falsifier.core.space import Freedom, InputRange
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.prompts import VARIANTS, Prompt, View, build_prompt
+from falsifier.llm.prompts import VARIANTS, Prompt, View, build_prompt, render
 from falsifier.llm.prompts.blocks import SampleLines
+from falsifier.llm.prompts.context import Context
+from falsifier.llm.replies import ReplyForm
 from falsifier.testing import FREE, START, lag_problem
 
 PROBLEM = lag_problem(free=FREE, parameters=[START])
@@ -112,13 +114,17 @@ def test_a_flat_robustness_is_noted_once_there_are_two_samples() -> None:
 
 def test_the_example_reply_has_the_form_that_is_asked_for() -> None:
     point = json.loads(built("MP1").reply.example)
-    assert point["point"] == [0.0] * 5
+    assert len(set(point["point"])) == 5, "no number looks recommended"
+    PROBLEM.space.decode(point["point"])
     named = json.loads(built("MP4").reply.example)
-    assert named["signals"] == [{"name": "u", "values": [0.0] * 4}]
-    assert named["parameters"] == [{"name": "x0", "value": 0.0}]
+    assert named["signals"] == [{"name": "u", "values": [-0.74, 0.72, -0.16, 0.36]}]
+    assert [p["name"] for p in named["parameters"]] == ["x0"]
     free = json.loads(built("MP5", count=3).reply.example)
     (one,) = free["candidates"]
-    assert one["signals"] == [{"name": "u", "interpolation": "linear", "times": [], "values": [0.0] * 4}]
+    assert one["signals"] == [
+        {"name": "u", "interpolation": "constant", "times": [0.0, 2.4, 6.2], "values": [-0.74, 0.72, -0.16]}
+    ]
+    ReplyForm(PROBLEM.space, free=True).read(json.dumps(one))
     assert built("MP5").reply.notes
     fixed = build_prompt(View.of(replace(PROBLEM, space=PROBLEM.space.fixed)), VARIANTS["MP5"], [])
     assert fixed.reply.notes == ()
@@ -129,3 +135,32 @@ def test_freedom_is_told_as_far_as_it_goes() -> None:
     problem = lag_problem(free=Freedom(7, 0.5))
     (u,) = build_prompt(View.of(problem), VARIANTS["MP5"], []).inputs.inputs
     assert (u.max_control_points, u.min_interval) == (7, 0.5)
+
+
+def test_start_budget_and_doubts_are_told_by_mp5() -> None:
+    sample = evaluate(PROBLEM, PROBLEM.space.decode([0.5] * 4 + [0.25]))
+    context = Context(30, {"x": (0.0, 0.0)}, {sample.candidate.key: "does not count"})
+    prompt = build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [sample], context=context)
+    assert prompt.outputs is not None and prompt.history is not None
+    assert [signal.start for signal in prompt.outputs.signals] == ["0"]
+    assert prompt.history.samples[0].doubt == "does not count"
+    _, changing = render(prompt)
+    assert "1 of 30 simulations spent, 29 left." in changing.content
+    _, first = render(build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [], context=context))
+    assert first.content == (
+        "Nothing has been simulated yet; 30 simulations may be spent. Propose the first sample."
+    )
+    depends = replace(context, start={"x": (-0.5, 0.5)})
+    outputs = build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [], context=depends).outputs
+    assert outputs is not None
+    assert outputs.signals[0].start == "-0.5 to 0.5, depending on what you choose"
+
+
+def test_the_published_variants_tell_neither_start_nor_budget_but_what_does_not_count() -> None:
+    sample = evaluate(PROBLEM, PROBLEM.space.decode([0.5] * 4 + [0.25]))
+    context = Context(30, {"x": (0.0, 0.0)}, {sample.candidate.key: "does not count"})
+    for name in ("MP1", "MP2", "MP3", "MP4"):
+        prompt = build_prompt(View.of(PROBLEM), VARIANTS[name], [sample], context=context)
+        text = "\n".join(m.content for m in render(prompt))
+        assert "30 simulations" not in text and "at t = 0:" not in text
+        assert "does not count" in text

@@ -6,15 +6,15 @@ from numpy.typing import NDArray
 
 from falsifier.llm.prompts.courses import (
     change_list,
+    coarse_clock,
     column_decimals,
+    course_text,
     dwell_list,
-    extrema,
     is_discrete,
     longest_stretch,
-    oscillation,
     pieces,
-    samples_at,
 )
+from falsifier.llm.prompts.shapes import Course, Phase, Swing
 
 TIMES = np.linspace(0.0, 10.0, 1001)
 
@@ -63,32 +63,20 @@ def test_pieces_cover_everything() -> None:
     assert all(a.end == b.start for a, b in pairwise(found))
 
 
-def test_extrema() -> None:
-    column = np.sin(TIMES)
-    assert extrema(TIMES, column, decimals=3, clock=2) == "min -1 at 4.71 s, max 1 at 1.57 s"
-    assert extrema(TIMES, 0 * column + 30, decimals=3, clock=2) == "constant 30"
-
-
 def test_longest_stretch() -> None:
     assert longest_stretch(TIMES, GEAR == 2) == pytest.approx((1.6, 4.35))
     assert longest_stretch(TIMES, GEAR == 7) is None
     assert longest_stretch(TIMES, GEAR > 0) == (0, 10)
 
 
-def test_a_fast_oscillation_is_found_where_it_is() -> None:
-    column = np.where((TIMES > 3) & (TIMES < 6), 2 * np.sin(2 * np.pi * 5 * TIMES), 0.0) + TIMES
-    found = oscillation(TIMES, column, slower_than=0.5)
-    assert found is not None
-    assert found.period == pytest.approx(0.2, rel=0.05)
-    assert found.start == pytest.approx(3.0, abs=0.2)
-    assert found.end == pytest.approx(6.0, abs=0.2)
-    assert found.swing == pytest.approx(4.0, rel=0.05)
-
-
-def test_slow_signals_and_ripple_do_not_oscillate() -> None:
-    slow = np.sin(2 * np.pi * TIMES / 5)
-    assert oscillation(TIMES, slow, slower_than=0.5) is None
-    assert oscillation(TIMES, 100 * TIMES + 0.1 * np.sin(60 * TIMES), slower_than=0.5) is None
+def test_a_course_is_told_by_its_breakpoints_and_oscillations() -> None:
+    flat = Course((((0.0, 1.0), (0.04, 1.0), (2.5, 3.04)),), (), 0.1)
+    assert course_text(flat, decimals=1, clock=1) == "0:1 2.5:3", "what reads the same is told once"
+    swing = Swing(3.0, 6.0, (Phase(3.0, 0.2), Phase(5.0, 0.4)), ((3.0, -1.0),), ((6.0, 1.0),))
+    drawn = Course((((0.0, 0.0), (3.0, 0.0)),), (swing,), 0.1)
+    assert course_text(drawn, decimals=0, clock=0) == (
+        "0:0 3:0; oscillates from 3 to 6 s with period 0.2 s, 0.4 s from 5 s, between 3:-1 and 6:1"
+    )
 
 
 def test_discrete_by_type_or_by_values() -> None:
@@ -104,4 +92,7 @@ def test_digits_follow_the_margin() -> None:
     assert column_decimals(pressure) == 2
     assert column_decimals(pressure, margin=0.037) == 4
     assert column_decimals(pressure, margin=1e-30) <= 8
-    assert samples_at(np.array([0.0, 1.0, 2.0]), pressure, [1.1], decimals=3) == "87.463"
+
+
+def test_times_of_a_course_show_a_hundredth_of_the_simulation() -> None:
+    assert [coarse_clock(stop) for stop in (1000.0, 50.0, 3.0, 0.3)] == [0, 1, 2, 3]

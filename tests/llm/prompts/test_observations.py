@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
+from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.prompts.observations import details, facts, grid_step, monitor_for
+from falsifier.llm.prompts.observations import details, facts, monitor_for, summary
 from falsifier.llm.prompts.view import View
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
-from falsifier.testing import Array, lag_problem
+from falsifier.testing import START, Array, lag_problem
 
 TIMES = lag_problem().experiment.times
 
@@ -49,7 +50,7 @@ def test_it_is_told_why_and_what_all_signals_were_then() -> None:
     ],
 )
 def test_of_a_predicate_it_is_told_when_it_was_false(limit: float, parts: list[str]) -> None:
-    told = line(list(facts(*seen(f"G[0,10] (x <= {limit:g})", TIMES.copy()))), f"x <= {limit:g}: ")
+    told = line(list(facts(*seen(f"G[0,10] (x <= {limit:g})", TIMES.copy()))), f"x <= {limit:g}, ")
     assert all(part in told for part in parts), told
 
 
@@ -69,13 +70,54 @@ def test_signals_of_few_whole_numbers_are_told_by_their_changes() -> None:
     assert not [each for each in details(view, evaluation) if each.startswith("x")]
 
 
-def test_details_are_values_on_a_grid_and_densely_where_it_was_decided() -> None:
+def test_details_are_breakpoints_and_more_exact_ones_where_it_was_decided() -> None:
     view, evaluation = seen("G[0,10] (x <= 2)", np.sin(TIMES / 2))
-    lines = list(details(view, evaluation))
-    coarse, dense = [i for i, each in enumerate(lines) if each.startswith("values every")]
-    assert "0.5 s from t = 0:" in lines[coarse]
-    assert lines[coarse + 1].count(",") >= 20
-    assert "values every 0.1 s from t = 2.1 s:" in lines[dense], "around pi s"
+    over_time, around = details(view, evaluation)
+    assert over_time.startswith("x: 0:0 ") and over_time.endswith(" 10:-0.96")
+    assert around.startswith("x around t = 3.1 s: 2.7:0.9757 ") and " 3.1:0.9998 " in around
+    (short,) = details(view, evaluation, close=False)
+    assert short.startswith("x: 0:0 ") and len(short) <= len(over_time)
+
+
+def test_an_oscillation_is_told_by_its_envelopes_and_periods_around_the_critical_time() -> None:
+    view, evaluation = seen("G[0,10] (x <= 2)", TIMES / 20 + np.sin(2 * np.pi * TIMES / 0.4))
+    over_time, around = details(view, evaluation)
+    assert (
+        "oscillates from 0.1 to 9.9 s with period 0.4 s, between 0.3:-0.98 9.9:-0.51 and 0.1:1 9.7:1.49"
+        in over_time
+    )
+    assert around.count(":") < 20
+
+
+def test_a_predicate_is_judged_only_when_the_requirement_asks_for_it() -> None:
+    view, evaluation = seen("G[2,5] (x <= 6)", TIMES.copy())
+    told = line(list(facts(view, evaluation)), "x <= 6")
+    assert told == "x <= 6, from 2 to 5 s: always true, smallest margin 1 at 5 s"
+
+
+def test_outputs_have_a_breakpoint_where_an_input_steps() -> None:
+    view, evaluation = seen("G[0,10] (x <= 20)", TIMES.copy())
+    stepping = Candidate({"u": Signal((0.0, 4.2, 7.0), (0.0, 1.0, 1.0), "constant")})
+    over_time = line(list(details(view, replace(evaluation, candidate=stepping))), "x: ")
+    assert over_time == "x: 0:0 4.2:4.2 10:10"
+
+
+def test_a_summary_is_one_line() -> None:
+    _, evaluation = seen("G[0,10] (x <= 2)", TIMES.copy())
+    assert list(summary(evaluation)) == ["decided at t = 10 s by x <= 2"]
+
+
+def test_parameters_alone_get_the_compared_signals_and_modes() -> None:
+    view, evaluation = seen("G[0,10] (x <= 2)", np.sin(TIMES / 2))
+    assert evaluation.trajectory is not None
+    more = {"w": np.cos(TIMES), "mode": np.where(TIMES < 5, 1.0, 2.0)}
+    evaluation = replace(evaluation, trajectory=evaluation.trajectory.with_columns(more, {}))
+    experiment = replace(view.experiment, outputs=("x", "w", "mode"))
+    alone = replace(view, experiment=experiment, space=SearchSpace((), (START,), 10.0))
+    told = {each.split(":")[0] for each in details(alone, evaluation)}
+    assert told == {"x", "mode", "x around t = 3.1 s"}
+    told = {each.split(":")[0] for each in details(replace(view, experiment=experiment), evaluation)}
+    assert "w" in told
 
 
 def test_without_a_trajectory_there_is_the_verdict_alone() -> None:
@@ -102,14 +144,6 @@ def test_no_more_signals_than_can_be_read() -> None:
         experiment=replace(problem.experiment, outputs=names),
     )
     lines = list(details(View.of(problem), evaluate(problem, problem.space.decode([0.0] * 4))))
-    told = {each.split(":")[0] for each in lines if each.startswith("y")}
+    told = {each.split(":")[0].split()[0] for each in lines if each.startswith("y")}
     assert len(told) == 16
     assert "y7" in told, "those of the formula come first"
-
-
-@pytest.mark.parametrize(
-    ("stop", "step"), [(50.0, 2.5), (40.0, 2.0), (0.3, 0.02), (1.0, 0.05), (1000.0, 50.0)]
-)
-def test_the_grid_has_a_round_step_and_at_most_twenty_parts(stop: float, step: float) -> None:
-    assert grid_step(stop) == step
-    assert stop / grid_step(stop) <= 20

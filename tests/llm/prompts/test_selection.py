@@ -3,7 +3,7 @@ from dataclasses import replace
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.prompts.selection import RECENT, recent, recent_best_and_different
+from falsifier.llm.prompts.selection import RECENT, depths, recent, recent_best_and_different
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Verdict
 from falsifier.testing import START, lag_problem
@@ -55,3 +55,16 @@ def test_two_old_ones_that_differ_most_are_kept_by_input_or_parameter() -> None:
 def test_a_failed_old_one_is_never_kept() -> None:
     samples = [sample(-1.0, None), *(replace(sample(0.0, 1.0)) for _ in range(RECENT))]
     assert 0 not in recent_best_and_different(VIEW, samples)
+
+
+def test_equal_samples_are_neither_best_nor_second_best() -> None:
+    flat = [sample(0.1 * i, 0.5) for i in range(3)]
+    assert set(recent_best_and_different(VIEW, flat).values()) == {""}
+
+
+def test_most_is_told_of_the_best_and_the_latest_sample() -> None:
+    samples = [sample(0.0, r) for r in (0.3, 0.1, 0.2, 0.9, 0.8, 0.7, 0.6)]
+    assert depths(range(7), samples) == {
+        0: "summary", 1: "close", 2: "plain", 3: "summary", 4: "plain", 5: "plain", 6: "close"
+    }  # fmt: skip
+    assert depths([0], [sample(0.0, None)]) == {}
