@@ -1,6 +1,7 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
 import shlex
+import sys
 import time
 from dataclasses import replace
 from datetime import datetime
@@ -22,6 +23,7 @@ from falsifier.campaigns import (
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
+from falsifier.campaigns.ceiling import ceiling
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.plan import as_searched
 from falsifier.campaigns.runner import check_request
@@ -54,6 +56,7 @@ from falsifier.core.words import counted
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search.leaders import price_of
 from falsifier.search.request import Effort, LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
 from falsifier.views.terminal import warn
@@ -113,6 +116,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     "--table", type=click.Choice(list(TABLES)), default="main", show_default=True, help="Table to print."
 )
 @out_option("Campaign directory; default: runs/bench-TIME.", metavar="DIR")
+@click.option("--yes", is_flag=True, help="Do not ask whether to pay for language models.")
 @quiet_option
 @json_option
 def bench(
@@ -141,6 +145,7 @@ def bench(
     executor: str | None,
     table: str,
     out: Path | None,
+    yes: bool,
     quiet: bool,
     as_json: bool,
     **options: Any,
@@ -157,7 +162,8 @@ def bench(
     if not parameterization:
         parameterization = (PROTOCOL_PARAMETERIZATION if suite_name else DEFAULT_PARAMETERIZATION,)
     if budget is None:
-        budget = PROTOCOL_SIMULATIONS if suite_name else DEFAULT_SIMULATIONS
+        # The competition's 1500 simulations may be 1500 paid questions.
+        budget = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
     methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)
@@ -180,6 +186,7 @@ def bench(
         allowed = ", if the spec allows it" if method.parameterization == "free" else ""
         name = replace(method, parameterization="fixed").label
         warn(f"{name}: {method.parameterization} parameterization{allowed}")
+    _agree(request, yes=yes)
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
@@ -237,6 +244,16 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
         warn(f"{counted(failed, 'run')} failed; to retry: {again}")
     text = data if as_json else TABLES[table](runs, published).text()
     conclude(text, 3 if failed or outcome.reason else 0, nl=not as_json)
+
+
+def _agree(request: CampaignRequest, *, yes: bool) -> None:
+    """Say what language models can cost at most; ask on a terminal."""
+    most = ceiling(request, price_of)
+    if most is None:
+        return
+    warn(most.text)
+    if not yes and most.cost != 0 and sys.stdin.isatty():
+        click.confirm("Start?", abort=True, err=True)
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:

@@ -21,8 +21,8 @@ from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search.budget import DEFAULT_SIMULATIONS
 from falsifier.search.request import Effort, LLMSettings
 
-# What a price is, in errors; $0.25 and $2 per million tokens, as providers state prices.
-_PRICE = "expected SENT:RECEIVED in US dollars per 1000 tokens sent and received, for example 0.00025:0.002"
+# What a price is, in errors; as providers state prices.
+_PRICE = "expected SENT:RECEIVED in US dollars per million tokens sent and received, for example 0.25:2"
 
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
@@ -176,7 +176,7 @@ def asking_options(command: Function) -> Function:
         click.option(
             "--price",
             metavar="SENT:RECEIVED",
-            help="US dollars per 1000 tokens sent and received, if the price is not known.",
+            help="US dollars per million tokens sent and received, if the price is not known.",
         ),
         click.option(
             "--timeout",

@@ -67,7 +67,7 @@ def listed_price(llm: str) -> Price | None:
     prompt, completion = info.get("input_cost_per_token"), info.get("output_cost_per_token")
     if prompt is None or completion is None or (not prompt and not completion and not known(llm).local):
         return None
-    return Price(1000 * prompt, 1000 * completion)
+    return Price(1e6 * prompt, 1e6 * completion)
 
 
 def may_take_tools(llm: str, *, api_base: str | None = None) -> bool:

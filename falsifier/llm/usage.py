@@ -18,8 +18,8 @@ class Price:
     """What an LLM costs.
 
     Attributes:
-        prompt: US dollars per 1000 tokens sent.
-        completion: US dollars per 1000 tokens received.
+        prompt: US dollars per million tokens sent.
+        completion: US dollars per million tokens received.
 
     Raises:
         SpecError: if a price is negative, infinite or not a number: a limit on the cost would not hold.
@@ -33,15 +33,15 @@ class Price:
             if not (isfinite(price) and price >= 0):
                 raise SpecError(
                     "the price of a language model must be two finite, non-negative numbers, US dollars "
-                    f"per 1000 tokens sent and received; got {self.prompt:g} and {self.completion:g}"
+                    f"per million tokens sent and received; got {self.prompt:g} and {self.completion:g}"
                 )
 
     def cost(self, prompt_tokens: int, completion_tokens: int) -> float:
         """US dollars of one request."""
-        return (self.prompt * prompt_tokens + self.completion * completion_tokens) / 1000
+        return (self.prompt * prompt_tokens + self.completion * completion_tokens) / 1e6
 
     def __str__(self) -> str:
-        return f"{self.prompt:.4g} US dollars per 1000 tokens sent, {self.completion:.4g} received"
+        return f"{self.prompt:.4g} US dollars per million tokens sent, {self.completion:.4g} received"
 
 
 def usage_of(

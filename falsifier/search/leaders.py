@@ -14,6 +14,7 @@ from falsifier.search.request import LLMSettings, RunRequest
 
 if TYPE_CHECKING:
     from falsifier.llm.retry import Gate
+    from falsifier.llm.usage import Price
 
 # Engines that ask a language model.
 _LLM_ENGINES = ("llm", "hybrid")
@@ -80,12 +81,11 @@ def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
     from falsifier.llm.cache import default_cache_directory
     from falsifier.llm.client import DEFAULT_TIMEOUT
     from falsifier.llm.connect import connect, preflight
-    from falsifier.llm.litellm_import import listed_price
     from falsifier.llm.usage import Price
 
     preflight(llm.name, api_base=llm.api_base)
     price = Price(*llm.price) if llm.price else None
-    if request.budget.cost is not None and (price or listed_price(llm.name)) is None:
+    if request.budget.cost is not None and price_of(llm) is None:
         raise SpecError(
             f"the price of {llm.name} is unknown, so --max-cost cannot be enforced: add "
             "--price SENT:RECEIVED, or use --max-tokens instead"
@@ -100,6 +100,14 @@ def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
         gate=_gate(llm.name, llm.api_base),
         cache=default_cache_directory() if llm.cache else None,
     )
+
+
+def price_of(llm: LLMSettings) -> "Price | None":
+    """Return what a language model costs: as stated, otherwise as listed; None if unknown."""
+    from falsifier.llm.litellm_import import listed_price
+    from falsifier.llm.usage import Price
+
+    return Price(*llm.price) if llm.price else listed_price(llm.name)
 
 
 def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, chat: Chat) -> Engine:

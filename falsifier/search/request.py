@@ -31,7 +31,7 @@ class LLMSettings(_Strict):
     options: dict[str, str | float] = Field(default_factory=dict, description="Passed to litellm unchanged.")
     price: tuple[_Price, _Price] | None = Field(
         default=None,
-        description="US dollars per 1000 tokens sent, and per 1000 received; default: litellm's table.",
+        description="US dollars per million tokens sent, and per million received; default: litellm's table.",
     )
     timeout: float | None = Field(
         default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."

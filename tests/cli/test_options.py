@@ -39,8 +39,8 @@ def test_quiet_silences_what_simulates_until_the_command_ends() -> None:
         ),
         (
             ["--llm", "nobody/x", "--price", "2"],
-            "--price 2: expected SENT:RECEIVED in US dollars per 1000 tokens sent and received, for example "
-            "0.00025:0.002",
+            "--price 2: expected SENT:RECEIVED in US dollars per million tokens sent and received, for "
+            "example 0.25:2",
         ),
     ],
 )

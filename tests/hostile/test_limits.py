@@ -94,7 +94,7 @@ def test_a_count_that_cannot_be_true_is_estimated(count: Any) -> None:
     )
     sent, received = sum(count_tokens(m.content) for m in REQUEST.messages), count_tokens("x" * 40)
     assert (usage.prompt_tokens, usage.completion_tokens, usage.estimated) == (sent, received, True)
-    assert usage.cost == pytest.approx((sent + received) / 1000)
+    assert usage.cost == pytest.approx((sent + received) / 1e6)
     assert sent > 0 and received > 0
 
 
@@ -102,7 +102,7 @@ def run(behaviour: Behaviour, **budget: Any) -> tuple[Result, int]:
     """Outcome of a run and the number of requests that it made."""
     problem = lag_problem()
     with misbehaving(behaviour) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url, price=Price(1.0, 1.0))
+        chat = LiteLLMChat("openai/m", api_base=server.url, price=Price(1000.0, 1000.0))
         result = falsify(problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(**budget))
         return result, len(server.requests)
 

@@ -199,7 +199,7 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     assert foreign.usage.cost is None
     assert hosted.usage.cost is None
     assert local.usage.cost == 0
-    assert priced.usage.cost == pytest.approx(0.1 * 0.25 + 0.02 * 2.0)
+    assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
 def test_reasoning_tokens_and_text_are_kept() -> None:

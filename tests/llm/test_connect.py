@@ -72,7 +72,7 @@ def test_check_of_a_model() -> None:
         price = Price(prompt=1.0, completion=2.0)
         found = check_llm("openai/mine", api_base=server.url, price=price)
         assert found.price == price
-        assert found.usage.cost == pytest.approx(0.14)
+        assert found.usage.cost == pytest.approx((100 * 1.0 + 20 * 2.0) / 1e6)
 
 
 def test_check_of_a_model_with_a_wrong_key(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,7 +26,7 @@ def test_counts_and_cost_are_the_providers() -> None:
 
 
 def test_a_price_of_ones_own_goes_before_what_is_reported() -> None:
-    assert usage(COUNTED, price=PRICE, reported=0.5).cost == pytest.approx(0.1 * 0.25 + 0.02 * 2.0)
+    assert usage(COUNTED, price=PRICE, reported=0.5).cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
 def test_an_unknown_price_is_none_and_never_zero() -> None:

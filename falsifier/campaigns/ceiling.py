@@ -1,0 +1,71 @@
+"""What a campaign can cost at most, said before it starts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+
+from falsifier.campaigns.plan import CampaignRequest
+from falsifier.core.words import counted
+from falsifier.llm.conversation import MAX_REASKS
+from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS
+from falsifier.llm.usage import Price
+from falsifier.search.request import LLMSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """Upper limits of what is asked of language models.
+
+    Attributes:
+        questions: number of questions: one per simulation, and those after replies that are not valid.
+        cost: US dollars for what is sent, prompts at their longest; None if a price is unknown.
+        limit: US dollars to which the campaign's own limits hold the cost of everything; inf without any.
+    """
+
+    questions: int
+    cost: float | None
+    limit: float
+
+    @property
+    def text(self) -> str:
+        """The limits in a sentence."""
+        asked = f"at most {counted(self.questions, 'question')} to language models"
+        if self.limit < inf:
+            return f"{asked}; the cost is limited to {self.limit:.4g} US dollars"
+        if self.cost is None:
+            return f"{asked}; the price is unknown (--price), so the cost is too: --total-tokens limits it"
+        if not self.cost:
+            return f"{asked}, free of charge"
+        return (
+            f"{asked}, which cost at most {self.cost:.4g} US dollars to send; replies cost extra, and "
+            "--total-cost limits all of it"
+        )
+
+
+def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | None]) -> Ceiling | None:
+    """Return what a campaign can cost at most; None if it asks no language model.
+
+    Runs without a limit on simulations are not counted.
+
+    Args:
+        request: the campaign.
+        price_of: returns the price of a language model, None if it is unknown.
+    """
+    asking = [(run.llm, run.budget) for run in request.runs if run.llm is not None]
+    if not asking:
+        return None
+    prices = {_server(llm): price_of(llm) for llm, _ in reversed(asking)}
+    total = request.limits.cost if request.limits is not None else None
+    questions, cost, limit = 0, 0.0, 0.0
+    for llm, budget in asking:
+        own = (budget.simulations or 0) * (1 + MAX_REASKS)
+        price = prices[_server(llm)]
+        questions += own
+        cost += inf if price is None else price.cost(own * DEFAULT_PROMPT_TOKENS, 0)
+        limit += inf if budget.cost is None else budget.cost
+    return Ceiling(questions, None if cost == inf else cost, min(limit, inf if total is None else total))
+
+
+def _server(llm: LLMSettings) -> tuple[object, ...]:
+    """What the price of a language model depends on."""
+    return llm.name, llm.api_base, llm.price
