@@ -80,6 +80,7 @@ def prompt(
     records = read_journal(directory) if directory else []
     evaluations = recorded_evaluations(directory, records) if directory else {}
     told = list(evaluations.values())[:samples]
+    limit = _limit(directory)
     settings = HybridSettings()
     count = 1 if engine == "llm" else settings.count if told else settings.opening
     messages = preview(
@@ -88,7 +89,7 @@ def prompt(
         evaluations=told,
         count=count,
         anonymous=anonymous,
-        simulations=_limit(directory),
+        simulations=limit if limit is None or len(told) < limit else None,
         doubtful=doubtful_confirmations(problem, records, evaluations),
     )
     tools: tuple[Tool, ...] = ()

@@ -8,6 +8,7 @@ import logging
 import math
 from collections.abc import Callable
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from typing import Any, get_args
 
@@ -213,6 +214,8 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
         click.UsageError: if a value is invalid, or one is given although no language model is named.
     """
     given = {key: options.pop(key) for key in ("api_base", "timeout", "fallback", "anonymous")}
+    if given["timeout"] is not None and not isfinite(given["timeout"]):
+        raise click.UsageError(f"--timeout {given['timeout']}: expected a number of seconds")
     price, pairs = options.pop("price"), options.pop("llm_options")
     cache = not options.pop("no_cache")
     if not named:

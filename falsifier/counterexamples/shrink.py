@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import inf
 
-from falsifier.core.arguments import instance
+from falsifier.core.arguments import finite, instance, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import InputRange
@@ -71,9 +71,12 @@ def shrink(
         progress: called with each simpler counterexample and the number of simulations so far.
 
     Raises:
-        SpecError: if the evaluation does not violate by that margin.
+        SpecError: if the evaluation does not violate by that margin, or a number is out of range.
     """
     instance("shrink", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
+    if margin is not None and finite("margin", margin) < 0:
+        raise SpecError(f"margin: expected a number that is not negative, got {margin!r}")
+    budget = whole("budget", budget, least=1)
     hunt = _Hunt(problem, budget, margin or 0.0, demands_violation=True)
     start = hunt.kept(problem.space.admit(evaluation.candidate))
     if start is None or start.robustness is None:
@@ -108,7 +111,8 @@ def shrink_miss(
     Raises:
         SpecError: if the simulation fails or violates, or ``within`` is negative.
     """
-    if within is not None and not within >= 0:
+    budget = whole("budget", budget, least=1)
+    if within is not None and finite("within", within) < 0:
         raise SpecError(f"within: expected a number that is not negative, got {within!r}")
     hunt = _Hunt(problem, budget, -inf)
     start = hunt.kept(problem.space.admit(evaluation.candidate))

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 from math import ceil, floor
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
+from falsifier.errors import SpecError
 from falsifier.search import manifest
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
 from falsifier.search.manifest import InputRecord, Manifest
@@ -178,7 +180,7 @@ class Coverage:
     modes: tuple[ModeCoverage, ...]
 
 
-def coverage(directory: Path | str) -> Coverage:
+def coverage(directory: str | PathLike[str]) -> Coverage:
     """Say which part of the search space a recorded run has tried, and what the system did.
 
     Args:
@@ -186,7 +188,13 @@ def coverage(directory: Path | str) -> Coverage:
 
     Raises:
         JournalError: if it is no run directory, or its record is damaged.
+        SpecError: if it is not a path.
     """
+    if not isinstance(directory, str | PathLike):
+        raise SpecError(
+            f"coverage: expected a run directory, got {directory!r}; "
+            "falsify(..., directory=...) records a run"
+        )
     place = Path(directory)
     described, records = manifest.read(place), read_journal(place)
     candidates = recorded_candidates(records)

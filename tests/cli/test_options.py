@@ -37,6 +37,7 @@ def test_quiet_silences_what_simulates_until_the_command_ends() -> None:
             ["--max-tokens", "10", "--max-cost", "1"],
             "--max-tokens, --max-cost: applies to language models only",
         ),
+        (["--llm", "nobody/x", "--timeout", "nan"], "--timeout nan: expected a number of seconds"),
         (
             ["--llm", "nobody/x", "--price", "2"],
             "--price 2: expected SENT:RECEIVED in US dollars per million tokens sent and received, for "

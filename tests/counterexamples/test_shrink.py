@@ -199,3 +199,15 @@ def test_a_near_miss_may_become_a_violation() -> None:
         shrink_miss(problem, found.evaluation)
     with pytest.raises(SpecError, match="within"):
         shrink_miss(problem, start, within=-1.0)
+
+
+@pytest.mark.parametrize("wrong", [{"budget": 0}, {"budget": -3}, {"margin": float("nan")}, {"margin": -1.0}])
+def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
+    problem = lag_problem()
+    violating = evaluate(problem, problem.space.decode([1.0] * 4))
+    (name,) = wrong
+    with pytest.raises(SpecError, match=f"{name}: expected"):
+        shrink(problem, violating, **wrong)  # type: ignore[arg-type]
+    if name == "budget":
+        with pytest.raises(SpecError, match="budget: expected"):
+            shrink_miss(problem, evaluate(problem, problem.space.decode([0.0] * 4)), **wrong)  # type: ignore[arg-type]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
+from falsifier.errors import SpecError
 from falsifier.search.coverage import Coverage, coverage_of
 from falsifier.search.manifest import InputRecord, Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest
@@ -109,3 +110,8 @@ def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> N
     assert found.ranges[0].low == pytest.approx(min(values))
     assert found.ranges[0].high == pytest.approx(max(values))
     assert [o.name for o in found.outputs] == ["x"]
+
+
+def test_what_is_no_path_is_refused() -> None:
+    with pytest.raises(SpecError, match="coverage: expected a run directory, got None"):
+        coverage(None)  # type: ignore[arg-type]

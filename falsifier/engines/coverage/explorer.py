@@ -83,6 +83,8 @@ class Explorer:
 
     def propose(self, rng: np.random.Generator) -> Idea:
         """Return the next input: one that reached a rare mark, continued differently after it."""
+        if not self._programs.has_inputs:
+            return Idea(self._programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
         mark = self._choose(rng)
         if mark is None:
             return Idea(
@@ -122,7 +124,7 @@ def describe(mark: Mark) -> str:
     """Return a mark in words, as the object of "made"."""
     source, what = mark
     if source == MODES:
-        return f"the modes {', '.join(f'{value:g}' for value in what)}"
+        return " and ".join(map(str, what))
     match what:
         case ("is", value):
             return f"{source} = {value:g}"

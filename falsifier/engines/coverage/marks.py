@@ -90,7 +90,9 @@ class Marker:
     def marks(self, trajectory: Trajectory) -> dict[Mark, float]:
         """Return the marks of a trajectory and the time in s at which each was reached first."""
         discrete = {n: c for n, c in self._columns(trajectory) if is_discrete(self.info, n, c)}
-        margins = {str(p): _margin(p, trajectory) for p in self.predicates if not _only(p, discrete)}
+        margins = {
+            f"{p.left} > {p.right}": _margin(p, trajectory) for p in self.predicates if not _only(p, discrete)
+        }
         truths = {name: (margin > 0).astype(np.float64) for name, margin in margins.items()}
         found = [
             *(mark for name, column in discrete.items() for mark in _values(name, column)),
@@ -140,13 +142,14 @@ def _values(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
 
 
 def _modes(columns: Mapping[str, Floats]) -> Iterator[tuple[Mark, int]]:
-    """Yield what the discrete signals were at the same time, with large numbers in octaves."""
+    """Yield what the discrete signals were at the same time, in words, with large numbers in octaves."""
     if len(columns) < 2:
         return
     table = np.stack([_coarse(column) for column in columns.values()])
     starts = np.flatnonzero((np.diff(table, axis=1) != 0).any(axis=0))[:_MAX_CHANGES] + 1
     for sample in (0, *starts.tolist()):
-        yield Mark(MODES, tuple(table[:, sample].tolist())), sample
+        values = zip(columns, table[:, sample].tolist(), strict=True)
+        yield Mark(MODES, tuple(f"{name} = {value:g}" for name, value in values)), sample
 
 
 def _coarse(column: Floats) -> Floats:

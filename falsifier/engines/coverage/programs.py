@@ -34,6 +34,11 @@ class Programs:
         self._times = [np.asarray(coding.times) for coding in layout.codings]
         self._longest = max((len(times) for times in self._times), default=1)
 
+    @property
+    def has_inputs(self) -> bool:
+        """Whether anything is an input over time."""
+        return bool(self._times)
+
     def fresh(self, rng: np.random.Generator) -> Array:
         """Return a new program, shape (d,)."""
         point = rng.random(self._layout.dimension)

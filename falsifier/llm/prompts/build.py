@@ -118,7 +118,8 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
 
 _LEGEND = (
     "Signals over time are written as time:value, time in s; between these points they run in straight "
-    "lines. Up to 3 % of a signal's span is rounded off, except around the time that decided."
+    "lines. Up to 3 % of a signal's span is rounded off, more where it oscillates, and nothing around the "
+    "time that decided."
 )
 
 

@@ -15,18 +15,31 @@ from falsifier.llm.prompts.view import View
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 7
 
+# Said of values where the sample had other control points than those that are told.
+_READ = " (values at these times of an input with other control points)"
+
 
 def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
     """The numbers in the order of the dimensions."""
-    return (f"point = {runs([float(v) for v in view.space.encode(candidate)])}",)
+    is_exact = all(_is_exact(view, r, candidate.signals[r.name]) for r in view.space.inputs)
+    return (f"point = {runs([float(v) for v in view.space.encode(candidate)])}{'' if is_exact else _READ}",)
 
 
 def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
     """Values of each input at the fixed control points, by name, and parameters."""
+    signals = [(r, candidate.signals[r.name]) for r in view.space.inputs]
     return (
-        *(f"{r.name} = {runs(_fixed_values(view, r, candidate.signals[r.name]))}" for r in view.space.inputs),
+        *(
+            f"{r.name} = {runs(_fixed_values(view, r, s))}{'' if _is_exact(view, r, s) else _READ}"
+            for r, s in signals
+        ),
         *_parameters(view, candidate),
     )
+
+
+def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:
+    """Whether the values at the fixed control points say all about a signal."""
+    return len(set(signal.values)) == 1 or view.space.is_fixed(r, signal)
 
 
 def as_signals(view: View, candidate: Candidate) -> tuple[str, ...]:

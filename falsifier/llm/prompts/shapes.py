@@ -16,7 +16,7 @@ Points = tuple[tuple[float, float], ...]
 
 # Breakpoints of one signal; a signal that needs more is told less exactly.
 MOST_BREAKPOINTS = 24
-_MOST_ENVELOPE_POINTS = 8
+_MOST_ENVELOPE_POINTS = 16
 # Factor of the period up to which an oscillation is one if breakpoints do not suffice.
 _SLOWER = 4
 # Oscillating intervals of one signal, the longest ones.

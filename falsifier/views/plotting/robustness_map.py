@@ -1,6 +1,6 @@
 """Figure of the neighbourhood of a counterexample or a near miss."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,7 +40,8 @@ def _colour(found: RobustnessMap) -> str:
 def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
     violates = found.robustness < 0
     for mask, color, label in ((violates, _VIOLATES, "violated"), (~violates, _HOLDS, "satisfied")):
-        ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
+        if mask.any():
+            ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
     ax.plot(0.0, found.original, "o", color=_colour(found), label=_centre(found))
     ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
     ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
@@ -49,15 +50,21 @@ def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
 
 def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     first, second = (found.coordinates[i] for i in found.axes)
-    largest = float(np.nanmax(np.abs(found.surface))) or 1.0
-    mesh = ax.pcolormesh(
-        *found.grid, found.surface, cmap="RdBu", vmin=-largest, vmax=largest, shading="nearest"
-    )
+    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", **_scale(found))
     if (found.surface < 0).any() and (found.surface >= 0).any():
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
     ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
     ax.figure.colorbar(mesh, ax=ax, label="robustness (< 0: violated)")
+
+
+def _scale(found: RobustnessMap) -> dict[str, Any]:
+    """Return a colour scale: red and blue from 0 if some of it is violated, otherwise from the smallest."""
+    low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
+    if low > 0:
+        return {"cmap": "Blues", "vmin": low, "vmax": high}
+    largest = max(-low, high) or 1.0
+    return {"cmap": "RdBu", "vmin": -largest, "vmax": largest}
 
 
 def _plot_line(ax: "Axes", found: RobustnessMap) -> None:

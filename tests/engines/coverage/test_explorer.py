@@ -36,6 +36,6 @@ def test_marks_are_said_in_words() -> None:
         describe(Mark("x", ("after", 0.0, 1.0, "y", 1.0, 0.0, 3)))
         == "x change from 0 to 1 after y from 1 to 0"
     )
-    assert describe(Mark("x <= 3", ("near", 2))) == "x <= 3 come close to its threshold"
+    assert describe(Mark("x > 3", ("near", 2))) == "x > 3 come close to its threshold"
     assert describe(Mark("x", ("up", -2))) == "x go up"
-    assert describe(Mark(MODES, (1.0, 0.0))) == "the modes 1, 0"
+    assert describe(Mark(MODES, ("gear = 1", "brake = 0"))) == "gear = 1 and brake = 0"

@@ -20,9 +20,9 @@ def test_values_changes_and_modes_are_marks_with_the_time_of_their_first_occurre
     assert marks[Mark("stage", ("is", 0.0))] == 0.0
     assert marks[Mark("stage", ("changes", 0.0, 1.0, 1))] == 0.5
     assert marks[Mark("stage", ("changes", 0.0, 1.0, 2))] == 1.5
-    assert marks[Mark(MODES, (2.0, 1.0))] == 2.0
+    assert marks[Mark(MODES, ("stage = 2", "open = 1"))] == 2.0
     assert Mark("open", ("is", 1.0)) in marks
-    assert Mark(MODES, (0.0, 1.0)) not in marks
+    assert Mark(MODES, ("stage = 0", "open = 1")) not in marks
 
 
 def test_the_order_of_changes_and_the_time_between_them_are_marks() -> None:

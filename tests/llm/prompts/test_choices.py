@@ -21,7 +21,9 @@ def test_a_point_is_all_numbers_in_order() -> None:
 def test_values_have_names_and_free_signals_are_read_at_the_fixed_times() -> None:
     assert as_values(VIEW, FIXED) == ("u = [0, 0.5, 0.5, 1]", "v = [-1, -1, -1, -1]", "x0 = 0.25")
     # Control points at 0, 3.33, 6.67 and 10 s; the step is at 4 s.
-    assert as_values(VIEW, STEP)[0] == "u = [0, 0, 1, 1]"
+    read = "(values at these times of an input with other control points)"
+    assert as_values(VIEW, STEP)[:2] == (f"u = [0, 0, 1, 1] {read}", "v = [-1, -1, -1, -1]")
+    assert as_point(VIEW, STEP)[0].endswith(read)
 
 
 def test_signals_are_told_with_their_own_control_points() -> None:
