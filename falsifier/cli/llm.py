@@ -18,11 +18,12 @@ from falsifier.cli.options import (
 )
 from falsifier.cli.output import say
 from falsifier.core.words import counted
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, SpecError
 from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Message, Tool
+    from falsifier.problem.problem import Problem
 
 
 @click.command()
@@ -77,6 +78,8 @@ def prompt(
     if samples is not None and directory is None:
         raise click.UsageError("--samples requires --after RUN")
     problem = load_source(problem_source(options))
+    if directory:
+        _check_same(directory, problem)
     records = read_journal(directory) if directory else []
     evaluations = recorded_evaluations(directory, records) if directory else {}
     told = list(evaluations.values())[:samples]
@@ -104,6 +107,18 @@ def _limit(directory: Path | None) -> int | None:
     from falsifier.search.budget import DEFAULT_SIMULATIONS
 
     return manifest.read(directory).request.budget.simulations if directory else DEFAULT_SIMULATIONS
+
+
+def _check_same(directory: Path, problem: "Problem") -> None:
+    """Check that a run's samples are those of the problem's model and requirement."""
+    from falsifier.search import manifest
+
+    described = manifest.read(directory)
+    if (described.model, True) != (problem.info.name, problem.name in described.names):
+        raise SpecError(
+            f"{directory} is a run of {', '.join(described.names)} on the model {described.model}, not of "
+            f"{problem.name} on {problem.info.name}"
+        )
 
 
 def _sent(directory: Path, sample: int, *, as_json: bool) -> str:

@@ -27,6 +27,8 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     assert sent[1]["content"] in at.out and "--- reply of openai/" in at.out
     none = falsifier("prompt", "run", "--at", "3", cwd=tmp_path)
     assert (none.code, "the run has no sample 3" in none.err) == (2, True)
+    other = falsifier("prompt", "CC1", "--after", "run", cwd=tmp_path)
+    assert (other.code, "run is a run of AT1 on the model" in other.err) == (2, True)
 
 
 def test_a_printed_prompt_says_how_much_of_it_stays_the_same(tmp_path: Path) -> None:

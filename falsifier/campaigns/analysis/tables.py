@@ -154,10 +154,20 @@ _LEGEND = (
 
 
 def _unfinished_note() -> str:
-    return "+n: n more runs failed or have not ended; no other number includes them."
+    return (
+        "+n: n more runs failed or have not ended; of the other numbers, only best robustness includes them."
+    )
 
 
 def _numbers(s: Statistics) -> tuple[str, ...]:
+    spent: tuple[str, ...] = (NONE,) * 4
+    if s.runs:
+        spent = (
+            _number(s.simulation_seconds, 2),
+            _number(s.seconds, 2),
+            _number(s.tokens, 0),
+            "unknown" if s.cost is None else _number(s.cost, 4),
+        )
     return (
         _interval(s.rate_interval, 2),
         _number(s.mean, 1),
@@ -165,10 +175,7 @@ def _numbers(s: Statistics) -> tuple[str, ...]:
         _number(s.median, 1),
         _number(s.deviation, 1),
         NONE if s.best is None else f"{s.best:.4g}",
-        _number(s.simulation_seconds, 2),
-        _number(s.seconds, 2),
-        _number(s.tokens, 0),
-        "unknown" if s.cost is None else _number(s.cost, 4),
+        *spent,
     )
 
 

@@ -60,6 +60,8 @@ def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
     table = main_table([replace(first, status="failed"), *others], PUBLISHED)
     assert table.rows[0][2] == "0/1 +1"
     assert any(note.startswith("+n") for note in table.notes)
+    alone = main_table([replace(first, status="failed")], PUBLISHED)
+    assert dict(zip(alone.header, alone.rows[0], strict=True))["cost $"] == "–", "an unknown cost is not zero"
 
 
 def asked(run: Run, variant: str) -> Run:
