@@ -70,31 +70,35 @@ class Table:
 
 
 def main_table(runs: Iterable[Run], published: Published) -> Table:
-    """Make a table with one row per requirement and method, and the published results.
+    """Make a table with one row per requirement and method, and the published results if there are any.
 
     The published results apply to the specs' own (fixed) parameterization of instance 1, so only rows of that
     parameterization show them.
     """
-    rows, notes = [], set[str]()
-    names = dict(COLUMNS)
-    for (requirement, method), members in group(runs).items():
-        found = statistics(members)
-        others = published.scores(requirement) if comparable(method) else {}
-        competitors = published.competitors(requirement) if others else []
-        rows.append(
-            (
-                requirement,
-                method.label,
-                _rate(found),
-                *_numbers(found),
-                _place(score(found), competitors),
-                *(_cell(others.get(name)) for name in names),
-            )
+    groups = group(runs)
+    found = {key: statistics(members) for key, members in groups.items()}
+    others = {
+        (requirement, method): published.scores(requirement) if comparable(method) else {}
+        for requirement, method in groups
+    }
+    names = dict(COLUMNS) if any(others.values()) else {}
+    rows = [
+        (
+            requirement,
+            method.label,
+            _rate(found[key]),
+            *_numbers(found[key]),
+            *((_place(score(found[key]), _competitors(published, key, others)),) if names else ()),
+            *(_cell(others[key].get(name)) for name in names),
         )
-        notes |= {_unfinished_note()} if found.unfinished else set()
-        notes |= set(_sources(published)) if others else set()
-    header = ("requirement", "method", "FR", *_NUMBERS, "rank", *names.values())
-    return Table("Falsification", header, tuple(rows), (_LEGEND, *sorted(notes)))
+        for key in groups
+        for requirement, method in [key]
+    ]
+    notes = {_unfinished_note()} if any(s.unfinished for s in found.values()) else set[str]()
+    legend = f"{_LEGEND} {_PUBLISHED_LEGEND}" if names else _LEGEND
+    notes |= set(_sources(published)) if names else set()
+    header = ("requirement", "method", "FR", *_NUMBERS, *(("rank",) if names else ()), *names.values())
+    return Table("Falsification", header, tuple(rows), (legend, *sorted(notes)))
 
 
 def ablation_table(runs: Iterable[Run], published: Published) -> Table:
@@ -148,9 +152,18 @@ _NUMBERS = (
 _LEGEND = (
     "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
     "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
-    "means per run. Rank: position among all published tools known for the requirement, by FR, then by "
-    "mean S; ties share a rank. Published cells: falsified runs / mean S."
+    "means per run."
 )
+_PUBLISHED_LEGEND = (
+    "Rank: position among all published tools known for the requirement, by FR, then by mean S; ties share "
+    "a rank. Published cells: falsified runs / mean S."
+)
+
+
+def _competitors(
+    published: Published, key: tuple[str, Method], others: Mapping[tuple[str, Method], Mapping[str, Score]]
+) -> list[Score]:
+    return published.competitors(key[0]) if others[key] else []
 
 
 def _unfinished_note() -> str:

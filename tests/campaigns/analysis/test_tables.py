@@ -64,6 +64,13 @@ def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
     assert dict(zip(alone.header, alone.rows[0], strict=True))["cost $"] == "–", "an unknown cost is not zero"
 
 
+def test_published_columns_are_shown_only_if_there_is_something_to_compare(runs: list[Run]) -> None:
+    free = [replace(run, method=replace(run.method, parameterization="free")) for run in runs]
+    table = main_table(free, PUBLISHED)
+    assert table.header[-1] == "cost $" and "Rank" not in table.text()
+    assert "rank" in main_table([*free, *runs], PUBLISHED).header
+
+
 def asked(run: Run, variant: str) -> Run:
     return replace(run, method=Method(llm="openai/gpt-5-nano", effort="low", variant=variant))
 
