@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from falsifier.core.trajectory import is_discrete
 from falsifier.engines import make_engine
 from falsifier.engines.llm import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import VARIANTS, View
-from falsifier.llm.prompts.courses import column_decimals, is_discrete
+from falsifier.llm.prompts.courses import column_decimals
 from falsifier.llm.prompts.numbers import plain
 from falsifier.llm.prompts.observations import course_line, drawn_course
 from falsifier.llm.prompts.shapes import Course, Points

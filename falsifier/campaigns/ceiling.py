@@ -1,4 +1,4 @@
-"""What a campaign can cost at most, said before it starts."""
+"""What a campaign asks of language models and about what that costs, said before it starts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +14,12 @@ from falsifier.search.request import LLMSettings
 
 @dataclass(frozen=True, slots=True)
 class Ceiling:
-    """Upper limits of what is asked of language models.
+    """What is asked of language models if nothing is found early.
 
     Attributes:
-        questions: number of questions: one per simulation, and those after replies that are not valid.
-        cost: US dollars for what is sent, prompts at their longest; None if a price is unknown.
+        questions: number of questions if each simulation takes one, and each of these is asked again as often
+            as after replies that are not valid; calls of tools come on top.
+        cost: US dollars for sending these with prompts at their longest; None if a price is unknown.
         limit: US dollars to which the campaign's own limits hold the cost of everything; inf without any.
     """
 
@@ -28,8 +29,8 @@ class Ceiling:
 
     @property
     def text(self) -> str:
-        """The limits in a sentence."""
-        asked = f"at most {counted(self.questions, 'question')} to language models"
+        """The estimate in a sentence."""
+        asked = f"up to {counted(self.questions, 'question')} to language models"
         if self.limit < inf:
             return f"{asked}; the cost is limited to {self.limit:.4g} US dollars"
         if self.cost is None:
@@ -37,13 +38,13 @@ class Ceiling:
         if not self.cost:
             return f"{asked}, free of charge"
         return (
-            f"{asked}, which cost at most {self.cost:.4g} US dollars to send; replies cost extra, and "
-            "--total-cost limits all of it"
+            f"{asked}, which cost about {self.cost:.4g} US dollars to send with the longest prompts; replies "
+            "cost extra, and --total-cost limits all of it"
         )
 
 
 def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | None]) -> Ceiling | None:
-    """Return what a campaign can cost at most; None if it asks no language model.
+    """Estimate what a campaign asks; None if it asks no language model.
 
     Runs without a limit on simulations are not counted.
 

@@ -247,7 +247,7 @@ def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> N
 
 
 def _agree(request: CampaignRequest, *, yes: bool) -> None:
-    """Say what language models can cost at most; ask on a terminal."""
+    """Say about what language models can cost; ask on a terminal."""
     most = ceiling(request, price_of)
     if most is None:
         return

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import click
 
+from falsifier.cli.files import draw
 from falsifier.cli.options import directory_argument, json_option, out_option
 from falsifier.cli.output import say
-from falsifier.core.literals import one_line
 from falsifier.search import manifest
 from falsifier.search.coverage import coverage as coverage_of_run
 from falsifier.views.coverage_text import coverage_json, coverage_text
-from falsifier.views.terminal import warn
 
 
 @click.command()
@@ -24,16 +23,14 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     Ranges of inputs and parameters, how fast inputs changed, combinations of two at the same time, values
     that outputs reached, modes and changes of mode. Nothing is simulated.
     """
-    from falsifier.views.plotting import plot_coverage, save_figure
+    from falsifier.views.plotting import plot_coverage
 
     found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
-    picture = out or directory / "coverage.png"
-    try:
-        save_figure(plot_coverage(found, name), picture)
-    except (ValueError, OverflowError, ArithmeticError) as error:  # of values that a drawing library refuses
-        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
+    picture = draw(lambda: plot_coverage(found, name), out or directory / "coverage.png")
     if as_json:
-        say(json.dumps({"requirements": name, **coverage_json(found), "picture": str(picture)}, indent=2))
+        content = {"requirements": name, **coverage_json(found), "picture": picture and str(picture)}
+        say(json.dumps(content, indent=2))
         return
     say(coverage_text(found, name))
-    say(f"picture: {picture}")
+    if picture is not None:
+        say(f"picture: {picture}")

@@ -1,6 +1,8 @@
 """Files written by several commands: a counterexample as JSON, and its picture."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from falsifier.core.literals import one_line
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
@@ -25,13 +27,8 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
         OSError: if the JSON file cannot be written.
     """
     data = save(to_store(confirmation), directory / name)
-    picture = data.with_suffix(".png")
-    try:
-        draw_evaluation(confirmation.problem, confirmation.evaluation, picture)
-    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
-        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
-        return [data]
-    return [data, picture]
+    picture = draw_evaluation(confirmation.problem, confirmation.evaluation, data.with_suffix(".png"))
+    return [data] if picture is None else [data, picture]
 
 
 def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = None) -> None:
@@ -57,8 +54,23 @@ def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = 
         raise SpecError(f"{path} exists and is not such a file: choose another --out, or delete it")
 
 
-def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> None:
-    """Write the picture of an evaluation with its trajectory."""
-    from falsifier.views.plotting import plot_evaluation, save_figure
+def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> Path | None:
+    """Write the picture of an evaluation with its trajectory; see ``draw``."""
+    from falsifier.views.plotting import plot_evaluation
 
-    save_figure(plot_evaluation(problem, evaluation), picture)
+    return draw(lambda: plot_evaluation(problem, evaluation), picture)
+
+
+def draw(plot: Callable[[], Any], picture: Path) -> Path | None:
+    """Write what ``plot`` returns, a figure; return its path.
+
+    None if it cannot be drawn or written, which is said on stderr.
+    """
+    from falsifier.views.plotting import save_figure
+
+    try:
+        save_figure(plot(), picture)
+    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
+        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
+        return None
+    return picture

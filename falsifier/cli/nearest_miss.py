@@ -30,7 +30,7 @@ def nearest_miss_line(miss: NearestMiss) -> str:
 
 def draw_nearest_miss(miss: NearestMiss, problem: Problem, evaluation: Evaluation) -> Path | None:
     """Write its picture into the run directory; None if it cannot be drawn, which is reported on stderr."""
-    return _drawn(problem, evaluation, miss.beside("nearest-miss.png"))
+    return draw_evaluation(problem, evaluation, miss.beside("nearest-miss.png"))
 
 
 def shrink_nearest_miss(
@@ -103,14 +103,5 @@ def _written(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]
     from falsifier.counterexamples.export.tables import write_csv
 
     files = [write_csv(input_table(problem, evaluation.candidate), file, problem.model)]
-    picture = _drawn(problem, evaluation, file.with_suffix(".png"))
+    picture = draw_evaluation(problem, evaluation, file.with_suffix(".png"))
     return files if picture is None else [*files, picture]
-
-
-def _drawn(problem: Problem, evaluation: Evaluation, picture: Path) -> Path | None:
-    try:
-        draw_evaluation(problem, evaluation, picture)
-    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
-        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
-        return None
-    return picture

@@ -142,13 +142,8 @@ def _written(problem: Problem, evaluation: Evaluation, trajectory: Trajectory, o
 
     files = [write_whole(out / "trajectory.csv", _table(trajectory))]
     files.append(write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model))
-    picture = out / "trajectory.png"
-    try:
-        draw_evaluation(_drawn(problem, evaluation), evaluation, picture)
-    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
-        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
-        return files
-    return [*files, picture]
+    picture = draw_evaluation(_drawn(problem, evaluation), evaluation, out / "trajectory.png")
+    return files if picture is None else [*files, picture]
 
 
 def _table(trajectory: Trajectory) -> str:

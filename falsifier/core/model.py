@@ -136,6 +136,10 @@ class ModelInfo:
     def __contains__(self, name: object) -> bool:
         return any(v.name == name for v in self.variables)
 
+    def kind(self, name: str) -> str:
+        """Return the type of a variable's values; real if there is no such variable."""
+        return next((v.kind for v in self.variables if v.name == name), "real")
+
     def with_causality(self, causality: Causality) -> tuple[Variable, ...]:
         """Return the variables with this causality, in the model's order, except those of ignored clocks."""
         return tuple(v for v in self.variables if v.causality == causality and not v.is_clocked)

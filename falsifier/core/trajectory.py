@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from falsifier.errors import MonitorError, did_you_mean
 
+# Maximum number of distinct values, all integers, of a real signal that is taken for discrete.
+_MAX_LEVELS = 16
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
@@ -88,3 +91,12 @@ class Trajectory:
             columns = archive["columns"]
             units = {n: str(u) for n, u in zip(names, archive["units"], strict=True) if str(u)}
             return cls(archive["times"], {n: columns[i] for i, n in enumerate(names)}, units)
+
+
+def is_discrete(column: NDArray[np.float64], *, kind: str) -> bool:
+    """Whether a signal, shape (n,), is of a discrete type, or of a real one but with few integer values."""
+    if kind != "real":
+        return True
+    if np.ptp(column) == 0 or not np.all(column == np.round(column)):
+        return False
+    return len(np.unique(column)) <= _MAX_LEVELS

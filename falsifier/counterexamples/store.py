@@ -196,8 +196,9 @@ def counterexample_file(path: Path) -> Path:
         )
     if not found:
         raise SpecError(
-            "contains no confirmed counterexample; expected the directory of a run that found one. Of "
-            "others, falsifier explain, shrink and robustness-map take the nearest miss",
+            "contains no confirmed counterexample; expected a counterexample file or the directory of a run "
+            "that found one (of a campaign: a directory in its runs/). falsifier explain, shrink and "
+            "robustness-map also take a run that found none",
             file=str(path),
         )
     return found[0]

@@ -107,7 +107,7 @@ def check_llm(
     """
     chat = connect(llm, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
     reply = chat.complete(_HELLO)
-    listed = listed_price(llm) if api_base is None else None
+    listed = listed_price(llm, api_base=api_base)
     return LLMCheck(
         llm=llm,
         key=key_variable(llm),

@@ -56,8 +56,13 @@ def check_name(llm: str) -> None:
     )
 
 
-def listed_price(llm: str) -> Price | None:
-    """Price of an LLM in litellm's table; None if it is not listed, or wrongly listed as free."""
+def listed_price(llm: str, *, api_base: str | None = None) -> Price | None:
+    """Price of an LLM in litellm's table; None if it is not listed, or wrongly listed as free.
+
+    Another server under a listed name has its own prices, unless it is the user's own machine.
+    """
+    if api_base is not None and not known(llm).local:
+        return None
     try:
         info = load_litellm().get_model_info(llm)
     except ChatError:

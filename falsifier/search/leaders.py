@@ -107,7 +107,7 @@ def price_of(llm: LLMSettings) -> "Price | None":
     from falsifier.llm.litellm_import import listed_price
     from falsifier.llm.usage import Price
 
-    return Price(*llm.price) if llm.price else listed_price(llm.name)
+    return Price(*llm.price) if llm.price else listed_price(llm.name, api_base=llm.api_base)
 
 
 def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, chat: Chat) -> Engine:

@@ -124,7 +124,9 @@ def _gap_rows(found: Coverage) -> Iterator[tuple[str, str]]:
         if r.gaps:
             gaps = [f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}" for low, high in r.gaps]
             yield r.searched.name, f"values {listed(gaps)}"
-        missing = [pace for pace in PACES if r.paces and not r.paces[pace]]
+        # Values that are held between changes have no slope.
+        possible = PACES if r.searched.kind == "real" else ("constant", "steps")
+        missing = [pace for pace in possible if r.paces and not r.paces[pace]]
         if missing:
             yield r.searched.name, f"changes: {listed(missing)}"
 

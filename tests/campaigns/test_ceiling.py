@@ -8,6 +8,7 @@ from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
+from falsifier.search.leaders import price_of
 from falsifier.search.request import LLMSettings
 
 PAID = Method("", "openai/m")
@@ -34,7 +35,7 @@ def test_the_most_is_every_question_three_times_at_full_length() -> None:
     assert most is not None
     assert most.questions == 2 * 10 * 3
     assert most.cost == pytest.approx(60 * DEFAULT_PROMPT_TOKENS * 0.5 / 1e6)
-    assert "at most 60 questions" in most.text and "0.48 US dollars to send" in most.text
+    assert "up to 60 questions" in most.text and "about 0.48 US dollars to send" in most.text
 
 
 def test_limits_go_before_estimates() -> None:
@@ -48,3 +49,11 @@ def test_an_unknown_price_is_not_zero() -> None:
     most = ceiling(asked(PAID, Method("", "hosted_vllm/x")), price)
     assert most is not None and most.cost is None and "the price is unknown" in most.text
     assert "free of charge" in Ceiling(3, 0.0, inf).text
+
+
+def test_the_listed_price_is_not_that_of_another_server() -> None:
+    listed = LLMSettings(name="openai/gpt-5-mini")
+    elsewhere = listed.model_copy(update={"api_base": "http://127.0.0.1:9"})
+    assert price_of(listed) is not None
+    assert price_of(elsewhere) is None
+    assert price_of(elsewhere.model_copy(update={"price": (1.0, 2.0)})) == Price(1.0, 2.0)

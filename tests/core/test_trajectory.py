@@ -1,9 +1,10 @@
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import MonitorError
 
 TIMES = np.linspace(0, 1, 11)
@@ -29,3 +30,20 @@ def test_missing_signals_and_unequal_lengths_are_named() -> None:
         TRAJECTORY["z"]
     with pytest.raises(MonitorError, match="'x' has 3 samples, expected 11 as in the time grid"):
         Trajectory(TIMES, {"x": np.zeros(3)})
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "expected"),
+    [
+        ("boolean", [0, 0], True),  # by its type
+        ("real", [0, 0], False),  # nothing can be said of a constant
+        ("real", [0, 3, 3], True),
+        ("real", [0, 0.5], False),
+        ("real", range(16), True),
+        ("real", range(17), False),
+    ],
+)
+def test_a_signal_is_discrete_by_its_type_or_by_its_values(
+    kind: str, values: Sequence[float], expected: bool
+) -> None:
+    assert is_discrete(np.array(values, dtype=np.float64), kind=kind) is expected

@@ -65,8 +65,8 @@ class Explorer:
     @property
     def has_modes(self) -> bool:
         """Whether a discrete output has changed so far."""
-        outputs = {*self._marker.outputs}
-        return any(mark.what[0] == "changes" and mark.source in outputs for mark in self._reached)
+        kinds = self._marker.kinds
+        return any(mark.what[0] == "changes" and mark.source in kinds for mark in self._reached)
 
     def learn(self, point: Array, trajectory: Trajectory) -> None:
         """Add a simulation to the archive."""

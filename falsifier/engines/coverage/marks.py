@@ -13,16 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from falsifier.core.model import ModelInfo
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.engines.box import learnable
 from falsifier.problem.problem import Problem
 from falsifier.stl.formula import Predicate
 
 Floats = NDArray[np.float64]
 
-# Maximum number of distinct values, all integers, of a signal that is taken for discrete.
-_MAX_LEVELS = 16
+# Values above this one are modes by their octave only.
+_EXACT = 16
 # Half octaves below the largest deviation of a signal that still count as levels.
 _LEVELS = 12
 # Changes of a trajectory that are looked at; a signal that chatters would otherwise hide the others.
@@ -66,14 +65,12 @@ class Marker:
     """Finds the marks of trajectories.
 
     Attributes:
-        outputs: recorded signals that are not searched inputs.
+        kinds: types of the recorded signals that are not searched inputs, by name.
         predicates: predicates of the formula that depend on such a signal.
-        info: what is known about the model.
     """
 
-    outputs: tuple[str, ...]
+    kinds: Mapping[str, str]
     predicates: tuple[Predicate, ...]
-    info: ModelInfo
 
     @classmethod
     def of(cls, problem: Problem) -> "Marker":
@@ -82,14 +79,14 @@ class Marker:
         formula = problem.requirement.formula
         outputs = tuple(dict.fromkeys((*problem.experiment.outputs, *formula.signals)))
         return cls(
-            tuple(name for name in outputs if name not in driven),
+            {name: problem.info.kind(name) for name in outputs if name not in driven},
             tuple(p for p in formula.predicates if not {*p.left.signals, *p.right.signals} <= driven),
-            problem.info,
         )
 
     def marks(self, trajectory: Trajectory) -> dict[Mark, float]:
         """Return the marks of a trajectory and the time in s at which each was reached first."""
-        discrete = {n: c for n, c in self._columns(trajectory) if is_discrete(self.info, n, c)}
+        columns = {n: _finite(trajectory[n]) for n in self.kinds if n in trajectory.columns}
+        discrete = {n: c for n, c in columns.items() if is_discrete(c, kind=self.kinds[n])}
         margins = {
             f"{p.left} > {p.right}": _margin(p, trajectory) for p in self.predicates if not _only(p, discrete)
         }
@@ -98,26 +95,13 @@ class Marker:
             *(mark for name, column in discrete.items() for mark in _values(name, column)),
             *_modes({**discrete, **truths}),
             *_changes(sorted(_all_changes({**discrete, **truths}))[:_MAX_CHANGES]),
-            *(m for n, c in self._columns(trajectory) if n not in discrete for m in _levels(n, c)),
+            *(mark for n, c in columns.items() if n not in discrete for mark in _levels(n, c)),
             *(mark for name, margin in margins.items() for mark in _nearness(name, margin)),
         ]
         first: dict[Mark, int] = {}
         for mark, sample in found:
             first[mark] = min(sample, first.get(mark, sample))
         return {mark: float(trajectory.times[sample]) for mark, sample in first.items()}
-
-    def _columns(self, trajectory: Trajectory) -> Iterator[tuple[str, Floats]]:
-        for name in self.outputs:
-            if name in trajectory.columns:
-                yield name, _finite(trajectory[name])
-
-
-def is_discrete(info: ModelInfo, name: str, column: Floats) -> bool:
-    """Whether a signal takes few values, all of them integers: by its type, otherwise by its course."""
-    if name in info and info[name].kind in ("integer", "boolean", "enumeration"):
-        return True
-    levels = np.unique(column)
-    return 1 < len(levels) <= _MAX_LEVELS and bool((levels == np.round(levels)).all())
 
 
 def _only(predicate: Predicate, discrete: Mapping[str, Floats]) -> bool:
@@ -155,7 +139,7 @@ def _modes(columns: Mapping[str, Floats]) -> Iterator[tuple[Mark, int]]:
 def _coarse(column: Floats) -> Floats:
     size = np.abs(column)
     octave = np.floor(np.log2(np.maximum(size, 1.0)))
-    return np.where(size > _MAX_LEVELS, np.sign(column) * 2.0**octave, column)
+    return np.where(size > _EXACT, np.sign(column) * 2.0**octave, column)
 
 
 def _all_changes(columns: Mapping[str, Floats]) -> Iterator[Change]:

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.engines.box import Array, learnable
-from falsifier.engines.coverage.marks import is_discrete
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
@@ -87,7 +86,9 @@ class History:
             problem.space,
             self.grid,
             self._coordinates,
-            discrete=frozenset(name for name in outputs if is_discrete(problem.info, name, trajectory[name])),
+            discrete=frozenset(
+                name for name in outputs if is_discrete(trajectory[name], kind=problem.info.kind(name))
+            ),
             stretches=self.settings.stretches,
             constants={
                 name: float(trajectory[name][0])

@@ -13,8 +13,6 @@ from falsifier.llm.prompts.shapes import Course, Points, Swing
 
 Array = NDArray[np.float64]
 
-# A real column with at most this many distinct values, all integers, is described by its changes.
-_MAX_LEVELS = 12
 # Changes listed individually; of longer lists the beginning and the end.
 _SHOWN_CHANGES = 16
 
@@ -26,15 +24,6 @@ class Piece:
     value: float
     start: float
     end: float
-
-
-def is_discrete(column: Array, *, kind: str) -> bool:
-    """Whether to describe a signal by its changes: a discrete type, or a real one with few integer values."""
-    if kind != "real":
-        return True
-    if np.ptp(column) == 0 or not np.all(column == np.round(column)):
-        return False
-    return len(np.unique(column)) <= _MAX_LEVELS
 
 
 def pieces(times: Array, column: Array) -> list[Piece]:

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import (
     change_list,
@@ -14,7 +14,6 @@ from falsifier.llm.prompts.courses import (
     column_decimals,
     course_text,
     dwell_list,
-    is_discrete,
     longest_stretch,
 )
 from falsifier.llm.prompts.numbers import decimals_for, number, plain, signed

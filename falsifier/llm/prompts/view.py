@@ -39,7 +39,7 @@ class View:
 
     def kind(self, name: str) -> str:
         """Type of a signal's values; real if unknown."""
-        return self.info[name].kind if name in self.info else "real"
+        return self.info.kind(name)
 
     @property
     def chosen(self) -> str:

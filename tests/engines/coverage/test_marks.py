@@ -1,10 +1,9 @@
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.coverage.marks import MODES, Mark, Marker, is_discrete
+from falsifier.engines.coverage.marks import MODES, Mark, Marker
 from falsifier.testing import lag_problem
 from tests.engines.coverage.support import lock_problem
 
@@ -66,17 +65,3 @@ def test_any_numbers_have_marks(values: list[float]) -> None:
     marker = Marker.of(lag_problem("G[0,10] (x <= 0.9)"))
     times = np.linspace(0.0, 1.0, len(values))
     marker.marks(Trajectory(times, {"x": np.array(values), "u": np.zeros(len(values))}))
-
-
-@pytest.mark.parametrize(
-    ("name", "values", "expected"),
-    [
-        ("stage", [0, 0], True),  # by its type
-        ("unknown", [0, 0], False),  # nothing can be said of a constant
-        ("unknown", [0, 3], True),
-        ("unknown", [0, 0.5], False),
-        ("unknown", list(range(17)), False),
-    ],
-)
-def test_what_counts_as_discrete(name: str, values: list[float], expected: bool) -> None:
-    assert is_discrete(lock_problem().info, name, np.array(values, dtype=float)) is expected

@@ -10,7 +10,6 @@ from falsifier.llm.prompts.courses import (
     column_decimals,
     course_text,
     dwell_list,
-    is_discrete,
     longest_stretch,
     pieces,
 )
@@ -77,14 +76,6 @@ def test_a_course_is_told_by_its_breakpoints_and_oscillations() -> None:
     assert course_text(drawn, decimals=0, clock=0) == (
         "0:0 3:0; oscillates from 3 to 6 s with period 0.2 s, 0.4 s from 5 s, between 3:-1 and 6:1"
     )
-
-
-def test_discrete_by_type_or_by_values() -> None:
-    assert is_discrete(GEAR, kind="real")
-    assert is_discrete(np.zeros(5), kind="boolean")
-    assert not is_discrete(np.zeros(5), kind="real")
-    assert not is_discrete(TIMES, kind="real")
-    assert not is_discrete(np.arange(50.0), kind="real")
 
 
 def test_digits_follow_the_margin() -> None:
