@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
 from falsifier.engines.surrogate.settings import Settings
@@ -77,20 +78,13 @@ class FourierDynamics:
     def __init__(
         self, traces: Sequence[Trace], best: Sequence[int], settings: Settings, rng: np.random.Generator
     ) -> None:
-        self._states = traces[0].states.shape[1]
-        x = np.concatenate([np.concatenate([t.states[:-1], t.inputs], axis=1) for t in traces])
-        target = np.concatenate(
-            [np.concatenate([np.diff(t.states, axis=0), t.excess], axis=1) for t in traces]
-        )
-        weights = np.concatenate(
-            [
-                np.full(len(t.inputs), 1.0 + (settings.best_weight if i in best else 0.0))
-                for i, t in enumerate(traces)
-            ]
-        )
-        if len(x) > settings.most_rows:
-            rows = rng.choice(len(x), settings.most_rows, replace=False, p=weights / weights.sum())
-            x, target, weights = x[rows], target[rows], np.ones(settings.most_rows)
+        states, inputs, excess = _stacked(traces)
+        weights = np.ones(inputs.shape[:2])
+        weights[list(best)] += settings.best_weight
+        rows, weight = _drawn(weights, settings.most_rows, rng)
+        x = np.concatenate([states[rows], inputs[rows]], axis=1)
+        after = states[rows[0], rows[1] + 1]
+        target = np.concatenate([after - states[rows], excess[rows]], axis=1)
         mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-3 * np.abs(x).max(axis=0) + 1e-9
         z = (x - mean) / spread
         width = z.shape[1]
@@ -98,39 +92,41 @@ class FourierDynamics:
         frequencies = rng.standard_normal((width, settings.features)) / scale
         phases = rng.uniform(0, 2 * np.pi, settings.features)
         amplitude = np.sqrt(2 / settings.features)
-        phi = np.concatenate(
-            [np.cos(z @ frequencies + phases) * amplitude, 0.3 * z, np.ones((len(z), 1))], axis=1
-        )
+        waves = np.cos((z @ frequencies + phases).astype(np.float32))
+        phi = np.concatenate([waves * amplitude, 0.3 * z, np.ones((len(z), 1))], axis=1)
         centre, unit = target.mean(axis=0), target.std(axis=0) + 1e-9
         solution = _ridge(
-            phi, (target - centre) / unit, weights * rng.exponential(size=len(z)), settings.ridge
+            phi, (target - centre) / unit, weight * rng.exponential(size=len(z)), settings.ridge
         )
-        # For fast rollouts, all scalings are folded into a few single-precision matrices.
+        # For fast rollouts, all scalings are folded into two single-precision matrices, which take the state,
+        # the inputs and a one to the phases of the features, and the features with these to the increments.
         solution = solution * unit
         raw = frequencies / spread[:, None]
-        self._frequencies = raw.astype(np.float32)
-        self._phases = (phases - mean @ raw).astype(np.float32)
         linear = solution[settings.features : -1] * 0.3 / spread[:, None]
-        self._amplitudes = (solution[: settings.features] * amplitude).astype(np.float32)
-        self._linear = linear.astype(np.float32)
-        self._offset = (solution[-1] + centre - mean @ linear).astype(np.float32)
-        self._low, self._high = _seen_range(traces)
+        self._to_phases = np.vstack([raw, phases - mean @ raw]).astype(np.float32)
+        self._to_steps = np.vstack(
+            [solution[: settings.features] * amplitude, linear, solution[-1] + centre - mean @ linear]
+        ).astype(np.float32)
+        self._low, self._high = (bound.astype(np.float32) for bound in _seen_range(states))
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
         """Predict m traces, cell by cell, in single precision; arguments as in ``Dynamics.predict``."""
         count, cells, _ = inputs.shape
-        by_cell = np.ascontiguousarray(inputs.transpose(1, 0, 2), dtype=np.float32)
-        n = self._states
+        n, features = start.shape[1], self._to_phases.shape[1]
         states = np.empty((cells + 1, count, n), np.float32)
-        excess = np.empty((cells, count, self._offset.shape[0] - n), np.float32)
+        excess = np.empty((cells, count, self._to_steps.shape[1] - n), np.float32)
         states[0] = start
-        # The contribution of the inputs to all features, for all cells at once.
-        driven = by_cell @ self._frequencies[n:] + self._phases
-        direct = by_cell @ self._linear[n:] + self._offset
+        by_cell = inputs.transpose(1, 0, 2).astype(np.float32)
+        basis = np.ones((count, len(self._to_steps)), np.float32)
+        waves, known = basis[:, :features], basis[:, features:]
+        step = np.empty((count, self._to_steps.shape[1]), np.float32)
         for k in range(cells):
-            waves = np.cos(states[k] @ self._frequencies[:n] + driven[k])
-            step = waves @ self._amplitudes + states[k] @ self._linear[:n] + direct[k]
-            states[k + 1] = np.clip(states[k] + step[:, :n], self._low, self._high)
+            known[:, :n], known[:, n:-1] = states[k], by_cell[k]
+            np.cos(known @ self._to_phases, out=waves)
+            np.matmul(basis, self._to_steps, out=step)
+            np.add(states[k], step[:, :n], out=states[k + 1])
+            np.maximum(states[k + 1], self._low, out=states[k + 1])
+            np.minimum(states[k + 1], self._high, out=states[k + 1])
             excess[k] = step[:, n:]
         return Prediction(states.transpose(1, 0, 2), excess.transpose(1, 0, 2))
 
@@ -142,81 +138,108 @@ class DeviationDynamics:
         self, traces: Sequence[Trace], best: Sequence[int], settings: Settings, rng: np.random.Generator
     ) -> None:
         self._base = traces[best[0]]
-        self._lags = settings.lags
-        self._state_unit = _spread([t.states - self._base.states for t in traces]) + 1e-12
-        self._excess_unit = _spread([t.excess - self._base.excess for t in traces]) + 1e-12
+        self._lags = lags = settings.lags
+        states, inputs, excess = _stacked(traces)
+        others = np.arange(len(traces)) != best[0]
+        self._state_unit = _spread(states[others] - self._base.states) + 1e-12
+        self._excess_unit = _spread(excess[others] - self._base.excess) + 1e-12
         # Otherwise an input that has hardly varied so far would become a huge deviation as soon as it does.
-        self._input_unit = np.maximum(_spread([t.inputs - self._base.inputs for t in traces]), 0.05)
-        rows, targets, weights = [], [], []
-        for i, trace in enumerate(traces):
-            if i == best[0]:
-                continue
-            dy, du = self._deviations(trace.states, trace.inputs)
-            cells = len(trace.inputs)
-            rows.append(_lagged(dy, du, self._lags, cells))
-            de = (trace.excess - self._base.excess) / self._excess_unit
-            targets.append(np.concatenate([dy[self._lags :], de], axis=1))
-            weights.append(np.full(cells, rng.exponential() + 0.2))
-        x, target, weight = np.concatenate(rows), np.concatenate(targets), np.concatenate(weights)
-        if len(x) > settings.most_rows:
-            kept = rng.choice(len(x), settings.most_rows, replace=False)
-            x, target, weight = x[kept], target[kept], weight[kept]
+        self._input_unit = np.maximum(_spread(inputs[others] - self._base.inputs), 0.05)
+        weights = np.repeat(rng.exponential(size=(others.sum(), 1)) + 0.2, inputs.shape[1], axis=1)
+        rows, weight = _drawn(weights, settings.most_rows, rng, uniformly=True)
+        dy, du = self._deviations(states[others], inputs[others])
+        past = rows[1][:, None] + np.arange(lags - 1, -1, -1)
+        x = np.concatenate([part[rows[0][:, None], past].reshape(len(past), -1) for part in (dy, du)], axis=1)
+        de = (excess[others] - self._base.excess)[rows] / self._excess_unit
+        target = np.concatenate([dy[rows[0], rows[1] + lags], de], axis=1)
         self._weights = _ridge(x, target, weight, settings.linear_ridge)
-        self._low, self._high = _seen_range(traces)
+        self._low, self._high = _seen_range(states)
 
     def _deviations(self, states: Array, inputs: Array) -> tuple[Array, Array]:
         """Return deviations in units of their spread, preceded by zeros for the lags."""
-        dy = (states - self._base.states[: states.shape[-2]]) / self._state_unit
-        du = (inputs - self._base.inputs[: inputs.shape[-2]]) / self._input_unit
-        pad = [(0, 0)] * (states.ndim - 2) + [(self._lags - 1, 0), (0, 0)]
-        return np.pad(dy, pad), np.pad(du, pad)
+        before = self._lags - 1
+        dy, du = (
+            np.concatenate([np.zeros((len(part), before, part.shape[2])), part], axis=1)
+            for part in (
+                (states - self._base.states[: states.shape[1]]) / self._state_unit,
+                (inputs - self._base.inputs[: inputs.shape[1]]) / self._input_unit,
+            )
+        )
+        return dy, du
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
         """Predict m traces, cell by cell, as deviations; arguments as in ``Dynamics.predict``."""
         count, cells, _ = inputs.shape
         lags, n = self._lags, start.shape[1]
-        initial = np.zeros((count, cells + 1, n))
-        initial[:, 0] = start
-        dy, du = self._deviations(initial, inputs)
-        dy[:, lags:] = 0.0
-        excess = np.empty((count, cells, self._weights.shape[1] - n))
-        # The contribution of the inputs to every step, for all cells at once; the most recent cell comes
-        # first.
+        first, du = self._deviations(start[:, None], inputs)
+        # The contribution of the inputs to every step, for all cells at once.
         own, driving = self._weights[: lags * n], self._weights[lags * n :]
-        driven = np.concatenate([du[:, lags - 1 - i : lags - 1 - i + cells] for i in range(lags)], axis=2)
-        driven = driven @ driving
+        windows = np.lib.stride_tricks.sliding_window_view(du[:, ::-1], lags, axis=1)[:, ::-1]
+        driven = windows.transpose(1, 0, 3, 2).reshape(cells, count, -1) @ driving
+        # The most recent cell comes first, so that the past of a cell is one slice.
+        total = cells + lags
+        dy = np.zeros((count, total * n))
+        dy[:, cells * n :] = first[:, ::-1].reshape(count, -1)
+        steps = np.empty((cells, count, driving.shape[1]))
         for k in range(cells):
-            past = np.concatenate([dy[:, k + lags - 1 - i] for i in range(lags)], axis=1)
-            step = past @ own + driven[:, k]
+            at = (cells - k) * n
+            np.matmul(dy[:, at : at + lags * n], own, out=steps[k])
+            steps[k] += driven[k]
             # An unstable fit must not overflow; deviations this large mean nothing anyway.
-            dy[:, k + lags] = np.clip(step[:, :n], -30.0, 30.0)
-            excess[:, k] = step[:, n:]
-        states = self._base.states[: cells + 1] + dy[:, lags - 1 :] * self._state_unit
+            np.clip(steps[k, :, :n], -30.0, 30.0, out=dy[:, at - n : at])
+        deviations = dy.reshape(count, total, n)[:, cells::-1]
+        states = self._base.states[: cells + 1] + deviations * self._state_unit
+        excess = steps[:, :, n:].transpose(1, 0, 2)
         return Prediction(
             np.clip(states, self._low, self._high), self._base.excess[:cells] + excess * self._excess_unit
         )
 
 
-def _lagged(dy: Array, du: Array, lags: int, cells: int) -> Array:
-    """Return rows [dy(k) ... dy(k - lags + 1), du(k) ... du(k - lags + 1)] for all cells k."""
-    parts = [dy[lags - 1 - i : lags - 1 - i + cells] for i in range(lags)]
-    parts += [du[lags - 1 - i : lags - 1 - i + cells] for i in range(lags)]
-    return np.concatenate(parts, axis=1)
+def _stacked(traces: Sequence[Trace]) -> tuple[Array, Array, Array]:
+    """Return states, inputs and excesses of all traces, shape (traces, ...)."""
+    return (
+        np.stack([t.states for t in traces]),
+        np.stack([t.inputs for t in traces]),
+        np.stack([t.excess for t in traces]),
+    )
+
+
+def _drawn(
+    weights: Array, count: int, rng: np.random.Generator, *, uniformly: bool = False
+) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], Array]:
+    """Draw rows of a regression, without repetition; return their traces and cells, and their weights.
+
+    If there are more than ``count`` rows, the weights decide which are drawn and count no more, unless they
+    are drawn uniformly.
+    """
+    if weights.size <= count:
+        rows = np.arange(weights.size)
+    else:
+        # The smallest of exponential variables with these rates: draws without replacement.
+        rates = 1.0 if uniformly else weights.ravel()
+        rows = np.argpartition(rng.exponential(size=weights.size) / rates, count)[:count]
+    weight = weights.ravel()[rows]
+    places = (rows // weights.shape[1], rows % weights.shape[1])
+    return places, weight if uniformly or weights.size <= count else np.ones(len(rows))
 
 
 def _ridge(x: Array, target: Array, weights: Array, strength: float) -> Array:
     """Solve a weighted ridge regression; the strength is relative to the mean eigenvalue."""
-    weighted = x * weights[:, None]
-    gram = x.T @ weighted
+    from scipy.linalg.blas import dsyrk
+
+    root = np.sqrt(weights)[:, None]
+    weighted = x * root
+    # Half of a symmetric matrix takes half the time.
+    gram = dsyrk(1.0, weighted.T)
+    gram += np.triu(gram, 1).T
     gram[np.diag_indices_from(gram)] += strength * np.trace(gram) / len(gram) + 1e-12
-    return np.linalg.solve(gram, weighted.T @ target)
+    return np.linalg.solve(gram, weighted.T @ (root * target))
 
 
-def _spread(deviations: Sequence[Array]) -> Array:
-    return np.asarray(np.sqrt(np.mean([np.mean(d**2, axis=0) for d in deviations], axis=0)))
+def _spread(deviations: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(deviations**2, axis=(0, 1))))
 
 
-def _seen_range(traces: Sequence[Trace]) -> tuple[Array, Array]:
-    low = np.min([t.states.min(axis=0) for t in traces], axis=0)
-    high = np.max([t.states.max(axis=0) for t in traces], axis=0)
+def _seen_range(states: Array) -> tuple[Array, Array]:
+    low, high = states.min(axis=(0, 1)), states.max(axis=(0, 1))
     return low - _WIDENING * (high - low), high + _WIDENING * (high - low)
