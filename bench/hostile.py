@@ -209,9 +209,12 @@ def children(pid: int) -> list[int]:
 
 def kill_dask(random: Random, place: Path, kind: str) -> str:
     """Kill workers of a Dask cluster at random moments of a campaign, up to three times."""
+    import dask.config
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+    local = LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None)
+    # On a busy machine workers take longer to restart than the 15 s after which the cluster gives them up.
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"}), local as cluster:
         address = f"dask:{cluster.scheduler_address}"
         process = subprocess.Popen(
             [*COMMAND, *SEARCHES[kind], "--out", str(place), "--executor", address],

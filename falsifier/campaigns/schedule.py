@@ -1,15 +1,21 @@
 """Keeps an executor busy with runs, even if its workers die."""
 
+import logging
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from time import monotonic
 
 from falsifier.campaigns.work import Done, Missing, Task, fmu_file, run_task
 from falsifier.errors import FalsifierError
 from falsifier.evaluation.workers import Workers
 
+_LOG = logging.getLogger(__name__)
+
 # Maximum time in s between two ticks while runs are in progress.
 _TICK = 0.25
+# Time in s without any worker after which that is reported: a cluster needs a moment to replace one.
+_ALONE_SECONDS = 20.0
 
 Report = Callable[[Task, Done], None]
 Tick = Callable[[], bool]
@@ -33,6 +39,8 @@ class Schedule:
         self._waiting = deque(tasks)
         self._suspects: deque[Task] = deque()
         self._running: dict[Future[Done | Missing], Task] = {}
+        self._served = monotonic()
+        self._is_reported = False
 
     def run(self, report: Report, tick: Tick) -> None:
         """Carry out all runs.
@@ -40,16 +48,37 @@ class Schedule:
         Args:
             report: called with each run that has ended.
             tick: called several times per second; once it returns False, no more runs are started and those
-                in progress are awaited.
+                in progress are awaited, as long as there are workers.
         """
         proceed = tick()
         while self._running or (proceed and (self._waiting or self._suspects)):
+            is_served = self._check_served()
+            if not (proceed or is_served):
+                self._workers.executor.shutdown(wait=False, cancel_futures=True)
+                self._running.clear()
+                return
             if proceed:
                 self._submit()
             finished, _ = wait(self._running, timeout=_TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 self._settle(future, report)
             proceed = tick() and proceed
+
+    def _check_served(self) -> bool:
+        """Return whether there are workers; report once if there have been none for long.
+
+        Dask gives up workers that take long to restart.
+        """
+        is_served = self._workers.slots() > 0
+        if is_served:
+            self._served, self._is_reported = monotonic(), False
+        elif not self._is_reported and monotonic() - self._served >= _ALONE_SECONDS:
+            self._is_reported = True
+            _LOG.warning(
+                "the cluster has no workers; the campaign goes on as soon as one joins. Ctrl-C stops it, and "
+                "falsifier resume goes on later"
+            )
+        return is_served
 
     def _submit(self) -> None:
         if self._suspects:  # alone, so that a dead worker identifies its run

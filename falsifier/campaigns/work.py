@@ -15,7 +15,7 @@ from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir
 from threading import Lock
-from time import monotonic
+from time import monotonic, time
 from typing import Any
 from zipfile import ZipFile
 
@@ -30,6 +30,9 @@ from falsifier.search.run import carry_out
 _PATIENCE = 10.0
 # Minimum time in s between two checks for the stop file.
 _STOP_PERIOD = 0.2
+
+# Time in s for which a run that was sent back is kept.
+_KEPT_SECONDS = 86400.0
 
 # A worker carries out one run at a time even if it has several threads: FMUs are loaded once per process.
 _ONE_AT_A_TIME = Lock()
@@ -103,9 +106,9 @@ def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
         )
         if in_place:
             return Done(result.status, result.reason)
-        packed = pack(directory)
-        rmtree(directory)
-        return Done(result.status, result.reason, packed)
+        _sweep(_store())
+        # It stays here for a while: if it gets lost on its way, with this worker, it need not be repeated.
+        return Done(result.status, result.reason, pack(directory))
 
 
 def fmu_file(problem: Problem) -> Path | None:
@@ -133,6 +136,14 @@ def unpack(packed: bytes, directory: Path) -> None:
         archive.extractall(partial)
     rmtree(directory, ignore_errors=True)
     partial.rename(directory)
+
+
+def _sweep(store: Path) -> None:
+    """Remove runs in which nothing has been written for long."""
+    for directory in store.glob("runs/*/runs/*"):
+        written = max((path.stat().st_mtime for path in directory.rglob("*")), default=0.0)
+        if time() - written > _KEPT_SECONDS:
+            rmtree(directory, ignore_errors=True)
 
 
 class _StopWatch:

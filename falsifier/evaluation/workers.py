@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from falsifier.core.candidate import Candidate
-from falsifier.errors import ModelError, SpecError
+from falsifier.errors import SpecError
+from falsifier.evaluation.cluster import connected
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
-# Maximum time in s to wait for a cluster's scheduler.
-_CONNECT_TIMEOUT = 20
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
 # Filter in the format of python -W: warnings whose message starts with this word.
@@ -72,8 +71,13 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
         ModelError: if the scheduler cannot be reached.
     """
     if cluster is not None:
-        with _dask_workers(cluster) as workers:
-            yield workers
+        with connected(cluster) as executor:
+
+            def again() -> Executor:
+                executor.check()
+                return executor
+
+            yield Workers(executor, executor.slots, again)
         return
     _check_jobs(jobs)
     workers = Workers(_process_pool(jobs), lambda: jobs, lambda: _process_pool(jobs))
@@ -156,26 +160,3 @@ def _prepare_worker(log_level: int) -> None:
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
-
-
-@contextmanager
-def _dask_workers(cluster: str) -> Iterator[Workers]:
-    kind, _, address = cluster.partition(":")
-    if kind != "dask" or not address:
-        raise SpecError(f"--executor {cluster}: expected dask:tcp://HOST:PORT")
-    try:
-        from distributed import Client
-    except ImportError:
-        raise SpecError(
-            f"--executor {cluster}: Dask is not installed; install it with pip install 'falsifier[cluster]'"
-        ) from None
-    try:
-        client = Client(address, timeout=_CONNECT_TIMEOUT)
-    except (OSError, ValueError) as error:
-        raise ModelError(f"--executor {cluster}: cannot reach a Dask scheduler there: {error}") from None
-    with client:
-        yield Workers(
-            client.get_executor(pure=False),
-            lambda: len(client.scheduler_info(n_workers=-1)["workers"]),
-            lambda: client.get_executor(pure=False),
-        )

@@ -146,3 +146,33 @@ def test_only_the_run_that_kills_workers_fails(monkeypatch: pytest.MonkeyPatch) 
         "deadly": "failed",
     }
     assert len(made) == 3
+
+
+def test_a_cluster_without_workers_is_reported_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("falsifier.campaigns.schedule._ALONE_SECONDS", 0.0)
+    counts = iter([0, 0, 0, 0, 0, 0])
+    workers = Workers(ThreadPoolExecutor(1), lambda: next(counts, 1), lambda: ThreadPoolExecutor(1))
+    done = run([task("a")], workers, monkeypatch, lambda *_: Done("not falsified", ""))
+    assert list(done) == ["a"]
+    assert [r.message for r in caplog.records if "no workers" in r.message] == [caplog.messages[0]]
+
+
+def test_a_stopped_campaign_does_not_wait_for_workers_that_have_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Silent(Executor):
+        def __init__(self) -> None:
+            self.given_up = False
+
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            return Future()
+
+        def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+            self.given_up = cancel_futures and not wait
+
+    executor, goes_on, counts = Silent(), iter([True, True, False]), iter([1, 1, 0])
+    workers = Workers(executor, lambda: next(counts, 0), lambda: executor)
+    done: dict[str, Done] = {}
+    schedule = Schedule([task("a")], workers, calls=1)
+    schedule.run(lambda t, d: done.__setitem__(t.name, d), lambda: next(goes_on, False))
+    assert executor.given_up and not done

@@ -1,6 +1,7 @@
 """What a worker does that sees neither the campaign's directory nor its FMU."""
 
 import copy
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -51,7 +52,23 @@ def test_a_run_comes_back_packed_where_the_directory_is_not_seen(store: Path, tm
     assert any(isinstance(r, EvaluatedRecord) for r in read_journal(place))
     assert (place / "manifest.json").exists()
     assert len(list((place / "trajectories").iterdir())) == 1
-    assert not list(store.rglob("journal.jsonl")), "the worker keeps no copy"
+
+
+def test_a_run_that_got_lost_on_its_way_is_sent_once_more(store: Path, tmp_path: Path) -> None:
+    task = remote_task(easy(), "python:tests.problems:easy")
+    first = run_task(task, {})
+    (journal,) = store.rglob("journal.jsonl")
+    recorded = journal.read_bytes()
+    again = run_task(task, {})
+    assert isinstance(first, Done) and isinstance(again, Done)
+    assert (again.status, again.reason) == (first.status, first.reason)
+    assert journal.read_bytes().startswith(recorded)
+    assert journal.read_bytes()[len(recorded) :].count(b'"kind":"ended"') == 1, "nothing was simulated again"
+    for path in journal.parent.rglob("*"):
+        os.utime(path, (0, 0))
+    other = run_task(replace(task, name="R-1"), {})
+    assert isinstance(other, Done)
+    assert [path.parent.name for path in store.rglob("journal.jsonl")] == ["R-1"], "kept for a day"
 
 
 def test_an_fmu_that_the_worker_does_not_have_is_asked_for_and_kept(store: Path, tmp_path: Path) -> None:
