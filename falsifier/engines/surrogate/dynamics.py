@@ -19,6 +19,9 @@ from falsifier.engines.surrogate.trace import Trace
 
 # Predicted states are limited to the range of the simulated ones, widened by this share of it on both sides.
 _WIDENING = 0.5
+# Largest predicted deviation, in units of the spread: an unstable fit must not overflow, and deviations this
+# large mean nothing anyway.
+_FAR = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +95,10 @@ class FourierDynamics:
         frequencies = rng.standard_normal((width, settings.features)) / scale
         phases = rng.uniform(0, 2 * np.pi, settings.features)
         amplitude = np.sqrt(2 / settings.features)
-        waves = np.cos((z @ frequencies + phases).astype(np.float32))
-        phi = np.concatenate([waves * amplitude, 0.3 * z, np.ones((len(z), 1))], axis=1)
+        phi = np.ones((len(z), settings.features + width + 1))
+        waves = np.cos(z.astype(np.float32) @ frequencies.astype(np.float32) + phases.astype(np.float32))
+        phi[:, : settings.features] = waves * np.float32(amplitude)
+        phi[:, settings.features : -1] = 0.3 * z
         centre, unit = target.mean(axis=0), target.std(axis=0) + 1e-9
         solution = _ridge(
             phi, (target - centre) / unit, weight * rng.exponential(size=len(z)), settings.ridge
@@ -185,8 +190,8 @@ class DeviationDynamics:
             at = (cells - k) * n
             np.matmul(dy[:, at : at + lags * n], own, out=steps[k])
             steps[k] += driven[k]
-            # An unstable fit must not overflow; deviations this large mean nothing anyway.
-            np.clip(steps[k, :, :n], -30.0, 30.0, out=dy[:, at - n : at])
+            np.maximum(steps[k, :, :n], -_FAR, out=dy[:, at - n : at])
+            np.minimum(dy[:, at - n : at], _FAR, out=dy[:, at - n : at])
         deviations = dy.reshape(count, total, n)[:, cells::-1]
         states = self._base.states[: cells + 1] + deviations * self._state_unit
         excess = steps[:, :, n:].transpose(1, 0, 2)

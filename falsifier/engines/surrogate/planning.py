@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
 from falsifier.engines.layout import Layout
@@ -69,9 +70,10 @@ def plan(
             np.concatenate([costs, predict(children)]),
             settings.parents,
         )
+    blocks = _blocks(layout, settings.directions)
     for step in range(settings.vertex_steps):
         base = pool[0] if step % 2 == 0 else pool[rng.integers(min(5, len(pool)))]
-        towards = _towards_bounds(predict, base)
+        towards = _towards_bounds(predict, base, blocks)
         pool, costs = _best(
             np.concatenate([pool, towards]),
             np.concatenate([costs, predict(towards)]),
@@ -95,11 +97,26 @@ def _best(points: Array, costs: Array, count: int) -> tuple[Array, Array]:
     return points[order], costs[order]
 
 
-def _towards_bounds(predict: Callable[[Array], Array], base: Array) -> Array:
-    """Return points between the base and the corner to which the negative gradient points."""
-    step = np.where(base > 0.5, -0.05, 0.05)
-    costs = predict(np.concatenate([base[None], base + np.diag(step)]))
-    gradient = (costs[1:] - costs[0]) / step
+def _blocks(layout: Layout, most: int) -> NDArray[np.intp]:
+    """Return for each coordinate the number of its block: neighbours of one group, some ``most`` blocks in all."""
+    width = -(-layout.dimension // most)
+    sizes = [-(-len(group) // width) for group in layout.groups]
+    firsts = np.cumsum([0, *sizes[:-1]])
+    parts = [f + np.arange(len(g)) // width for f, g in zip(firsts, layout.groups, strict=True)]
+    return np.concatenate(parts)
+
+
+def _towards_bounds(predict: Callable[[Array], Array], base: Array, blocks: NDArray[np.intp]) -> Array:
+    """Return points between the base and the corner to which the negative gradient points.
+
+    The gradient is taken by blocks of coordinates, as neighbouring cells of an input do nearly the same.
+    """
+    count = int(blocks[-1]) + 1
+    level = np.bincount(blocks, base) / np.bincount(blocks)
+    step = np.where(level > 0.5, -0.05, 0.05)
+    changed = np.where(blocks == np.arange(count)[:, None], base + step[:, None], base)
+    costs = predict(np.concatenate([base[None], np.clip(changed, 0.0, 1.0)]))
+    gradient = ((costs[1:] - costs[0]) / step)[blocks]
     corner = (gradient < 0).astype(np.float64)
     size = np.abs(gradient)
     points = [base + share * (corner - base) for share in (0.1, 0.3, 0.6, 1.0)]

@@ -34,6 +34,7 @@ class Settings:
         parents: number of survivors per generation.
         generations: number of generations of a plan.
         vertex_steps: number of gradient steps towards bounds after the generations.
+        directions: number of blocks of coordinates by which a gradient is taken; more take longer and tell little.
         elites: number of best simulated inputs from which the first candidates are bred.
         snap: difference in predicted scaled robustness up to which a simple input (constant or at its bounds)
             is preferred to the best one: extremes generalise better than fitted details.
@@ -83,6 +84,7 @@ class Settings:
     parents: int = 30
     generations: int = 5
     vertex_steps: int = 4
+    directions: int = 60
     elites: int = 8
     snap: float = 0.5
     snap_decay: float = 0.5
