@@ -98,7 +98,7 @@ def _best(points: Array, costs: Array, count: int) -> tuple[Array, Array]:
 
 
 def _blocks(layout: Layout, most: int) -> NDArray[np.intp]:
-    """Return for each coordinate the number of its block: neighbours of one group, some ``most`` blocks in all."""
+    """Return for each coordinate the number of its block: neighbours of one group, about ``most`` blocks."""
     width = -(-layout.dimension // most)
     sizes = [-(-len(group) // width) for group in layout.groups]
     firsts = np.cumsum([0, *sizes[:-1]])

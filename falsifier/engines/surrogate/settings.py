@@ -34,7 +34,7 @@ class Settings:
         parents: number of survivors per generation.
         generations: number of generations of a plan.
         vertex_steps: number of gradient steps towards bounds after the generations.
-        directions: number of blocks of coordinates by which a gradient is taken; more take longer and tell little.
+        directions: number of blocks of coordinates by which a gradient is taken; more take longer.
         elites: number of best simulated inputs from which the first candidates are bred.
         snap: difference in predicted scaled robustness up to which a simple input (constant or at its bounds)
             is preferred to the best one: extremes generalise better than fitted details.
