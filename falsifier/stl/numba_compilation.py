@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
-def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
+def compiled(function: _Function, *, forceinline: bool = False, fastmath: bool = False) -> _Function:
     """Compile a function at its first call and cache the machine code for later processes.
 
     Numba writes the cache next to the source or to the user's cache folder. If both are read-only (for
@@ -19,12 +19,14 @@ def compiled(function: _Function, *, forceinline: bool = False) -> _Function:
     Args:
         function: the function to compile.
         forceinline: whether to inline its machine code at every call.
+        fastmath: whether sums may be reordered and non-finite numbers ignored.
     """
     import numba
 
     from falsifier.stl.checked_cache import check_cache
 
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": forceinline}
+    options["fastmath"] = fastmath
 
     try:
         result: _Function = numba.njit(cache=True, **options)(function)

@@ -103,37 +103,30 @@ class FourierDynamics:
         solution = _ridge(
             phi, (target - centre) / unit, weight * rng.exponential(size=len(z)), settings.ridge
         )
-        # For fast rollouts, all scalings are folded into two single-precision matrices, which take the state,
-        # the inputs and a one to the phases of the features, and the features with these to the increments.
+        # For fast rollouts, all scalings are folded into two single-precision matrices.
         solution = solution * unit
         raw = frequencies / spread[:, None]
         linear = solution[settings.features : -1] * 0.3 / spread[:, None]
-        self._to_phases = np.vstack([raw, phases - mean @ raw]).astype(np.float32)
-        self._to_steps = np.vstack(
+        to_turns = np.vstack([raw, phases - mean @ raw]) / (2 * np.pi)
+        to_steps = np.vstack(
             [solution[: settings.features] * amplitude, linear, solution[-1] + centre - mean @ linear]
-        ).astype(np.float32)
+        )
+        self._to_turns = to_turns.astype(np.float32)
+        self._to_steps = np.ascontiguousarray(to_steps.T, dtype=np.float32)
         self._low, self._high = (bound.astype(np.float32) for bound in _seen_range(states))
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
-        """Predict m traces, cell by cell, in single precision; arguments as in ``Dynamics.predict``."""
+        """Predict m traces in single precision; arguments as in ``Dynamics.predict``."""
+        from falsifier.engines.surrogate.kernels import roll_out_waves
+
         count, cells, _ = inputs.shape
-        n, features = start.shape[1], self._to_phases.shape[1]
-        states = np.empty((cells + 1, count, n), np.float32)
-        excess = np.empty((cells, count, self._to_steps.shape[1] - n), np.float32)
-        states[0] = start
-        by_cell = inputs.transpose(1, 0, 2).astype(np.float32)
-        basis = np.ones((count, len(self._to_steps)), np.float32)
-        waves, known = basis[:, :features], basis[:, features:]
-        step = np.empty((count, self._to_steps.shape[1]), np.float32)
-        for k in range(cells):
-            known[:, :n], known[:, n:-1] = states[k], by_cell[k]
-            np.cos(known @ self._to_phases, out=waves)
-            np.matmul(basis, self._to_steps, out=step)
-            np.add(states[k], step[:, :n], out=states[k + 1])
-            np.maximum(states[k + 1], self._low, out=states[k + 1])
-            np.minimum(states[k + 1], self._high, out=states[k + 1])
-            excess[k] = step[:, n:]
-        return Prediction(states.transpose(1, 0, 2), excess.transpose(1, 0, 2))
+        n = start.shape[1]
+        states = np.empty((count, cells + 1, n), np.float32)
+        excess = np.empty((count, cells, len(self._to_steps) - n), np.float32)
+        states[:, 0] = start
+        driving = np.ascontiguousarray(inputs, dtype=np.float32)
+        roll_out_waves(self._to_turns, self._to_steps, self._low, self._high, driving, states, excess)
+        return Prediction(states, excess)
 
 
 class DeviationDynamics:
@@ -153,11 +146,13 @@ class DeviationDynamics:
         weights = np.repeat(rng.exponential(size=(others.sum(), 1)) + 0.2, inputs.shape[1], axis=1)
         rows, weight = _drawn(weights, settings.most_rows, rng, uniformly=True)
         dy, du = self._deviations(states[others], inputs[others])
-        past = rows[1][:, None] + np.arange(lags - 1, -1, -1)
+        past = rows[1][:, None] + np.arange(lags)
         x = np.concatenate([part[rows[0][:, None], past].reshape(len(past), -1) for part in (dy, du)], axis=1)
         de = (excess[others] - self._base.excess)[rows] / self._excess_unit
         target = np.concatenate([dy[rows[0], rows[1] + lags], de], axis=1)
-        self._weights = _ridge(x, target, weight, settings.linear_ridge)
+        linear = _ridge(x, target, weight, settings.linear_ridge).T
+        self._own = np.ascontiguousarray(linear[:, : lags * states.shape[2]])
+        self._driving = np.ascontiguousarray(linear[:, lags * states.shape[2] :])
         self._low, self._high = _seen_range(states)
 
     def _deviations(self, states: Array, inputs: Array) -> tuple[Array, Array]:
@@ -173,28 +168,18 @@ class DeviationDynamics:
         return dy, du
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
-        """Predict m traces, cell by cell, as deviations; arguments as in ``Dynamics.predict``."""
+        """Predict m traces as deviations; arguments as in ``Dynamics.predict``."""
+        from falsifier.engines.surrogate.kernels import roll_out_deviations
+
         count, cells, _ = inputs.shape
-        lags, n = self._lags, start.shape[1]
+        n = start.shape[1]
         first, du = self._deviations(start[:, None], inputs)
-        # The contribution of the inputs to every step, for all cells at once.
-        own, driving = self._weights[: lags * n], self._weights[lags * n :]
-        windows = np.lib.stride_tricks.sliding_window_view(du[:, ::-1], lags, axis=1)[:, ::-1]
-        driven = windows.transpose(1, 0, 3, 2).reshape(cells, count, -1) @ driving
-        # The most recent cell comes first, so that the past of a cell is one slice.
-        total = cells + lags
-        dy = np.zeros((count, total * n))
-        dy[:, cells * n :] = first[:, ::-1].reshape(count, -1)
-        steps = np.empty((cells, count, driving.shape[1]))
-        for k in range(cells):
-            at = (cells - k) * n
-            np.matmul(dy[:, at : at + lags * n], own, out=steps[k])
-            steps[k] += driven[k]
-            np.maximum(steps[k, :, :n], -_FAR, out=dy[:, at - n : at])
-            np.minimum(dy[:, at - n : at], _FAR, out=dy[:, at - n : at])
-        deviations = dy.reshape(count, total, n)[:, cells::-1]
-        states = self._base.states[: cells + 1] + deviations * self._state_unit
-        excess = steps[:, :, n:].transpose(1, 0, 2)
+        dy = np.empty((count, self._lags + cells, n))
+        dy[:, : self._lags] = first
+        excess = np.empty((count, cells, len(self._own) - n))
+        inputs_in_row, states_in_row = du.reshape(count, -1), dy.reshape(count, -1)
+        roll_out_deviations(self._own, self._driving, _FAR, inputs_in_row, states_in_row, excess)
+        states = self._base.states[: cells + 1] + dy[:, self._lags - 1 :] * self._state_unit
         return Prediction(
             np.clip(states, self._low, self._high), self._base.excess[:cells] + excess * self._excess_unit
         )

@@ -1,0 +1,44 @@
+"""The compiled rollouts against the same recursions in numpy."""
+
+import numpy as np
+
+from falsifier.engines.surrogate.kernels import roll_out_deviations, roll_out_waves
+
+TRACES, CELLS, STATES, INPUTS, LEAVES, FEATURES, LAGS = 3, 7, 2, 2, 1, 20, 3
+
+
+def test_waves_follow_cosines_of_state_and_inputs_within_bounds() -> None:
+    rng = np.random.default_rng(0)
+    to_turns = rng.standard_normal((STATES + INPUTS + 1, FEATURES)).astype(np.float32)
+    to_steps = rng.standard_normal((STATES + LEAVES, FEATURES + STATES + INPUTS + 1)).astype(np.float32) / 5
+    low, high = np.array([[-1.5, -9.0], [1.5, 9.0]], dtype=np.float32)
+    inputs = rng.random((TRACES, CELLS, INPUTS), dtype=np.float32)
+    states = np.zeros((TRACES, CELLS + 1, STATES), np.float32)
+    excess = np.empty((TRACES, CELLS, LEAVES), np.float32)
+    roll_out_waves(to_turns, to_steps, low, high, inputs, states, excess)
+    for k in range(CELLS):
+        known = np.concatenate([states[:, k], inputs[:, k], np.ones((TRACES, 1), np.float32)], axis=1)
+        basis = np.concatenate([np.cos(2 * np.pi * (known @ to_turns)), known], axis=1)
+        step = basis @ to_steps.T
+        np.testing.assert_allclose(
+            states[:, k + 1], np.clip(states[:, k] + step[:, :STATES], low, high), atol=1e-4
+        )
+        np.testing.assert_allclose(excess[:, k], step[:, STATES:], atol=1e-4)
+    assert (np.abs(states[..., 0]) <= 1.5).all() and (np.abs(states[..., 0]) == 1.5).any()
+
+
+def test_deviations_follow_the_last_states_and_inputs() -> None:
+    rng = np.random.default_rng(1)
+    own = rng.standard_normal((STATES + LEAVES, LAGS * STATES))
+    driving = rng.standard_normal((STATES + LEAVES, LAGS * INPUTS))
+    inputs = rng.standard_normal((TRACES, LAGS - 1 + CELLS, INPUTS))
+    states = np.zeros((TRACES, LAGS + CELLS, STATES))
+    excess = np.empty((TRACES, CELLS, LEAVES))
+    rows = inputs.reshape(TRACES, -1), states.reshape(TRACES, -1)
+    roll_out_deviations(own, driving, 4.0, *rows, excess)
+    for k in range(CELLS):
+        step = states[:, k : k + LAGS].reshape(TRACES, -1) @ own.T
+        step += inputs[:, k : k + LAGS].reshape(TRACES, -1) @ driving.T
+        np.testing.assert_allclose(states[:, k + LAGS], np.clip(step[:, :STATES], -4.0, 4.0))
+        np.testing.assert_allclose(excess[:, k], step[:, STATES:])
+    assert (np.abs(states) == 4.0).any()
