@@ -265,7 +265,9 @@ class LLMEngine:
         seen |= {c.key: "one that was proposed already" for c in self._pending}
         new = {c.key: c for c in candidates if c.key not in seen}
         if not new:
-            raise RejectedReplyError(f"it repeats {seen[candidates[0].key]}")
+            # The published prompts number only the samples that they show.
+            which = "an earlier sample" if self._variant.is_published else seen[candidates[0].key]
+            raise RejectedReplyError(f"it repeats {which}")
         return list(new.values())
 
 

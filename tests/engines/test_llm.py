@@ -67,7 +67,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
     assert [r.body["reasoning_effort"] for r in server.received] == ["high", "high"]
     opening, following = (r.texts[-1] for r in server.received)
     assert "Sample" not in opening
-    for told in ("+0.419", "82.5 at 8.3 s", "81.5 at 50.0 s", "t = 20.0 s with speed = 119.6"):
+    for told in ("robustness 0.419", "82.5 at 8.3 s", "81.5 at 50.0 s", "t = 20.0 s with speed = 119.6"):
         assert told in following
     assert result.spent.calls == 2
     assert result.spent.tokens == 240
@@ -119,7 +119,7 @@ def test_the_road_to_a_valid_reply() -> None:
     assert problems[0] is None and problems[-1] is None
     assert "neither a JSON object" in (problems[1] or "")
     assert "'u' at t = 10 s: 7 is outside its range [-1, 1]" in (problems[2] or "")
-    assert problems[3] == "it repeats sample 1"
+    assert problems[3] == "it repeats an earlier sample"
     assert exchanges[1].reply is not None and exchanges[1].reply.attempts == 3
 
 

@@ -1,6 +1,7 @@
 """The part of a prompt that advises how to use the rest."""
 
 from falsifier.llm.prompts.blocks import AdviceBlock
+from falsifier.llm.prompts.published import guidance
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl.formula import Always, And, Formula, Implies
@@ -8,21 +9,16 @@ from falsifier.stl.formula import Always, And, Formula, Implies
 
 def advice(view: View, variant: Variant) -> AdviceBlock:
     """Advice that fits what the variant shows, how the requirement is built and what is chosen."""
+    if variant.is_published:
+        return AdviceBlock(lines=guidance(view, variant))
     what = view.chosen
     samples = [
-        f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs."
-    ]
-    if variant.has("critical"):
-        samples.append(
-            f"Look at the time that decided each robustness value, and change the {what} so that the signals "
-            "at that time move towards violating the requirement."
-        )
-    if not variant.has("observations"):
-        return AdviceBlock(lines=tuple(samples))
-    samples.append(
+        f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs.",
+        f"Look at the time that decided each robustness value, and change the {what} so that the signals "
+        "at that time move towards violating the requirement.",
         "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
-        "strategy."
-    )
+        "strategy.",
+    ]
     return AdviceBlock(lines=tuple(_at_any_time(view, variant)), on_samples=tuple(samples))
 
 

@@ -1,15 +1,15 @@
 """From a problem and its evaluations to a prompt: selects what is shown and arranges it in blocks."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import InputRange, ParameterRange, nearest_value
+from falsifier.core.space import InputRange, ParameterRange
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
     BudgetBlock,
+    CourseLine,
     DimensionLine,
     HistoryBlock,
     InputLine,
@@ -17,7 +17,6 @@ from falsifier.llm.prompts.blocks import (
     OutputsBlock,
     ParameterLine,
     Prompt,
-    ReplyBlock,
     RequirementBlock,
     SampleLines,
     SignalLine,
@@ -25,8 +24,9 @@ from falsifier.llm.prompts.blocks import (
     TaskBlock,
 )
 from falsifier.llm.prompts.context import Context
-from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
-from falsifier.llm.prompts.published import published_facts
+from falsifier.llm.prompts.numbers import bounds, number, signed
+from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, clock, published_facts
+from falsifier.llm.prompts.reply import reply_block
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl import in_words
@@ -60,15 +60,20 @@ def build_prompt(
     context = context or Context()
     return Prompt(
         variant=variant.name,
-        task=TaskBlock(knows_requirement=variant.has("requirement"), chosen=view.chosen, count=count),
+        task=TaskBlock(
+            knows_requirement=variant.has("requirement"),
+            is_published=variant.is_published,
+            chosen=view.chosen,
+            count=count,
+        ),
         system=_system(view) if variant.has("system") else None,
         requirement=_requirement(view, variant) if variant.has("requirement") else None,
         outputs=_outputs(view, variant, context) if variant.has("outputs") else None,
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
         history=_history(view, variant, evaluations, pending, notes, context),
         budget=_budget(variant, evaluations, context),
-        advice=advice(view, variant) if variant.has("advice") else None,
-        reply=_reply(view, variant, count),
+        advice=advice(view, variant),
+        reply=reply_block(view, variant, count),
     )
 
 
@@ -133,14 +138,18 @@ def _start(variant: Variant, context: Context, name: str) -> str:
 
 def _dimensions(view: View, variant: Variant) -> InputsBlock:
     """The numbers to choose, with or without their meanings."""
-    clock = decimals_for(view.space.stop_time, 4)
     dimensions = []
     for i, dimension in enumerate(view.space.dimensions, start=1):
         low, high = bounds(dimension.low, dimension.high)
-        at = "" if dimension.time is None else f" at t = {plain(dimension.time, clock)} s"
+        at = "" if dimension.time is None else f" at t = {clock(view, dimension.time)}"
         meaning = f"{dimension.name}{at}" if variant.has("names") else ""
         dimensions.append(DimensionLine(number=i, meaning=meaning, low=low, high=high))
-    return InputsBlock(stop_time=number(view.space.stop_time), dimensions=tuple(dimensions))
+    named = view.space.inputs if variant.has("names") else ()
+    courses = (
+        CourseLine(name=r.name, interpolation=r.interpolation, hold=r.hold, is_constant=r.control_points == 1)
+        for r in named
+    )
+    return InputsBlock(dimensions=tuple(dimensions), courses=tuple(courses))
 
 
 def _named_inputs(view: View, variant: Variant) -> InputsBlock:
@@ -215,13 +224,14 @@ def _history(
         depths = {}
     if not chosen and not pending and not notes:
         return None
-    judged = sum(e.verdict is not None or variant.has("failures") for e in evaluations)
+    # The published prompts count the samples that they show, not all that there were.
+    numbers = {i: n for n, i in enumerate(chosen)} if variant.is_published else {i: i for i in chosen}
     return HistoryBlock(
         samples=tuple(
-            _sample(view, variant, i, mark, evaluations[i], depths.get(i, "close"), context)
+            _sample(view, variant, numbers[i], mark, evaluations[i], depths.get(i, "close"), context)
             for i, mark in chosen.items()
         ),
-        omitted=judged - len(chosen),
+        omitted=0 if variant.is_published else len(evaluations) - len(chosen),
         pending=tuple("; ".join(_chosen(view, variant, c)) for c in pending),
         notes=(*(_notes(view, evaluations) if variant.has("observations") else ()), *notes),
     )
@@ -240,12 +250,15 @@ def _sample(
     if evaluation.robustness is None:
         return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
     rich = variant.has("observations")
-    digits = observations.ROBUSTNESS_DIGITS if rich else 3
+    if rich:
+        robustness = signed(evaluation.robustness, observations.ROBUSTNESS_DIGITS)
+    else:
+        robustness = f"{evaluation.robustness:.{ROBUSTNESS_DECIMALS}f}"
     return SampleLines(
         number=index + 1,
         mark=mark,
         inputs=inputs,
-        robustness=signed(evaluation.robustness, digits),
+        robustness=robustness,
         doubt=context.doubts.get(evaluation.candidate.key, ""),
         facts=tuple(
             _observed(view, evaluation, depth) if rich else published_facts(view, variant, evaluation)
@@ -285,62 +298,4 @@ def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:
         f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its value "
         "gives no direction. Look instead at how close a condition came to being true, how briefly a "
         "discrete value was held, and how far a signal was from its switching point."
-    ]
-
-
-def _reply(view: View, variant: Variant, count: int) -> ReplyBlock:
-    space = view.space
-    one: dict[str, object] = {"rationale": "why these values"}
-    free = variant.has("freedom") and any(r.free for r in space.inputs)
-    if not variant.has("names"):
-        one["point"] = _spread([(d.low, d.high) for d in space.dimensions])
-    else:
-        if space.inputs:
-            one["signals"] = [_example(view, r, k, free=free) for k, r in enumerate(space.inputs)]
-        if space.parameters:
-            values = _spread([(p.low, p.high) for p in space.parameters])
-            one["parameters"] = [
-                {"name": p.name, "value": nearest_value(p, value)}
-                for p, value in zip(space.parameters, values, strict=True)
-            ]
-    example = json.dumps(one if count == 1 else {"candidates": [one]})
-    return ReplyBlock(example=example, notes=_FREE_NOTES if free else ())
-
-
-_FREE_NOTES = (
-    'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
-    "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
-    'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
-    "stop time.",
-    'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
-)
-# Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
-_PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
-# Share of the stop time at which the pieces of an example begin.
-_BEGINNINGS = (0.0, 0.24, 0.62)
-
-
-def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
-    limits = [(r.low, r.high)]
-    if not free:
-        values = [nearest_value(r, v) for v in _spread(limits * r.control_points, position)]
-        return {"name": r.name, "values": values}
-    times: list[float] = []
-    interpolation: str = r.interpolation
-    count = min(r.control_points, len(_PLACES))
-    stepping = r.free and r.free.max_control_points >= len(_BEGINNINGS)
-    if stepping and r.free and position == 0 and r.free.min_interval <= view.space.stop_time / 5:
-        times = [float(f"{share * view.space.stop_time:.3g}") for share in _BEGINNINGS]
-        interpolation, count = "constant", len(times)
-    elif r.free is None:
-        count = r.control_points
-    values = [nearest_value(r, v) for v in _spread(limits * count, position)]
-    return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
-
-
-def _spread(limits: Sequence[tuple[float, float]], first: int = 0) -> list[float]:
-    """Numbers within their limits that differ from each other."""
-    places = (_PLACES[(first + k) % len(_PLACES)] for k in range(len(limits)))
-    return [
-        float(f"{low + place * (high - low):.4g}") for place, (low, high) in zip(places, limits, strict=True)
     ]

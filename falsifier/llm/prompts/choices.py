@@ -14,6 +14,7 @@ from falsifier.llm.prompts.view import View
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 7
+_PUBLISHED_DECIMALS = 3
 
 # Said of values where the sample had other control points than those that are told.
 _READ = " (values at these times of an input with other control points)"
@@ -22,19 +23,28 @@ _READ = " (values at these times of an input with other control points)"
 def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
     """The numbers in the order of the dimensions."""
     is_exact = all(_is_exact(view, r, candidate.signals[r.name]) for r in view.space.inputs)
-    return (f"point = {runs([float(v) for v in view.space.encode(candidate)])}{'' if is_exact else _READ}",)
+    values = zip(view.space.encode(candidate), view.space.dimensions, strict=True)
+    listed = ", ".join(_published(float(value), d.low, d.high) for value, d in values)
+    return (f"point = [{listed}]{'' if is_exact else _READ}",)
 
 
 def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
     """Values of each input at the fixed control points, by name, and parameters."""
     signals = [(r, candidate.signals[r.name]) for r in view.space.inputs]
+    parameters = [(p, candidate.parameters[p.name]) for p in view.space.parameters]
     return (
         *(
-            f"{r.name} = {runs(_fixed_values(view, r, s))}{'' if _is_exact(view, r, s) else _READ}"
+            f"{r.name} = [{', '.join(_published(v, r.low, r.high) for v in _fixed_values(view, r, s))}]"
+            f"{'' if _is_exact(view, r, s) else _READ}"
             for r, s in signals
         ),
-        *_parameters(view, candidate),
+        *(f"{p.name} = {_published(value, p.low, p.high)}" for p, value in parameters),
     )
+
+
+def _published(value: float, low: float, high: float) -> str:
+    """A value with the published three decimals; with more only if the range is too narrow for them."""
+    return plain(value, max(_PUBLISHED_DECIMALS, decimals_for(high - low, 2)))
 
 
 def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:

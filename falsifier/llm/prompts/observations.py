@@ -94,7 +94,7 @@ def details(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterat
         return
     times = trajectory.times
     steps = _input_steps(evaluation) if close else ()
-    compared = _compared(view, trajectory)
+    compared = compared_columns(view, trajectory)
     if not close:
         compared = {name: column for name, column in compared.items() if name in _deciding(view, verdict)}
     columns = _shown_columns(view, trajectory, compared) if close else compared
@@ -196,7 +196,7 @@ def _short(margin: float) -> str:
     return f"{margin:.5g}"
 
 
-def _compared(view: View, trajectory: Trajectory) -> dict[str, Array]:
+def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
     formula = view.requirement.formula
     sides = {str(side): side for p in formula.predicates for side in (p.left, p.right)}
