@@ -11,6 +11,8 @@ Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
 Mode = Literal["json_schema", "json_object", "prompt"]
 MODES: tuple[Mode, ...] = get_args(Mode)
+# What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
+ReplyKind = Literal["json", "points"]
 
 
 class _Value(BaseModel):

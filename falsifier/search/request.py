@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from falsifier.core.secrets import is_secret_option
+from falsifier.llm.messages import ReplyKind
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
@@ -28,6 +29,9 @@ class LLMSettings(_Strict):
     effort: Effort | None = None
     api_base: str | None = None
     variant: str | None = Field(default=None, description="Prompt variant; default: the best one.")
+    reply: ReplyKind = Field(
+        default="json", description="What a reply consists of: a JSON object, or numbers between tags."
+    )
     options: dict[str, str | float] = Field(default_factory=dict, description="Passed to litellm unchanged.")
     price: tuple[_Price, _Price] | None = Field(
         default=None,

@@ -89,6 +89,26 @@ def test_preview_is_what_is_sent() -> None:
         assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
 
 
+@pytest.mark.parametrize("variant", ["MP1", "MP4", "MP5"])
+def test_replies_as_points(variant: str) -> None:
+    problem = lag_problem(free=Freedom(100, 0.1))
+    asked = "<point>0, 0, 9, -9</point>", "So: <point>0, 0, 0.25, 1</point>", "<point>1, 1, 1, 1</point>"
+    chat = ScriptedChat(list(asked))
+    engine = make_llm_engine(problem, chat, variant=variant, reply="points")
+    engine.tell([evaluate(problem, *engine.ask())])
+    (second,) = engine.ask()
+    assert second.signals["u"].values == (1, 1, 1, 1)
+    first, rejected, later = chat.requests
+    assert all(request.reply_schema is None for request in chat.requests)
+    assert (
+        "between <point> and </point>" in first.messages[0].content
+        and "JSON" not in first.messages[0].content
+    )
+    assert "at t = 6.66667, 10 s: 9, -9 are outside its range [-1, 1]" in rejected.messages[-1].content
+    assert ("point = [0, 0, 0.25, 1]" in later.messages[-1].content) == (variant != "MP5")
+    assert first.messages == preview(problem, variant=variant, reply="points")
+
+
 def test_the_road_to_a_valid_reply() -> None:
     """Rate limit, lost connection, bad JSON, a point out of range, a repetition, then success."""
     problem = lag_problem()
@@ -117,7 +137,7 @@ def test_the_road_to_a_valid_reply() -> None:
         assert len(server.received) == 7
     problems = [e.problem for e in exchanges]
     assert problems[0] is None and problems[-1] is None
-    assert "neither a JSON object" in (problems[1] or "")
+    assert "no JSON object" in (problems[1] or "")
     assert "'u' at t = 10 s: 7 is outside its range [-1, 1]" in (problems[2] or "")
     assert problems[3] == "it repeats an earlier sample"
     assert exchanges[1].reply is not None and exchanges[1].reply.attempts == 3

@@ -154,7 +154,8 @@ class AdviceBlock(_Block):
 class ReplyBlock(_Block):
     """The required form of the reply."""
 
-    example: str
+    example: str = Field(default="", description="Empty: numbers between tags are asked for.")
+    order: str = Field(default="", description="Order of the numbers between tags.")
     has_numbers: bool = Field(default=True, description="Whether the example contains numbers.")
     notes: tuple[str, ...] = ()
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
@@ -44,6 +45,7 @@ def build_prompt(
     pending: Sequence[Candidate] = (),
     notes: Sequence[str] = (),
     count: int = 1,
+    reply: ReplyKind = "json",
     context: Context | None = None,
 ) -> Prompt:
     """Build the prompt for the next candidates.
@@ -55,6 +57,7 @@ def build_prompt(
         pending: candidates without an evaluation yet.
         notes: lines about the search as a whole, from the engine that leads it.
         count: number of candidates wanted.
+        reply: what a reply is to consist of.
         context: what is known of the run; default: nothing.
     """
     context = context or Context()
@@ -70,10 +73,10 @@ def build_prompt(
         requirement=_requirement(view, variant) if variant.has("requirement") else None,
         outputs=_outputs(view, variant, context) if variant.has("outputs") else None,
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
-        history=_history(view, variant, evaluations, pending, notes, context),
+        history=_history(view, variant, evaluations, pending, notes, context, reply),
         budget=_budget(variant, evaluations, context),
         advice=advice(view, variant),
-        reply=reply_block(view, variant, count),
+        reply=reply_block(view, variant, count, reply),
     )
 
 
@@ -215,6 +218,7 @@ def _history(
     pending: Sequence[Candidate],
     notes: Sequence[str],
     context: Context,
+    reply: ReplyKind,
 ) -> HistoryBlock | None:
     if variant.has("selection"):
         chosen = selection.recent_best_and_different(view, evaluations)
@@ -228,11 +232,11 @@ def _history(
     numbers = {i: n for n, i in enumerate(chosen)} if variant.is_published else {i: i for i in chosen}
     return HistoryBlock(
         samples=tuple(
-            _sample(view, variant, numbers[i], mark, evaluations[i], depths.get(i, "close"), context)
+            _sample(view, variant, numbers[i], mark, evaluations[i], depths.get(i, "close"), context, reply)
             for i, mark in chosen.items()
         ),
         omitted=0 if variant.is_published else len(evaluations) - len(chosen),
-        pending=tuple("; ".join(_chosen(view, variant, c)) for c in pending),
+        pending=tuple("; ".join(_chosen(view, variant, c, reply)) for c in pending),
         notes=(*(_notes(view, evaluations) if variant.has("observations") else ()), *notes),
     )
 
@@ -245,8 +249,9 @@ def _sample(
     evaluation: Evaluation,
     depth: selection.Depth,
     context: Context,
+    reply: ReplyKind,
 ) -> SampleLines:
-    inputs = _chosen(view, variant, evaluation.candidate)
+    inputs = _chosen(view, variant, evaluation.candidate, reply)
     if evaluation.robustness is None:
         return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
     rich = variant.has("observations")
@@ -282,8 +287,8 @@ def _failure(evaluation: Evaluation) -> str:
     return f"no verdict, the simulation {how}: {evaluation.reason}".rstrip(": ")
 
 
-def _chosen(view: View, variant: Variant, candidate: Candidate) -> tuple[str, ...]:
-    if not variant.has("names"):
+def _chosen(view: View, variant: Variant, candidate: Candidate, reply: ReplyKind) -> tuple[str, ...]:
+    if not variant.has("names") or (variant.is_published and reply == "points"):
         return choices.as_point(view, candidate)
     return (choices.as_signals if variant.has("system") else choices.as_values)(view, candidate)
 

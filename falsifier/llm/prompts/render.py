@@ -158,6 +158,13 @@ def _parameter(line: ParameterLine) -> str:
 
 
 def _reply(block: ReplyBlock, count: int) -> str:
+    if not block.example:
+        what = f"{count} different samples" if count > 1 else "the new sample"
+        them = "each sample" if count > 1 else "them"
+        return (
+            f"Think step by step, but write no code. End your reply with {what}: {block.order}; separate the "
+            f"numbers by commas and put {them} between <point> and </point>."
+        )
     many = f" with {count} different candidates" if count > 1 else ""
     own = "; the numbers below only show the form, choose your own" if block.has_numbers else ""
     return "\n".join(

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from falsifier.core.space import InputRange, nearest_value
 from falsifier.core.words import counted
+from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts.blocks import ReplyBlock
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
@@ -23,8 +24,10 @@ _PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
 _BEGINNINGS = (0.0, 0.24, 0.62)
 
 
-def reply_block(view: View, variant: Variant, count: int) -> ReplyBlock:
+def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "json") -> ReplyBlock:
     """Say what form a reply has."""
+    if reply == "points":
+        return ReplyBlock(order=_order(view, variant))
     if variant.is_published:
         # The published prompts show no numbers before the first sample.
         return ReplyBlock(example=_blank(view, variant, count), has_numbers=False)
@@ -41,6 +44,20 @@ def reply_block(view: View, variant: Variant, count: int) -> ReplyBlock:
         ]
     example = json.dumps(one if count == 1 else {"candidates": [one]})
     return ReplyBlock(example=example, notes=_FREE_NOTES if free else ())
+
+
+def _order(view: View, variant: Variant) -> str:
+    """Which numbers a point has."""
+    numbers = counted(len(view.space.dimensions), "number")
+    if variant.is_published:
+        return f"its {numbers} in the order above"
+    signals = (
+        f"the value of {r.name}"
+        if r.control_points == 1
+        else f"the values of {r.name} at its {r.control_points} control points"
+        for r in view.space.inputs
+    )
+    return f"its {numbers} in this order: {', '.join((*signals, *(p.name for p in view.space.parameters)))}"
 
 
 def _blank(view: View, variant: Variant, count: int) -> str:

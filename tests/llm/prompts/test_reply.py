@@ -32,3 +32,10 @@ def test_the_example_has_the_form_that_is_asked_for() -> None:
     assert built("MP5").notes
     fixed = View.of(replace(PROBLEM, space=PROBLEM.space.fixed))
     assert reply_block(fixed, VARIANTS["MP5"], 1).notes == ()
+
+
+def test_points_are_asked_for_in_the_order_of_the_list_or_a_stated_one() -> None:
+    view = View.of(replace(PROBLEM, space=PROBLEM.space.fixed))
+    published, own = (reply_block(view, VARIANTS[name], 1, "points") for name in ("MP2", "MP5"))
+    assert (published.example, published.order) == ("", "its 5 numbers in the order above")
+    assert own.order == "its 5 numbers in this order: the values of u at its 4 control points, x0"
