@@ -112,10 +112,7 @@ class LLMEngine:
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Be told that a violation does not count, which prompts state with the reason."""
-        shown = confirmation.candidate
-        if self._disguise:
-            shown = self._disguise.hidden_candidate(shown)
-        self._doubts[shown.key] = in_doubt(confirmation)
+        self._doubts |= _doubts([confirmation], self._disguise)
 
     @property
     def handed_over(self) -> bool:
@@ -198,7 +195,11 @@ class LLMEngine:
         """Add evaluations to the history, including those of other engines' candidates."""
         if self._fallback is not None:
             self._fallback.tell(evaluations)
-        told = [self._disguise.hidden(e) for e in evaluations] if self._disguise else evaluations
+        told = evaluations
+        if self._disguise:
+            self._circumstances()  # first, so that values at time 0 determine scales before trajectories do
+            self._wear(self._disguise.fitted(evaluations))
+            told = [self._disguise.hidden(e) for e in evaluations]
         keys = {e.candidate.key for e in told}
         self._pending = [c for c in self._pending if c.key not in keys]
         self._evaluations = _thinned([*self._evaluations, *told])
@@ -257,8 +258,14 @@ class LLMEngine:
     def _circumstances(self) -> Context:
         if self._context is None:
             start = self._start() if self._variant.has("circumstances") else {}
-            self._context = Context(start=self._disguise.hidden_values(start) if self._disguise else start)
+            if self._disguise:
+                self._wear(self._disguise.fitted_to_start(start))
+                start = self._disguise.hidden_values(start)
+            self._context = Context(start=start)
         return replace(self._context, simulations=self._simulations, doubts=self._doubts)
+
+    def _wear(self, disguise: Disguise) -> None:
+        self._disguise, self._view = disguise, disguise.view
 
     def _new(self, candidates: list[Candidate]) -> list[Candidate]:
         """Return the candidates that are neither evaluated nor pending.
@@ -266,6 +273,8 @@ class LLMEngine:
         Raises:
             RejectedReplyError: if there is none.
         """
+        if self._disguise:
+            candidates = [self._disguise.canonical(c) for c in candidates]
         seen = {e.candidate.key: f"sample {i}" for i, e in enumerate(self._evaluations, start=1)}
         seen |= {c.key: "one that was proposed already" for c in self._pending}
         new = {c.key: c for c in candidates if c.key not in seen}
@@ -346,12 +355,12 @@ def preview(
     told = variant_named(variant)
     view = _told_view(View.of(problem), reply)
     start = start_values(problem) if told.has("circumstances") else {}
-    doubts: dict[Hashable, str] = {c.candidate.key: in_doubt(c) for c in doubtful}
+    disguise = None
     if anonymous:
-        disguise = Disguise.of(view)
-        doubts = {disguise.hidden_candidate(c.candidate).key: in_doubt(c) for c in doubtful}
+        disguise = Disguise.of(view).fitted_to_start(start).fitted(evaluations)
         view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
         start = disguise.hidden_values(start)
+    doubts = _doubts(doubtful, disguise)
     prompt = build_prompt(
         view, told, evaluations, count=count, reply=reply, context=Context(simulations, start, doubts)
     )
@@ -387,6 +396,16 @@ def _form(view: View, variant: Variant, reply: ReplyKind, *, count: int, reasone
         count=count,
         reasoned=reasoned,
     )
+
+
+def _doubts(confirmations: Sequence[Confirmation], disguise: Disguise | None) -> dict[Hashable, str]:
+    """Why violations do not count, by the keys of their candidates as they are told."""
+    if disguise is None:
+        return {c.candidate.key: in_doubt(c) for c in confirmations}
+    return {
+        disguise.hidden_candidate(c.candidate).key: in_doubt(c, disguise.unit_of(c.evaluation))
+        for c in confirmations
+    }
 
 
 def _unchanged(value: T) -> T:

@@ -115,7 +115,7 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
                 name=name,
                 unit=view.unit(name),
                 description=view.description(name),
-                kind=view.kind(name),
+                kind=view.kind(name) if view.tells_kinds else "real",
                 start=_start(variant, context, name),
             )
             for name in (*view.formula_outputs, *others)
@@ -161,7 +161,7 @@ def _named_inputs(view: View, variant: Variant) -> InputsBlock:
     return InputsBlock(
         stop_time=number(view.space.stop_time),
         inputs=tuple(_input(view, r, free=free) for r in view.space.inputs),
-        parameters=tuple(_parameter(p) for p in view.space.parameters),
+        parameters=tuple(_parameter(view, p) for p in view.space.parameters),
     )
 
 
@@ -178,8 +178,8 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
         name=r.name,
         unit=r.unit,
         description=r.description,
-        kind=r.kind,
-        items=_items(r),
+        kind="levels" if r.name in view.levels else r.kind,
+        items=_items(view, r),
         low=low,
         high=high,
         control_points=r.control_points,
@@ -192,22 +192,24 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     )
 
 
-def _parameter(p: ParameterRange) -> ParameterLine:
+def _parameter(view: View, p: ParameterRange) -> ParameterLine:
     low, high = bounds(p.low, p.high)
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
         name=p.name,
         unit=p.unit,
         description=p.description,
-        kind=p.kind,
-        items=_items(p),
+        kind="levels" if p.name in view.levels else p.kind,
+        items=_items(view, p),
         low=low,
         high=high,
         nominal=nominal,
     )
 
 
-def _items(ranged: InputRange | ParameterRange) -> tuple[str, ...]:
+def _items(view: View, ranged: InputRange | ParameterRange) -> tuple[str, ...]:
+    if ranged.name in view.levels:
+        return tuple(number(level) for level in view.levels[ranged.name])
     return tuple(f"{n} = {name}" for name, n in ranged.items if ranged.low <= n <= ranged.high)
 
 

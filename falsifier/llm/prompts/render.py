@@ -77,7 +77,7 @@ def _requirement(block: RequirementBlock) -> str:
 def _outputs(block: OutputsBlock) -> str:
     if not block.signals:
         return "Output signals: none; the requirement refers to inputs only."
-    if not any(s.unit or s.description or s.kind != "real" for s in block.signals):
+    if not block.legend and not any(s.unit or s.description or s.kind != "real" for s in block.signals):
         return f"Output signals: {', '.join(s.name for s in block.signals)}"
     legend = (block.legend,) if block.legend else ()
     return "\n".join(("Recorded signals:", *(_signal(s) for s in block.signals), *legend))

@@ -1,6 +1,7 @@
 """What an LLM may know about a problem: everything except the model itself."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.space import SearchSpace
@@ -17,12 +18,16 @@ class View:
         requirement: the requirement to violate.
         space: search space.
         experiment: stop time and output grid.
+        levels: values that something searched can take, by name, if they are levels without a type.
+        tells_kinds: whether types of signals are told.
     """
 
     info: ModelInfo
     requirement: Requirement
     space: SearchSpace
     experiment: Experiment
+    levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    tells_kinds: bool = True
 
     @classmethod
     def of(cls, problem: Problem) -> "View":
