@@ -418,6 +418,7 @@ def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
         messages=request.messages,
         parameters=dict(chat.parameters),
         reply=None,
+        lost=error.lost,
         problem=str(error),
     )
 

@@ -95,3 +95,14 @@ def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> No
     assert done.code == 2
     assert "set OPENAI_API_KEY" in done.err
     assert not (tmp_path / "runs").exists()
+
+
+def test_an_unknown_option_is_refused_before_the_first_simulation(tmp_path: Path) -> None:
+    named = ("run", "AT1", "--llm", "openai/gpt-5-mini", "--out", "run", "--llm-option")
+    for option, told in (
+        ("foo=1", "--llm-option foo: openai has no such option"),
+        ("timeout=9", "--timeout"),
+    ):
+        done = falsifier(*named, option, cwd=tmp_path, env={"OPENAI_API_KEY": "sk-some-key"})
+        assert (done.code, told in done.err) == (2, True), done.err
+    assert not (tmp_path / "run").exists()
