@@ -1,5 +1,7 @@
 """The part of a prompt that advises how to use the rest."""
 
+from falsifier.core.space import InputRange
+from falsifier.core.words import listed
 from falsifier.llm.prompts.blocks import AdviceBlock
 from falsifier.llm.prompts.published import guidance
 from falsifier.llm.prompts.variants import Variant
@@ -31,6 +33,8 @@ def _at_any_time(view: View, variant: Variant) -> list[str]:
             "The limits of the ranges are good first samples, and so is a single switch from one limit to "
             "the other."
         ]
+    if view.space.inputs and all(_is_discrete(view, r) for r in view.space.inputs):
+        lines = ["One value throughout, and a single switch to another value, are good first samples."]
     if _is_conjunction(formula):
         lines.append(
             "The requirement is a conjunction: it is violated as soon as any one of its conjuncts is. Its "
@@ -47,12 +51,24 @@ def _at_any_time(view: View, variant: Variant) -> list[str]:
             "condition true first."
         )
     if variant.has("freedom") and any(r.free for r in view.space.inputs):
-        lines.append(
-            "Choose the signal shape that a violation needs: constant interpolation with your own times for "
-            "steps and short pulses, few control points for slow changes, pieces of half a period to excite "
-            "a resonance."
-        )
+        free = [r for r in view.space.inputs if r.free]
+        if not all(_is_discrete(view, r) for r in free):
+            lines.append(
+                "Choose the signal shape that a violation needs: constant interpolation with your own times "
+                "for steps and short pulses, few control points for slow changes, pieces of half a period to "
+                "excite a resonance."
+            )
+        if discrete := [r.name for r in free if _is_discrete(view, r)]:
+            lines.append(
+                f"{listed(discrete)} can only jump from value to value: what matters is the order of the "
+                "values, when each begins and how long it lasts. Try unusual orders, switching back, and "
+                "stays that are just too short or too long for what the system does meanwhile."
+            )
     return lines
+
+
+def _is_discrete(view: View, r: InputRange) -> bool:
+    return r.kind != "real" or r.name in view.levels
 
 
 def _is_conjunction(formula: Formula) -> bool:

@@ -43,6 +43,7 @@ class SignalLine(_Block):
     unit: str = ""
     description: str = ""
     kind: str = "real"
+    items: tuple[str, ...] = Field(default=(), description="Numbers and names of an enumeration.")
     start: str = Field(default="", description="Its value at time 0.")
 
 

@@ -116,7 +116,8 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
                 unit=view.unit(name),
                 description=view.description(name),
                 kind=view.kind(name) if view.tells_kinds else "real",
-                start=_start(variant, context, name),
+                items=view.items(name),
+                start=_start(view, variant, context, name),
             )
             for name in (*view.formula_outputs, *others)
         ),
@@ -131,11 +132,11 @@ _LEGEND = (
 )
 
 
-def _start(variant: Variant, context: Context, name: str) -> str:
+def _start(view: View, variant: Variant, context: Context, name: str) -> str:
     """Value at time 0; a range if it depends on what is chosen."""
     if name not in context.start or not variant.has("circumstances"):
         return ""
-    low, high = (number(value, 5) for value in context.start[name])
+    low, high = (view.labelled(name, value, number(value, 5)) for value in context.start[name])
     return low if low == high else f"{low} to {high}, depending on what you choose"
 
 

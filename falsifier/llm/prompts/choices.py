@@ -14,6 +14,9 @@ from falsifier.llm.prompts.view import View
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 7
+# Switches of a signal up to which every one is told; of others those by more than a share of the range.
+_MOST_PIECES = 12
+_ROUGHLY = 0.02
 _PUBLISHED_DECIMALS = 3
 
 # Said of values where the sample had other control points than those that are told.
@@ -67,7 +70,27 @@ def _signal_text_in(r: InputRange, signal: Signal, stop_time: float) -> str:
     """Parameterization with values rounded to some thousandths of the range."""
     decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
     rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
+    if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
+        rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
+        if rough.switches < rounded.switches:
+            return f"told within {_ROUGHLY:.0%} of the range: {signal_text(rough, stop_time=stop_time)}"
     return signal_text(rounded, stop_time=stop_time)
+
+
+def _merged(signal: Signal, tolerance: float) -> Signal:
+    """Constant pieces, those whose values differ from the first of them by no more than this as one."""
+    kept = [(signal.times[0], signal.values[0])]
+    kept += [
+        (time, value)
+        for before, time, value in zip(signal.values, signal.times[1:], signal.values[1:], strict=False)
+        if before != value
+    ]
+    merged = kept[:1]
+    for time, value in kept[1:]:
+        if abs(value - merged[-1][1]) > tolerance:
+            merged.append((time, value))
+    times, values = zip(*merged, strict=True)
+    return replace(signal, times=times, values=values)
 
 
 def signal_text(signal: Signal, *, stop_time: float) -> str:

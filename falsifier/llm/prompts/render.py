@@ -85,6 +85,8 @@ def _outputs(block: OutputsBlock) -> str:
 
 def _signal(line: SignalLine) -> str:
     kind = "" if line.kind == "real" else f", {line.kind}"
+    if line.items:
+        kind = f", {', '.join(line.items)}"
     start = f"; at t = 0: {line.start}" if line.start else ""
     return f"- {line.name}{_bracketed(line.unit)}{kind}{_described(line.description)}{start}"
 

@@ -46,6 +46,17 @@ class View:
         """Type of a signal's values; real if unknown."""
         return self.info.kind(name)
 
+    def items(self, name: str) -> tuple[str, ...]:
+        """Numbers of an enumeration with the names of its items; empty if it has none."""
+        literals = self.info[name].literals if name in self.info else {}
+        return tuple(f"{number} = {item}" for item, number in literals.items())
+
+    def labelled(self, name: str, value: float, text: str) -> str:
+        """A value's text, with the name of its item if it has one."""
+        literals = self.info[name].literals if name in self.info else {}
+        item = next((item for item, number in literals.items() if number == value), "")
+        return f"{text} ({item})" if item else text
+
     @property
     def chosen(self) -> str:
         """What is chosen, in one word."""

@@ -1,3 +1,6 @@
+from dataclasses import replace
+
+from falsifier.core.space import InputRange
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.variants import VARIANTS
 from falsifier.llm.prompts.view import View
@@ -56,3 +59,17 @@ def test_units_are_spoken_of_where_they_differ() -> None:
     several = advice(View.of(load_problem("AT6a")), VARIANTS["MP5"]).lines
     assert any("unit" in line for line in several)
     assert not any("unit" in line for line in one)
+
+
+def test_inputs_that_only_jump_get_advice_on_order_and_times() -> None:
+    problem = lag_problem(inputs=2, free=FREE)
+    u, v = problem.space.inputs
+    mode = replace(v, low=0.0, high=1.0, kind="boolean", interpolation="constant")
+
+    def told(*inputs: InputRange) -> str:
+        space = replace(problem.space, inputs=inputs)
+        return " ".join(advice(View.of(replace(problem, space=space)), VARIANTS["MP5"]).lines)
+
+    assert "slow changes" in told(u, mode) and "v can only jump" in told(u, mode)
+    only = told(mode)
+    assert "slow" not in only and "limits" not in only and "One value throughout" in only
