@@ -11,6 +11,7 @@ from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 
 _RATIONALE = "why these values"
+_ALL_NOTE = "Every input and parameter must be given in every reply, also those that stay as they were."
 _FREE_NOTES = (
     'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
     "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
@@ -43,7 +44,10 @@ def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "js
             for p, value in zip(space.parameters, values, strict=True)
         ]
     example = json.dumps(one if count == 1 else {"candidates": [one]})
-    return ReplyBlock(example=example, notes=_FREE_NOTES if free else ())
+    several = len(space.names) > 1
+    return ReplyBlock(
+        example=example, notes=(*([_ALL_NOTE] if several else ()), *(_FREE_NOTES if free else ()))
+    )
 
 
 def _order(view: View, variant: Variant) -> str:

@@ -31,7 +31,9 @@ def test_the_example_has_the_form_that_is_asked_for() -> None:
     ReplyForm(PROBLEM.space, free=True).read(json.dumps(one))
     assert built("MP5").notes
     fixed = View.of(replace(PROBLEM, space=PROBLEM.space.fixed))
-    assert reply_block(fixed, VARIANTS["MP5"], 1).notes == ()
+    (note,) = reply_block(fixed, VARIANTS["MP5"], 1).notes
+    assert "Every input and parameter" in note
+    assert reply_block(View.of(lag_problem()), VARIANTS["MP5"], 1).notes == ()
 
 
 def test_points_are_asked_for_in_the_order_of_the_list_or_a_stated_one() -> None:
