@@ -160,7 +160,7 @@ def api_base_option(command: Function) -> Function:
 
 
 def anonymous_option(command: Function) -> Function:
-    return click.option("--anonymous", is_flag=True, help="Use neutral names in prompts.")(command)
+    return click.option("--anonymous", is_flag=True, help="Use neutral names and scales in prompts.")(command)
 
 
 def reply_option(command: Function) -> Function:

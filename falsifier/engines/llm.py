@@ -162,6 +162,8 @@ class LLMEngine:
         what = "a random change of the best sample" if best else "a random sample"
         _LOG.warning("%s. Continuing with %s.", error, what)
         changed = random_change(self._view.space, best, seed=seed)
+        if self._disguise:
+            changed = self._disguise.canonical(changed)
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
         return [replace(changed, origin="random change", rationale=rationale)]
 

@@ -40,7 +40,7 @@ class LLMSettings(_Strict):
     timeout: float | None = Field(
         default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."
     )
-    anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
+    anonymous: bool = Field(default=False, description="Use neutral names and scales in prompts.")
     fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 

@@ -168,3 +168,13 @@ def test_every_form_of_formula_is_renamed() -> None:
     swapped = renamed(formula, {"a": "first", "b": "second"})
     assert set(swapped.signals) == {"first", "second"}
     assert renamed(swapped, {"first": "a", "second": "b"}) == formula
+
+
+def test_what_is_simulated_in_place_of_an_answer_is_recognised_when_it_comes_back() -> None:
+    problem = lag_problem(parameters=[START])
+    chat = ScriptedChat(["nothing"] * 3 + ['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
+    engine = make_llm_engine(problem, chat, anonymous=True)
+    (changed,) = engine.ask()
+    engine.tell([evaluate(problem, changed)])
+    engine.ask()
+    assert "Proposed earlier" not in chat.requests[-1].messages[1].content

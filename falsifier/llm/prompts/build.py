@@ -127,7 +127,7 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
 
 _LEGEND = (
     "Signals over time are written as time:value, time in s; between these points they run in straight "
-    "lines. Where a signal oscillates, its period, its lower and its upper envelope are given. Up to 3 % of a "
+    "lines. Where a signal oscillates, its period and its lower and upper envelope are given. Up to 3 % of a "
     "signal's span is rounded off, more where it oscillates, and nothing around the time that decided."
 )
 
