@@ -7,7 +7,7 @@ failed.
 
 import difflib
 from collections.abc import Iterable
-from typing import Literal
+from typing import Any, Literal
 
 # Maximum number of characters of a rejected value in a message.
 _SHOWN_INPUT = 60
@@ -111,9 +111,15 @@ class MonitorError(FalsifierError):
 
 
 class ChatError(FalsifierError):
-    """The language model could not be reached or did not give a usable reply."""
+    """The language model could not be reached or did not give a usable reply.
+
+    Attributes:
+        lost: tokens and cost of requests that timed out, a ``falsifier.llm.messages.Usage``; None: there
+            were none.
+    """
 
     exit_code = 3
+    lost: Any = None
 
 
 class ChatSetupError(ChatError):

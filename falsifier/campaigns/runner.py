@@ -209,7 +209,7 @@ def check_request(request: CampaignRequest, *, executor: str | None) -> None:
 
     Raises:
         SpecError: for an unknown engine or prompt variant.
-        ChatError: for an unknown provider or a missing key.
+        ChatError: for an unknown provider, an option that it does not have, or a missing key.
     """
     runs = tuple(request.named().values())
     for run in runs:
@@ -217,8 +217,8 @@ def check_request(request: CampaignRequest, *, executor: str | None) -> None:
     if executor is None:
         from falsifier.llm.connect import preflight
 
-        for name, api_base in {(r.llm.name, r.llm.api_base) for r in runs if r.llm is not None}:
-            preflight(name, api_base=api_base)
+        for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
+            preflight(llm.name, api_base=llm.api_base, options=llm.options)
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:

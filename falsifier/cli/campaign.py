@@ -277,7 +277,17 @@ def _methods(
         raise click.UsageError("--variant and --effort require --llm NAME")
     named = [_llm(llm, effort) for llm in llms] or [("", "")]
     methods = [
-        Method(engine, llm, level, variant, parameterization, profile, how.anonymous, how.fallback or "")
+        Method(
+            engine=engine,
+            llm=llm,
+            effort=level,
+            variant=variant,
+            parameterization=parameterization,
+            profile=profile,
+            reply=how.reply,
+            anonymous=how.anonymous,
+            fallback=how.fallback or "",
+        )
         for engine, (llm, level), variant, parameterization in product(
             engines or ("",), named, variants or ("",), parameterizations
         )

@@ -14,11 +14,13 @@ from falsifier.cli.options import (
     json_option,
     problem_options,
     problem_source,
+    reply_option,
     variant_option,
 )
 from falsifier.cli.output import say
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, SpecError
+from falsifier.llm.messages import ReplyKind
 from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 @problem_options
 @variant_option()
 @anonymous_option
+@reply_option
 @click.option(
     "--after",
     "directory",
@@ -56,6 +59,7 @@ def prompt(
     *,
     variant: str | None,
     anonymous: bool,
+    reply: ReplyKind | None,
     directory: Path | None,
     samples: int | None,
     at: int | None,
@@ -92,12 +96,16 @@ def prompt(
         evaluations=told,
         count=count,
         anonymous=anonymous,
+        reply=reply or "json",
         simulations=limit if limit is None or len(told) < limit else None,
         doubtful=doubtful_confirmations(problem, records, evaluations),
     )
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
-        tools = (preview_tool(problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous),)
+        tool = preview_tool(
+            problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous, reply=reply or "json"
+        )
+        tools = (tool,)
     say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
 
 

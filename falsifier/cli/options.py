@@ -16,6 +16,7 @@ import click
 
 from falsifier.core.secrets import is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
+from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts.variants import DEFAULT_VARIANT
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import Parameterization, ProblemSource
@@ -159,7 +160,16 @@ def api_base_option(command: Function) -> Function:
 
 
 def anonymous_option(command: Function) -> Function:
-    return click.option("--anonymous", is_flag=True, help="Use neutral names in prompts.")(command)
+    return click.option("--anonymous", is_flag=True, help="Use neutral names and scales in prompts.")(command)
+
+
+def reply_option(command: Function) -> Function:
+    return click.option(
+        "--reply",
+        type=click.Choice(get_args(ReplyKind)),
+        help="What a reply consists of: a JSON object, or numbers between <point> and </point> as in the "
+        "published prompts, which leaves control points as the spec has them; default: json.",
+    )(command)
 
 
 def asking_options(command: Function) -> Function:
@@ -186,6 +196,7 @@ def asking_options(command: Function) -> Function:
             help="Maximum time to wait for a reply of the language model; default: 600.",
         ),
         anonymous_option,
+        reply_option,
         click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
         click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
     )
@@ -213,13 +224,15 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
     Raises:
         click.UsageError: if a value is invalid, or one is given although no language model is named.
     """
-    given = {key: options.pop(key) for key in ("api_base", "timeout", "fallback", "anonymous")}
+    given = {key: options.pop(key) for key in ("api_base", "timeout", "fallback", "anonymous", "reply")}
     if given["timeout"] is not None and not isfinite(given["timeout"]):
         raise click.UsageError(f"--timeout {given['timeout']}: expected a number of seconds")
     price, pairs = options.pop("price"), options.pop("llm_options")
     cache = not options.pop("no_cache")
     if not named:
         _refuse_without_llm(given | {"price": price, "llm_option": pairs})
+    if given["reply"] is None:
+        del given["reply"]
     return given | {"price": _price(price), "options": dict(map(_llm_option, pairs)), "cache": cache}
 
 

@@ -22,6 +22,8 @@ ValueKind = Literal["real", "integer", "boolean", "enumeration"]
 # Values outside their range by at most this share of it are clipped, others rejected: bounds that were
 # printed with six digits may come back rounded outwards.
 _ROUNDING_SHARE = 1e-5
+# Values of one input outside its range that an error lists.
+_SHOWN_VALUES = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,41 +245,48 @@ class SearchSpace:
         enumerations are rounded to the nearest allowed number; each input gets its hold.
 
         Raises:
-            CandidateError: naming the input or parameter that is unknown, missing or outside its range, or
-                whose control points the space does not allow.
+            CandidateError: naming the input or parameter that is unknown or missing or whose control points
+                the space does not allow, or all that are outside their ranges.
         """
         for name in (*candidate.signals, *candidate.parameters):
             if name not in self.names:
                 raise CandidateError(f"unknown input or parameter {name!r}; {did_you_mean(name, self.names)}")
-        signals = {}
-        for r in self.inputs:
-            if r.name not in candidate.signals:
-                raise CandidateError(f"input {r.name!r} is missing")
-            signals[r.name] = self._admit_signal(r, candidate.signals[r.name])
-        parameters = {}
-        for p in self.parameters:
-            if p.name not in candidate.parameters:
-                raise CandidateError(f"parameter {p.name!r} is missing")
-            parameters[p.name] = _into_range(f"parameter {p.name!r}", candidate.parameters[p.name], p)
+        for kind, ranges, given in (
+            ("input", self.inputs, candidate.signals),
+            ("parameter", self.parameters, candidate.parameters),
+        ):
+            for r in ranges:
+                if r.name not in given:
+                    raise CandidateError(f"{kind} {r.name!r} is missing")
+        times = {r.name: self._admitted_times(r, candidate.signals[r.name]) for r in self.inputs}
+        outside = [
+            *(_signal_outside(r, times[r.name], candidate.signals[r.name].values) for r in self.inputs),
+            *(_parameter_outside(p, candidate.parameters[p.name]) for p in self.parameters),
+        ]
+        if any(outside):
+            raise CandidateError("; ".join(filter(None, outside)))
+        signals = {r.name: _admitted_signal(r, times[r.name], candidate.signals[r.name]) for r in self.inputs}
+        parameters = {p.name: _into_range(candidate.parameters[p.name], p) for p in self.parameters}
         return replace(candidate, signals=signals, parameters=parameters)
 
-    def _admit_signal(self, r: InputRange, signal: Signal) -> Signal:
+    def _admitted_times(self, r: InputRange, signal: Signal) -> tuple[float, ...]:
+        """Times of the control points as they will be simulated."""
         fixed = self.fixed_times(r)
         is_fixed = signal.interpolation == r.interpolation and (
             signal.times == fixed or _are_close(signal.times, fixed, 1e-9 * max(self.stop_time, 1.0))
         )
         if not is_fixed:
             _check_freedom(r, signal, self.stop_time)
-        times, values = fixed if is_fixed else signal.times, signal.values
-        if r.kind != "real" or min(values) < r.low or max(values) > r.high:
-            values = tuple(
-                _into_range(f"input {r.name!r} at t = {t:g} s", v, r)
-                for t, v in zip(times, values, strict=True)
-            )
-        admitted = times, values, r.hold
-        if admitted == (signal.times, signal.values, signal.hold):
-            return signal
-        return Signal(times, values, signal.interpolation, r.hold)
+        return fixed if is_fixed else signal.times
+
+
+def _admitted_signal(r: InputRange, times: tuple[float, ...], signal: Signal) -> Signal:
+    values = signal.values
+    if r.kind != "real" or min(values) < r.low or max(values) > r.high:
+        values = tuple(_into_range(v, r) for v in values)
+    if (times, values, r.hold) == (signal.times, signal.values, signal.hold):
+        return signal
+    return Signal(times, values, signal.interpolation, r.hold)
 
 
 def _check_range(what: str, ranged: InputRange | ParameterRange) -> None:
@@ -341,9 +350,31 @@ def nearest_value(ranged: InputRange | ParameterRange, value: float) -> float:
     return float(min(max(round(value), ceil(ranged.low)), floor(ranged.high)))
 
 
-def _into_range(what: str, value: float, ranged: InputRange | ParameterRange) -> float:
-    low, high = ranged.low, ranged.high
-    tolerance = _ROUNDING_SHARE * (high - low)
-    if not low - tolerance <= value <= high + tolerance:
-        raise CandidateError(f"{what}: {value:g} is outside its range [{low:g}, {high:g}]")
-    return nearest_value(ranged, min(max(float(value), low), high))
+def _into_range(value: float, ranged: InputRange | ParameterRange) -> float:
+    return nearest_value(ranged, min(max(float(value), ranged.low), ranged.high))
+
+
+def _is_outside(ranged: InputRange | ParameterRange, value: float) -> bool:
+    tolerance = _ROUNDING_SHARE * (ranged.high - ranged.low)
+    return not ranged.low - tolerance <= value <= ranged.high + tolerance
+
+
+def _signal_outside(r: InputRange, times: Sequence[float], values: Sequence[float]) -> str:
+    """What is outside the range of an input; empty if nothing is."""
+    if r.low <= min(values) and max(values) <= r.high:
+        return ""
+    found = [(t, v) for t, v in zip(times, values, strict=True) if _is_outside(r, v)]
+    if not found:
+        return ""
+    shown = found[:_SHOWN_VALUES]
+    more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
+    at, what = (", ".join(f"{pair[k]:g}" for pair in shown) for k in (0, 1))
+    verb, bounds = "is" if len(found) == 1 else "are", f"[{r.low:g}, {r.high:g}]"
+    return f"input {r.name!r} at t = {at} s{more}: {what}{more} {verb} outside its range {bounds}"
+
+
+def _parameter_outside(p: ParameterRange, value: float) -> str:
+    """Whether a parameter is outside its range, in words; empty if it is not."""
+    if not _is_outside(p, value):
+        return ""
+    return f"parameter {p.name!r}: {value:g} is outside its range [{p.low:g}, {p.high:g}]"

@@ -17,7 +17,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.disguise import Disguise
-from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, Tool
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, ReplyKind, Tool
 from falsifier.llm.prompts import (
     DEFAULT_PROMPT_TOKENS,
     Variant,
@@ -52,6 +52,7 @@ class LLMEngine:
         view: the problem without its model.
         chat: the chat with the LLM.
         variant: the prompt variant, which determines what prompts contain.
+        reply: what replies consist of; with ``points`` control points stay as the spec has them.
         on_exchange: called with every exchange until ``attach`` replaces it.
         sample: number that distinguishes runs with equal questions, so that cached replies are not shared.
         prompt_tokens: maximum number of tokens of a prompt, estimated.
@@ -68,6 +69,7 @@ class LLMEngine:
         chat: Chat,
         variant: Variant,
         *,
+        reply: ReplyKind = "json",
         on_exchange: OnExchange = lambda _: None,
         sample: int = 0,
         prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
@@ -75,6 +77,8 @@ class LLMEngine:
         fallback: Engine | None = None,
         start: Callable[[], StartValues] = dict,
     ) -> None:
+        view = _told_view(view, reply)
+        self._reply = reply
         self._disguise = Disguise.of(view) if anonymous else None
         self._view = self._disguise.view if self._disguise else view
         self._chat = chat
@@ -108,10 +112,7 @@ class LLMEngine:
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Be told that a violation does not count, which prompts state with the reason."""
-        shown = confirmation.candidate
-        if self._disguise:
-            shown = self._disguise.hidden_candidate(shown)
-        self._doubts[shown.key] = in_doubt(confirmation)
+        self._doubts |= _doubts([confirmation], self._disguise)
 
     @property
     def handed_over(self) -> bool:
@@ -161,6 +162,8 @@ class LLMEngine:
         what = "a random change of the best sample" if best else "a random sample"
         _LOG.warning("%s. Continuing with %s.", error, what)
         changed = random_change(self._view.space, best, seed=seed)
+        if self._disguise:
+            changed = self._disguise.canonical(changed)
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
         return [replace(changed, origin="random change", rationale=rationale)]
 
@@ -186,7 +189,7 @@ class LLMEngine:
     def describe(self, candidate: Candidate) -> str:
         """Return a candidate in one line; as a point if the prompt variant shows no names."""
         shown = self._disguise.hidden_candidate(candidate) if self._disguise else candidate
-        if not self._variant.has("names"):
+        if not self._variant.has("names") or (self._variant.is_published and self._reply == "points"):
             return "; ".join(choices.as_point(self._view, shown))
         return in_one_line(shown)
 
@@ -194,7 +197,11 @@ class LLMEngine:
         """Add evaluations to the history, including those of other engines' candidates."""
         if self._fallback is not None:
             self._fallback.tell(evaluations)
-        told = [self._disguise.hidden(e) for e in evaluations] if self._disguise else evaluations
+        told = evaluations
+        if self._disguise:
+            self._circumstances()  # first, so that values at time 0 determine scales before trajectories do
+            self._wear(self._disguise.fitted(evaluations))
+            told = [self._disguise.hidden(e) for e in evaluations]
         keys = {e.candidate.key for e in told}
         self._pending = [c for c in self._pending if c.key not in keys]
         self._evaluations = _thinned([*self._evaluations, *told])
@@ -203,7 +210,7 @@ class LLMEngine:
         disguise = self._disguise
         return PredictionTool(
             what_if,
-            _form(self._view, self._variant, count=MOST_CANDIDATES, reasoned=False),
+            _form(self._view, self._variant, self._reply, count=MOST_CANDIDATES, reasoned=False),
             self._variant,
             reveal=disguise.revealed if disguise else _unchanged,
             hide=disguise.hidden_verdict if disguise else _unchanged,
@@ -218,7 +225,7 @@ class LLMEngine:
         dispensable: bool,
     ) -> list[Candidate]:
         variant = self._variant
-        form = _form(self._view, variant, count=count)
+        form = _form(self._view, variant, self._reply, count=count)
         prompt = build_prompt(
             self._view,
             variant,
@@ -226,11 +233,12 @@ class LLMEngine:
             pending=self._pending,
             notes=notes,
             count=count,
+            reply=self._reply,
             context=self._circumstances(),
         )
         request = ChatRequest(
             messages=render(trimmed(prompt, self._prompt_tokens, self._chat.llm)),
-            reply_schema=form.schema(),
+            reply_schema=None if form.points else form.schema(),
             tools=() if tool is None else (tool.offer,),
             sample=self._sample,
         )
@@ -252,8 +260,14 @@ class LLMEngine:
     def _circumstances(self) -> Context:
         if self._context is None:
             start = self._start() if self._variant.has("circumstances") else {}
-            self._context = Context(start=self._disguise.hidden_values(start) if self._disguise else start)
+            if self._disguise:
+                self._wear(self._disguise.fitted_to_start(start))
+                start = self._disguise.hidden_values(start)
+            self._context = Context(start=start)
         return replace(self._context, simulations=self._simulations, doubts=self._doubts)
+
+    def _wear(self, disguise: Disguise) -> None:
+        self._disguise, self._view = disguise, disguise.view
 
     def _new(self, candidates: list[Candidate]) -> list[Candidate]:
         """Return the candidates that are neither evaluated nor pending.
@@ -261,11 +275,15 @@ class LLMEngine:
         Raises:
             RejectedReplyError: if there is none.
         """
+        if self._disguise:
+            candidates = [self._disguise.canonical(c) for c in candidates]
         seen = {e.candidate.key: f"sample {i}" for i, e in enumerate(self._evaluations, start=1)}
         seen |= {c.key: "one that was proposed already" for c in self._pending}
         new = {c.key: c for c in candidates if c.key not in seen}
         if not new:
-            raise RejectedReplyError(f"it repeats {seen[candidates[0].key]}")
+            # The published prompts number only the samples that they show.
+            which = "an earlier sample" if self._variant.is_published else seen[candidates[0].key]
+            raise RejectedReplyError(f"it repeats {which}")
         return list(new.values())
 
 
@@ -274,6 +292,7 @@ def make_llm_engine(
     chat: Chat,
     *,
     variant: str | None = None,
+    reply: ReplyKind = "json",
     on_exchange: OnExchange = lambda _: None,
     sample: int = 0,
     prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
@@ -286,6 +305,7 @@ def make_llm_engine(
         problem: the problem to search.
         chat: the chat with the LLM.
         variant: name of the prompt variant; None: the default one.
+        reply: what replies consist of.
         on_exchange: called with every exchange until ``attach`` replaces it.
         sample: number that distinguishes runs with equal questions.
         prompt_tokens: maximum number of tokens of a prompt, estimated.
@@ -299,6 +319,7 @@ def make_llm_engine(
         View.of(problem),
         chat,
         variant_named(variant),
+        reply=reply,
         on_exchange=on_exchange,
         sample=sample,
         prompt_tokens=prompt_tokens,
@@ -316,6 +337,7 @@ def preview(
     count: int = 1,
     prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
     anonymous: bool = False,
+    reply: ReplyKind = "json",
     simulations: int | None = None,
     doubtful: Sequence[Confirmation] = (),
 ) -> tuple[Message, ...]:
@@ -328,39 +350,64 @@ def preview(
         count: number of candidates to ask for.
         prompt_tokens: maximum number of tokens of a prompt.
         anonymous: whether the LLM gets neutral names instead of real ones.
+        reply: what a reply is to consist of.
         simulations: maximum number of simulations of the run; None: no limit.
         doubtful: violations among the evaluations that do not count.
     """
     told = variant_named(variant)
-    view, start = View.of(problem), start_values(problem) if told.has("circumstances") else {}
-    doubts: dict[Hashable, str] = {c.candidate.key: in_doubt(c) for c in doubtful}
+    view = _told_view(View.of(problem), reply)
+    start = start_values(problem) if told.has("circumstances") else {}
+    disguise = None
     if anonymous:
-        disguise = Disguise.of(view)
-        doubts = {disguise.hidden_candidate(c.candidate).key: in_doubt(c) for c in doubtful}
+        disguise = Disguise.of(view).fitted_to_start(start).fitted(evaluations)
         view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
         start = disguise.hidden_values(start)
-    prompt = build_prompt(view, told, evaluations, count=count, context=Context(simulations, start, doubts))
+    doubts = _doubts(doubtful, disguise)
+    prompt = build_prompt(
+        view, told, evaluations, count=count, reply=reply, context=Context(simulations, start, doubts)
+    )
     return render(trimmed(prompt, prompt_tokens))
 
 
 def preview_tool(
-    problem: Problem, *, calls: int, variant: str | None = None, anonymous: bool = False
+    problem: Problem,
+    *,
+    calls: int,
+    variant: str | None = None,
+    anonymous: bool = False,
+    reply: ReplyKind = "json",
 ) -> Tool:
     """Return the tool that a question with permission to request predictions would offer; sends nothing."""
-    view = View.of(problem)
+    view = _told_view(View.of(problem), reply)
     shown = Disguise.of(view).view if anonymous else view
-    form = _form(shown, variant_named(variant), count=MOST_CANDIDATES, reasoned=False)
+    form = _form(shown, variant_named(variant), reply, count=MOST_CANDIDATES, reasoned=False)
     return what_if_tool(form.schema(), calls=calls)
 
 
-def _form(view: View, variant: Variant, *, count: int, reasoned: bool = True) -> ReplyForm:
+def _told_view(view: View, reply: ReplyKind) -> View:
+    """The view that can be asked about: lists of numbers have the control points of the spec."""
+    return view if reply == "json" else replace(view, space=view.space.fixed)
+
+
+def _form(view: View, variant: Variant, reply: ReplyKind, *, count: int, reasoned: bool = True) -> ReplyForm:
     return ReplyForm(
         view.space,
-        named=variant.has("names"),
+        named=variant.has("names") and reply == "json",
+        points=reply == "points",
         free=variant.has("freedom"),
         count=count,
         reasoned=reasoned,
     )
+
+
+def _doubts(confirmations: Sequence[Confirmation], disguise: Disguise | None) -> dict[Hashable, str]:
+    """Why violations do not count, by the keys of their candidates as they are told."""
+    if disguise is None:
+        return {c.candidate.key: in_doubt(c) for c in confirmations}
+    return {
+        disguise.hidden_candidate(c.candidate).key: in_doubt(c, disguise.unit_of(c.evaluation))
+        for c in confirmations
+    }
 
 
 def _unchanged(value: T) -> T:
@@ -373,6 +420,7 @@ def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
         messages=request.messages,
         parameters=dict(chat.parameters),
         reply=None,
+        lost=error.lost,
         problem=str(error),
     )
 

@@ -8,11 +8,11 @@ from typing import Any
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.llm.failures import classify
 from falsifier.llm.incoming import cleaned
-from falsifier.llm.litellm_import import dropped_parameters, load_litellm
+from falsifier.llm.litellm_import import dropped_parameters, listed_price, load_litellm
 from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode
 from falsifier.llm.providers import find_key, known
 from falsifier.llm.transport import within
-from falsifier.llm.usage import Price, usage_of
+from falsifier.llm.usage import Price, lost_usage, usage_of
 from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, storable
 
 # In s; reasoning models may think for minutes.
@@ -78,14 +78,18 @@ class LiteLLMChat:
         try:
             return cleaned(within(seconds, ask), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
-            raise classify(
+            failure = classify(
                 error,
                 llm=self.llm,
                 api_base=self.api_base,
                 key_variables=known(self.llm).keys,
                 secrets=secrets,
                 offers_tools=bool(request.tools),
-            ) from None
+            )
+            if isinstance(error, TimeoutError) or type(error).__name__ == "Timeout":
+                price = self.price or listed_price(self.llm, api_base=self.api_base)
+                failure.lost = lost_usage(request, llm=self.llm, price=price)
+            raise failure from None
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Do nothing; storing replies is CachedChat's concern."""

@@ -8,7 +8,7 @@ from typing import Any
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.ladder import LadderChat
-from falsifier.llm.litellm_import import check_name, listed_price
+from falsifier.llm.litellm_import import check_name, check_options, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
 from falsifier.llm.providers import find_key, first_mode, key_variable
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate, RetryingChat
@@ -17,14 +17,15 @@ from falsifier.llm.usage import Price
 _HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word ready."),))
 
 
-def preflight(llm: str, *, api_base: str | None = None) -> None:
-    """Check an LLM's name and key without sending anything.
+def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, Any] | None = None) -> None:
+    """Check an LLM's name, key and options without sending anything.
 
     Raises:
         ChatError: saying what to set or change.
     """
     check_name(llm)
     find_key(llm, api_base=api_base)
+    check_options(llm, options or {}, api_base=api_base)
 
 
 def connect(
@@ -44,7 +45,8 @@ def connect(
 
     Args:
         llm: PROVIDER/MODEL as litellm names it.
-        effort: reasoning effort, ``low``, ``medium`` or ``high``.
+        effort: reasoning effort: ``none``, ``minimal``, ``low``, ``medium`` or ``high``; what the LLM does
+            not take is left out, and the record says so.
         api_base: address of the server, if it is not the provider's own.
         options: further parameters of litellm's ``completion``.
         price: what the LLM costs; None: litellm's table.
@@ -55,9 +57,9 @@ def connect(
         cache: directory of stored replies; None: no cache.
 
     Raises:
-        ChatError: for an unknown provider or a missing key.
+        ChatError: for an unknown provider, an unknown option or a missing key.
     """
-    preflight(llm, api_base=api_base)
+    preflight(llm, api_base=api_base, options=options)
     client = LiteLLMChat(
         llm=llm,
         effort=effort,

@@ -17,7 +17,7 @@ MAX_REASKS = 2
 # Characters of a rejected reply that are quoted back to the LLM; runaway replies are cut.
 _LONGEST_QUOTE = 4000
 # Characters of a defect that are told; what is wrong stands at the beginning.
-_LONGEST_PROBLEM = 600
+_LONGEST_PROBLEM = 1200
 
 
 class RejectedReplyError(FalsifierError):

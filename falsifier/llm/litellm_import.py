@@ -4,10 +4,11 @@ import os
 import warnings
 from collections.abc import Mapping
 from functools import cache
+from inspect import signature
 from typing import Any
 
 from falsifier.errors import ChatError, ChatSetupError, did_you_mean
-from falsifier.llm.providers import PROVIDERS, known
+from falsifier.llm.providers import PROVIDERS, known, provider_of
 from falsifier.llm.usage import Price
 
 # What litellm would do on import or first use, and the variables that prevent it.
@@ -16,6 +17,8 @@ _ENVIRONMENT = {
     "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",  # fetch a list of headers
     "LITELLM_MODE": "PRODUCTION",  # read a .env file
 }
+# Providers that pass options on to servers of all kinds.
+_ROUTERS = frozenset({"openrouter", "huggingface"})
 # Parameters that litellm drops for LLMs that do not accept them.
 _DROPPABLE = frozenset(
     {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
@@ -88,6 +91,45 @@ def may_take_tools(llm: str, *, api_base: str | None = None) -> bool:
     except Exception:  # not in the table
         return True
     return bool(litellm.supports_function_calling(llm))
+
+
+def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None = None) -> None:
+    """Reject options that the provider does not have.
+
+    What a server of the user's own, a router or an unlisted provider takes is not known: its options are sent
+    as they are.
+
+    Raises:
+        ChatSetupError: naming the option.
+    """
+    if "timeout" in options:
+        raise ChatSetupError("--llm-option timeout: use --timeout SECONDS, which also limits slow replies")
+    provider = provider_of(llm)
+    is_own = api_base is not None or known(llm).local or not known(llm).keys or provider in _ROUTERS
+    if not options or is_own:
+        return
+    taken = _options_of(llm)
+    for name in options:
+        if name not in taken:
+            raise ChatSetupError(
+                f"--llm-option {name}: {provider} has no such option; {did_you_mean(name, taken)}. What "
+                "litellm does not know can be sent in Python as options={'extra_body': {...}}"
+            )
+
+
+def _options_of(llm: str) -> set[str]:
+    """Names of what litellm takes for an LLM: OpenAI's parameters, the provider's and its own."""
+    litellm = load_litellm()
+    from litellm.types.utils import all_litellm_params
+    from litellm.utils import ProviderConfigManager
+
+    name, provider, *_ = litellm.get_llm_provider(llm)
+    taken = {*signature(litellm.completion).parameters, *all_litellm_params, "extra_body", "max_retries"}
+    taken |= set(litellm.get_supported_openai_params(model=name, custom_llm_provider=provider) or ())
+    config = ProviderConfigManager.get_provider_chat_config(name, litellm.LlmProviders(provider))
+    for kind in type(config).__mro__:
+        taken |= {key for key in getattr(kind, "__annotations__", {}) if key.islower() and key[0] != "_"}
+    return taken - {"kwargs", "self"}
 
 
 def dropped_parameters(llm: str, arguments: Mapping[str, Any]) -> tuple[str, ...]:

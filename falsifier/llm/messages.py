@@ -11,6 +11,8 @@ Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
 Mode = Literal["json_schema", "json_object", "prompt"]
 MODES: tuple[Mode, ...] = get_args(Mode)
+# What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
+ReplyKind = Literal["json", "points"]
 
 
 class _Value(BaseModel):
@@ -81,11 +83,27 @@ class Usage(_Value):
     estimated: bool = Field(
         default=False, description="The provider sent no counts; counted with a usual tokenizer."
     )
+    timed_out: int = Field(
+        default=0,
+        description="Requests among them that had no reply in time; providers charge for them, so the tokens "
+        "that were sent are counted.",
+    )
 
     @property
     def tokens(self) -> int:
         """Tokens sent and received."""
         return self.prompt_tokens + self.completion_tokens
+
+    def __add__(self, other: "Usage") -> "Usage":
+        costs = (self.cost, other.cost)
+        return Usage(
+            prompt_tokens=self.prompt_tokens + other.prompt_tokens,
+            completion_tokens=self.completion_tokens + other.completion_tokens,
+            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
+            cost=None if None in costs else sum(cost or 0.0 for cost in costs),
+            estimated=self.estimated or other.estimated,
+            timed_out=self.timed_out + other.timed_out,
+        )
 
 
 class ChatRequest(_MayUseTools):
@@ -145,14 +163,17 @@ class Exchange(_Value):
     messages: tuple[Message, ...]
     parameters: dict[str, Any] = Field(default_factory=dict)
     reply: ChatReply | None = Field(description="None if there was no reply.")
+    lost: Usage | None = Field(
+        default=None, description="Requests that timed out, if there was no reply in the end."
+    )
     problem: str | None = Field(
         default=None, description="Why the reply was rejected, or why there was none."
     )
 
     @property
     def usage(self) -> Usage:
-        """Tokens and cost of this exchange; without a reply it cost nothing."""
-        return Usage(cost=0.0) if self.reply is None else self.reply.usage
+        """Tokens and cost of this exchange; without a reply, those of requests that timed out."""
+        return self.lost or Usage(cost=0.0) if self.reply is None else self.reply.usage
 
     @property
     def seconds(self) -> float:

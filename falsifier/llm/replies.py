@@ -1,13 +1,14 @@
 """Replies of a language model: the required form, and how candidates are read from a reply.
 
-Two forms are accepted: JSON with signals by name and a rationale, which is what prompts ask for, and the
-numbers of a point in order between ``<point>`` and ``</point>``.
+A prompt asks for one of two forms: JSON with signals by name and a rationale, or the numbers of a point in
+order between ``<point>`` and ``</point>``. A reply in the other form is read too.
 """
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Annotated, Any
 
 from pydantic import (
@@ -53,6 +54,7 @@ class ReplyForm:
         space: search space that candidates must fit.
         named: signals and parameters by name; else one list of numbers in the order of the dimensions.
         free: whether a free parameterization may be used if the space allows it.
+        points: numbers between tags are asked for, not JSON; tools take the same numbers as JSON.
         count: number of candidates.
         reasoned: whether each candidate comes with a rationale.
     """
@@ -60,6 +62,7 @@ class ReplyForm:
     space: SearchSpace
     named: bool = True
     free: bool = False
+    points: bool = False
     count: int = 1
     reasoned: bool = True
 
@@ -96,12 +99,15 @@ class ReplyForm:
         """Read the valid candidates of a reply.
 
         Raises:
-            RejectedReplyError: if none is valid; states what is wrong with the first.
+            RejectedReplyError: if none is valid; states what is wrong with each.
         """
         found = self.read_each(text, origin=origin)
         candidates = [one for one in found if isinstance(one, Candidate)]
         if not candidates:
-            raise next(one for one in found if isinstance(one, RejectedReplyError))
+            numbered = len(found) > 1
+            raise RejectedReplyError(
+                "; ".join(f"candidate {i}: {one}" if numbered else str(one) for i, one in enumerate(found, 1))
+            )
         return candidates
 
     def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
@@ -111,18 +117,35 @@ class ReplyForm:
             RejectedReplyError: if the reply contains no candidate, valid or not.
         """
         text = _without_thoughts(text)
-        found = _candidate_objects(text) or [{"point": numbers} for numbers in _points(text)]
+        # Reasoning may contain drafts before what is meant, and speak of the tags.
+        points = _points(text)[-self.count :] if self.points else _points(text)
+        found: Sequence[str | dict[str, Any]] = (
+            points or _candidate_objects(text) if self.points else _candidate_objects(text) or points
+        )
         if not found:
-            raise RejectedReplyError(
-                "it contains neither a JSON object with a candidate nor <point> ... </point>"
+            missing = (
+                "numbers between <point> and </point>" if self.points else "JSON object with a candidate"
             )
+            raise RejectedReplyError(f"it contains no {missing}")
         each: list[Candidate | RejectedReplyError] = []
         for one in found:
             try:
-                each.append(self._candidate(_validated(one), origin))
+                reply = CandidateReply(point=self._numbers(one)) if isinstance(one, str) else _validated(one)
+                each.append(self._candidate(reply, origin))
             except RejectedReplyError as rejection:
                 each.append(rejection)
         return each
+
+    def _numbers(self, text: str) -> list[float | str]:
+        """Numbers of a point; the tags are spoken of only if they were asked for."""
+        where = " between <point> and </point>" if self.points else ""
+        words = [w for w in re.split(r"[\s,;()\[\]]+", text) if w]
+        for word in words:
+            if len(word) > _LONGEST_NUMBER or not _NUMBER.fullmatch(word):
+                raise RejectedReplyError(f"expected only numbers{where}, got {_shown(word)}")
+        if not all(isfinite(float(word)) for word in words):
+            raise RejectedReplyError(f"expected only finite numbers{where}")
+        return [float(word) for word in words]
 
     def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:
         if reply.point is not None:
@@ -324,24 +347,16 @@ def _without_thoughts(text: str) -> str:
     return "".join((*kept, text[start:]))
 
 
-def _points(text: str) -> Iterator[list[float]]:
-    begun = -1
+def _points(text: str) -> list[str]:
+    """What stands between the tags."""
+    found, begun = [], -1
     for tag in _POINT_TAG.finditer(text):
         if not tag[1]:
             begun = tag.end()
         elif begun >= 0:
-            yield _numbers(text[begun : tag.start()])
+            found.append(text[begun : tag.start()])
             begun = -1
-
-
-def _numbers(text: str) -> list[float]:
-    words = [w for w in re.split(r"[\s,;()\[\]]+", text) if w]
-    for word in words:
-        if len(word) > _LONGEST_NUMBER or not _NUMBER.fullmatch(word):
-            raise RejectedReplyError(
-                f"expected only numbers between <point> and </point>, got {_shown(word)}"
-            )
-    return [float(w) for w in words]
+    return found[-_MOST_CANDIDATES:]
 
 
 def _unrolled(values: list[float | str]) -> list[float]:

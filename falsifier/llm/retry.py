@@ -12,7 +12,7 @@ from typing import Any
 from falsifier.core.words import counted
 from falsifier.errors import ChatError
 from falsifier.llm.failures import TransientChatError
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 
 _LOG = logging.getLogger(__name__)
 
@@ -103,12 +103,22 @@ class RetryingChat:
             ChatError: if the last attempt failed, there is no time for another one, or for a failure that
                 waiting does not cure.
         """
+        lost: list[Usage] = []
+        try:
+            reply = self._complete(request, lost)
+        except ChatError as error:
+            error.lost = sum(lost[1:], lost[0]) if lost else error.lost
+            raise
+        return reply.model_copy(update={"usage": sum(lost, reply.usage)}) if lost else reply
+
+    def _complete(self, request: ChatRequest, lost: list[Usage]) -> ChatReply:
         for attempt in range(1, self.attempts + 1):
             try:
                 with self.gate.passage(request.seconds_left):
                     reply = self.inner.complete(request)
                 return reply.model_copy(update={"attempts": attempt})
             except TransientChatError as error:
+                lost += [error.lost] if error.lost else []
                 asked = error.retry_after
                 if asked is not None and asked > self.longest_delay:
                     raise ChatError(

@@ -89,6 +89,13 @@ def usage_of(
     )
 
 
+def lost_usage(request: ChatRequest, *, llm: str, price: Price | None) -> Usage:
+    """Usage of a request that timed out: the provider charges at least for what was sent."""
+    sent = sum(count_tokens(part, llm) for part in _sent(request))
+    cost = None if price is None else price.cost(sent, 0)
+    return Usage(prompt_tokens=sent, cost=cost, estimated=True, timed_out=1)
+
+
 def _count(reported: Any) -> int | None:
     """A reported number of tokens; 0 if none was reported, None if it cannot be true."""
     if reported is None:

@@ -118,6 +118,7 @@ def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, chat: C
         problem,
         chat,
         variant=llm.variant,
+        reply=llm.reply,
         sample=request.seed,
         anonymous=llm.anonymous,
         fallback=fallback,

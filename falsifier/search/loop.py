@@ -15,7 +15,7 @@ from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.evaluation.workers import evaluate_all
-from falsifier.llm.messages import Chat, Exchange
+from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
 from falsifier.search.bounded import BoundedChat
 from falsifier.search.budget import Budget, LimitReached, Spent
@@ -152,6 +152,8 @@ def search(
         status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
         status, reason = "failed", str(error)
+        if error.lost is not None:
+            loop.count_usage(error.lost)
     except BaseException as error:
         with suppress(Exception):  # an error in a listener must not hide the first one
             loop.end("failed", f"{type(error).__name__}: {error}")
@@ -337,14 +339,17 @@ class _Loop:
 
     def exchanged(self, exchange: Exchange) -> None:
         """Count and announce an exchange with a language model."""
-        usage = exchange.usage
+        self.count_usage(exchange.usage)
+        self.emit(Exchanged(exchange=exchange, spent=self.clock()))
+
+    def count_usage(self, usage: Usage) -> None:
+        """Count what was asked of a language model."""
         self.spent = self.spent.plus_call(
             prompt=usage.prompt_tokens,
             completion=usage.completion_tokens,
             reasoning=usage.reasoning_tokens,
             cost=usage.cost,
         )
-        self.emit(Exchanged(exchange=exchange, spent=self.clock()))
 
     def clock(self) -> Spent:
         """Update and return what has been spent."""

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from falsifier.core.secrets import is_secret_option
+from falsifier.llm.messages import ReplyKind
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
@@ -28,6 +29,9 @@ class LLMSettings(_Strict):
     effort: Effort | None = None
     api_base: str | None = None
     variant: str | None = Field(default=None, description="Prompt variant; default: the best one.")
+    reply: ReplyKind = Field(
+        default="json", description="What a reply consists of: a JSON object, or numbers between tags."
+    )
     options: dict[str, str | float] = Field(default_factory=dict, description="Passed to litellm unchanged.")
     price: tuple[_Price, _Price] | None = Field(
         default=None,
@@ -36,7 +40,7 @@ class LLMSettings(_Strict):
     timeout: float | None = Field(
         default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."
     )
-    anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
+    anonymous: bool = Field(default=False, description="Use neutral names and scales in prompts.")
     fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 

@@ -70,3 +70,19 @@ def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:
     for part in ("openai/mine", "'ready'", "120 tokens", "OPENAI_API_KEY"):
         assert part in done.out
     assert ENV["OPENAI_API_KEY"] not in done.out + done.err
+
+
+def test_replies_as_points_are_asked_for_and_recorded(tmp_path: Path) -> None:
+    asking = ("prompt", "AT1", "--variant", "MP2", "--reply", "points", "--json")
+    printed = json.loads(falsifier(*asking, cwd=tmp_path).out)
+    with serving(Step("All out. <point>100, 100, 100, 100, 100, 100, 100, 0, 0, 0</point>")) as server:
+        done = falsifier(
+            *at1(server.url, "--variant", "MP2", "--reply", "points", "--out", "run"), cwd=tmp_path, env=ENV
+        )
+        (asked,) = server.received
+    assert (done.code, asked.body["messages"]) == (1, printed)
+    assert "response_format" not in asked.body and "</point>" in printed[0]["content"]
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert '"reply": "points"' in json.dumps(manifest)
+    unnamed = falsifier("run", "AT1", "--reply", "points", cwd=tmp_path)
+    assert (unnamed.code, "--reply: applies to language models only" in unnamed.err) == (2, True)

@@ -23,7 +23,7 @@ def test_two_replies_falsify_at1(tmp_path: Path) -> None:
     assert found["counterexample"]["rationale"] == "full throttle throughout"
     assert "best robustness +0.418" in done.err
     assert "Sample" not in first
-    for part in ("+0.419", "82.5", "81.5", "20.0 s", "119.6"):
+    for part in ("robustness 0.419", "82.5", "81.5", "20.0 s", "119.6"):
         assert part in second, part
     records = [r for r in read_journal(tmp_path / "run") if isinstance(r, ExchangeRecord)]
     assert records[1].exchange["messages"][-1]["content"] == second
@@ -76,7 +76,7 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
         write_manifest(tmp_path / "run", manifest)
         resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
         assert len(server.received) == 1
-        assert "+0.419" in server.received[0].texts[-1]
+        assert "robustness 0.419" in server.received[0].texts[-1]
     assert resumed.code == 1, resumed.err
     assert resumed.json["spent"]["calls"] == 2
 
@@ -95,3 +95,14 @@ def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> No
     assert done.code == 2
     assert "set OPENAI_API_KEY" in done.err
     assert not (tmp_path / "runs").exists()
+
+
+def test_an_unknown_option_is_refused_before_the_first_simulation(tmp_path: Path) -> None:
+    named = ("run", "AT1", "--llm", "openai/gpt-5-mini", "--out", "run", "--llm-option")
+    for option, told in (
+        ("foo=1", "--llm-option foo: openai has no such option"),
+        ("timeout=9", "--timeout"),
+    ):
+        done = falsifier(*named, option, cwd=tmp_path, env={"OPENAI_API_KEY": "sk-some-key"})
+        assert (done.code, told in done.err) == (2, True), done.err
+    assert not (tmp_path / "run").exists()

@@ -67,7 +67,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
     assert [r.body["reasoning_effort"] for r in server.received] == ["high", "high"]
     opening, following = (r.texts[-1] for r in server.received)
     assert "Sample" not in opening
-    for told in ("+0.419", "82.5 at 8.3 s", "81.5 at 50.0 s", "t = 20.0 s with speed = 119.6"):
+    for told in ("robustness 0.419", "82.5 at 8.3 s", "81.5 at 50.0 s", "t = 20.0 s with speed = 119.6"):
         assert told in following
     assert result.spent.calls == 2
     assert result.spent.tokens == 240
@@ -87,6 +87,26 @@ def test_preview_is_what_is_sent() -> None:
         engine.ask()
         assert chat.requests[0].messages == preview(problem, variant=variant)
         assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
+
+
+@pytest.mark.parametrize("variant", ["MP1", "MP4", "MP5"])
+def test_replies_as_points(variant: str) -> None:
+    problem = lag_problem(free=Freedom(100, 0.1))
+    asked = "<point>0, 0, 9, -9</point>", "So: <point>0, 0, 0.25, 1</point>", "<point>1, 1, 1, 1</point>"
+    chat = ScriptedChat(list(asked))
+    engine = make_llm_engine(problem, chat, variant=variant, reply="points")
+    engine.tell([evaluate(problem, *engine.ask())])
+    (second,) = engine.ask()
+    assert second.signals["u"].values == (1, 1, 1, 1)
+    first, rejected, later = chat.requests
+    assert all(request.reply_schema is None for request in chat.requests)
+    assert (
+        "between <point> and </point>" in first.messages[0].content
+        and "JSON" not in first.messages[0].content
+    )
+    assert "at t = 6.66667, 10 s: 9, -9 are outside its range [-1, 1]" in rejected.messages[-1].content
+    assert ("point = [0, 0, 0.25, 1]" in later.messages[-1].content) == (variant != "MP5")
+    assert first.messages == preview(problem, variant=variant, reply="points")
 
 
 def test_the_road_to_a_valid_reply() -> None:
@@ -117,9 +137,9 @@ def test_the_road_to_a_valid_reply() -> None:
         assert len(server.received) == 7
     problems = [e.problem for e in exchanges]
     assert problems[0] is None and problems[-1] is None
-    assert "neither a JSON object" in (problems[1] or "")
+    assert "no JSON object" in (problems[1] or "")
     assert "'u' at t = 10 s: 7 is outside its range [-1, 1]" in (problems[2] or "")
-    assert problems[3] == "it repeats sample 1"
+    assert problems[3] == "it repeats an earlier sample"
     assert exchanges[1].reply is not None and exchanges[1].reply.attempts == 3
 
 

@@ -123,7 +123,7 @@ def test_wrong_arguments_are_told_and_can_be_corrected() -> None:
     chat, exchanges = ScriptedChat(script), list[Exchange]()
     run(hybrid(chat, on_exchange=exchanges.append))
     told = answers(chat.requests[first_offer(chat.requests) + 2])
-    assert "7 is outside its range [-2, 2]" in told[0]
+    assert "7, 7, 7, 7 are outside its range [-2, 2]" in told[0]
     assert "unknown input 'u9'" in told[1]
     assert [bool(e.problem) for e in exchanges if e.reply and e.reply.tool_calls][:2] == [True, True]
     # It heard no prediction by itself, so it is told some.
@@ -197,17 +197,17 @@ def test_calls_come_over_the_wire_beside_the_schema() -> None:
 def test_neutral_names_hold_in_calls_and_answers() -> None:
     def script(request: ChatRequest) -> Line:
         if not request.tools:
-            levels = (-1.0, 0.5) if len(chat.requests) == 1 else (0.1 * len(chat.requests),)
+            levels = (0.25, 0.625) if len(chat.requests) == 1 else (0.5 + 0.02 * len(chat.requests),)
             return candidates(*levels, name="u1")
         told = answers(request)
-        return call(1.5, name="u1") if not told else candidates(1.75, name="u1")
+        return call(0.875, name="u1") if not told else candidates(0.9375, name="u1")
 
     chat = ScriptedChat(script)
     engine = hybrid(chat, anonymous=True)
     judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
     asked = drive(engine, judge, rounds=14)
     sent = [r for r in chat.requests if r.tools]
-    assert "by y1 <= 9" in answers(sent[1])[0]
+    assert "by y1 <= 0.769230769" in answers(sent[1])[0]
     everything = "\n".join(m.content for r in sent for m in r.messages) + str([r.tools for r in sent])
     # An x between numbers counts repeated values.
     assert not re.search(r"\bu\b|(?<!\d )\bx\b|\blag\b|drive|position", everything)
@@ -226,8 +226,9 @@ def test_candidates_are_described_as_the_model_knows_them() -> None:
         for anonymous in (False, True)
     }
     assert told["MP5", False].startswith("u linear: 0.5 at 0 s, 1 at 3.333 s")
-    assert told["MP5", True].startswith("u1 linear: 0.5 at 0 s")
-    assert told["MP1", False] == told["MP1", True] == "point = [0.5, 1, -1, 2]"
+    assert told["MP5", True].startswith("u1 linear: 0.625 at 0 s, 0.75 at 3.333 s")
+    assert told["MP1", False] == "point = [0.5, 1, -1, 2]"
+    assert told["MP1", True] == "point = [0.625, 0.75, 0.25, 1]"
 
 
 class TestResume:

@@ -256,6 +256,7 @@ class TestFailures:
 
     def test_timeout(self, model: str) -> None:
         error, count = self.failing(model, Step(silent=True), timeout=0.2)
+        assert error.lost.timed_out == 1 and error.lost.prompt_tokens > 0
         assert isinstance(error, TransientChatError)
         assert count == 1
 
@@ -356,3 +357,11 @@ def test_nothing_else_is_reached_printed_or_read(tmp_path: Path) -> None:
         assert len(server.received) == 3
     assert done.stdout == "[] None\n"
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("effort", ["none", "minimal"])
+def test_the_smallest_efforts_are_sent_or_reported_as_dropped(effort: str) -> None:
+    with serving(Step("yes")) as server:
+        reply = LiteLLMChat("openai/gpt-5-mini", effort=effort, api_base=server.url).complete(REQUEST)
+        (asked,) = server.received
+    assert (asked.body.get("reasoning_effort") == effort) != ("effort" in reply.parameters.get("dropped", []))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.errors import ChatError
+from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.connect import check_llm, connect, preflight
 from falsifier.llm.retry import RetryingChat
@@ -82,3 +82,24 @@ def test_check_of_a_model_with_a_wrong_key(monkeypatch: pytest.MonkeyPatch) -> N
             check_llm("openai/mine", api_base=server.url)
         assert "sk-wrong" not in str(caught.value)
         assert len(server.received) == 1
+
+
+@pytest.mark.parametrize("model", ["openai/gpt-5-mini", "anthropic/claude-sonnet-4-5"])
+def test_an_option_that_the_provider_does_not_have_is_refused(
+    model: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
+        monkeypatch.setenv(variable, "sk-some-key")
+    with pytest.raises(ChatSetupError, match=r"--llm-option max_token: .* did you mean 'max_tokens'"):
+        connect(model, options={"max_token": 9})
+    connect(model, options={"max_tokens": 9, "temperature": 1, "extra_headers": {"X": "y"}})
+
+
+def test_options_of_servers_that_are_not_known_are_sent_as_they_are() -> None:
+    connect("openai/m", api_base="http://127.0.0.1:9", options={"foo": 1})
+    connect("ollama_chat/x", options={"foo": 1})
+
+
+def test_the_time_for_a_reply_is_not_an_option_of_the_provider() -> None:
+    with pytest.raises(ChatSetupError, match="--llm-option timeout: use --timeout SECONDS"):
+        connect("ollama_chat/x", options={"timeout": 5})

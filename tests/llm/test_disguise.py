@@ -1,59 +1,163 @@
-"""Neutral names out, real names back."""
+"""Neutral names and scales out, real ones back."""
 
+import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange, SearchSpace
+from falsifier.engines.llm import make_llm_engine, preview
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.disguise import Disguise
+from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.stl import parse
 from falsifier.stl.renaming import renamed
+from falsifier.testing import FREE, START, lag_problem
 
-REAL = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT1"
+WORDS = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT\d|Pos|Ref|magnet|integer"
+# Ends of ranges, thresholds, and a factor of a threshold, each as a number of its own.
+NUMBERS = {"AT6a": "100|325|3000|35", "AT51": "100|325", "NN": r"0\.005|0\.035|0\.03\*"}
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_nothing_real_is_told(variant: str) -> None:
+def text_of(requests: Sequence[ChatRequest]) -> str:
+    return "\n".join(message.content for request in requests for message in request.messages)
+
+
+def asked(name: str, variant: str, replies: Sequence[str]) -> tuple[str, Problem, list[Evaluation]]:
+    """What is sent in a run of two samples, the second after a rejected reply."""
+    problem = load_problem(name)
+    chat = ScriptedChat(list(replies))
+    engine = make_llm_engine(problem, chat, variant=variant, anonymous=True)
+    done = []
+    for _ in range(2):
+        (candidate,) = engine.ask()
+        done.append(evaluate(problem, candidate))
+        engine.tell(done[-1:])
+    assert len(chat.requests) == 3
+    sent = text_of([*chat.requests, ChatRequest(messages=preview(
+        problem, variant=variant, evaluations=done, anonymous=True))])  # fmt: skip
+    return sent, problem, done
+
+
+@pytest.mark.parametrize(
+    ("name", "variant"), [("AT6a", "MP1"), ("AT51", "MP5"), ("NN", "MP4"), ("AT6a", "MP5")]
+)
+def test_nothing_real_is_told(name: str, variant: str) -> None:
+    size = len(load_problem(name).space.dimensions)
+    replies = [f'{{"point": {json.dumps([value] * size)}}}' for value in (0.25, 7, 0.5)]
+    sent, problem, done = asked(name, variant, replies)
+    assert not re.search(WORDS, sent.replace("Car ", ""))
+    assert not re.search(rf"(?<![\d.])(?:{NUMBERS[name]})(?![\d.]|: | s\b)", numbers_of_interest(sent))
+    assert "7 are outside its range [0, 1]" in sent or "7, 7" in sent
+    first, second = (problem.space.encode(e.candidate) for e in done)
+    low, high = problem.space.bounds.T
+    assert first == pytest.approx(low + 0.25 * (high - low), rel=1e-12)
+    assert second == pytest.approx((low + high) / 2, rel=1e-12)
+
+
+def numbers_of_interest(sent: str) -> str:
+    """The text without what is in seconds, and without counts."""
+    return re.sub(r"\[\d+,\d+\]|\d+ (?:to \d+ s|numbers|simulations|evenly)|at most \d+|percent", "", sent)
+
+
+def disguised(problem: Problem) -> Disguise:
+    return Disguise.of(View.of(problem))
+
+
+def test_candidates_come_back_under_their_names_and_in_their_ranges() -> None:
     problem = load_problem("AT1")
-    disguise = Disguise.of(View.of(problem))
-    candidate = problem.space.decode([100] * 7 + [0, 0, 325])
-    failed = Evaluation(candidate, "failed", reason="throttle: out of range", log=("speed is NaN",))
-    evaluations = [disguise.hidden(e) for e in (evaluate(problem, candidate), failed)]
-    text = "\n".join(m.content for m in render(build_prompt(disguise.view, VARIANTS[variant], evaluations)))
-    assert not re.search(REAL, text)
-    if variant != "MP1":
-        assert "G[0,20] (y1 <= 120)" in text
-        assert "u1" in text and "u2" in text
-
-
-def test_candidates_come_back_under_their_names() -> None:
-    problem = load_problem("AT1")
-    disguise = Disguise.of(View.of(problem))
     signals = {
-        "u1": Signal.evenly([1.0] * 7, stop_time=50.0, hold=0.05),
-        "u2": Signal.evenly([2.0] * 3, stop_time=50.0, hold=0.05),
+        "u1": Signal.evenly([1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.1], stop_time=50.0, hold=0.05),
+        "u2": Signal.evenly([1.0] * 3, stop_time=50.0, hold=0.05),
     }
+    disguise = disguised(problem)
     back = disguise.revealed(Candidate(signals, {}, "m", "more u1 raises y1, u9 is no name"))
-    assert back.signals == {"throttle": signals["u1"], "brake": signals["u2"]}
+    assert back.signals["throttle"].values == (100.0, 50.0, 0.0, 0.0, 0.0, 0.0, 10.0)
+    assert back.signals["brake"].values == (325.0,) * 3
     assert back.rationale == "more throttle raises speed, u9 is no name"
     assert disguise.hidden_candidate(problem.space.admit(back)).signals == signals
 
 
-def test_verdicts_keep_their_numbers() -> None:
+def test_a_formula_on_one_scale_keeps_its_robustness_up_to_a_constant() -> None:
     problem = load_problem("AT1")
-    disguise = Disguise.of(View.of(problem))
+    disguise = disguised(problem)
     real = evaluate(problem, problem.space.decode([100] * 7 + [0] * 3))
-    hidden = disguise.hidden(real)
+    hidden = disguise.fitted([real]).hidden(real)
     assert real.verdict is not None and hidden.verdict is not None
-    assert hidden.verdict.robustness == real.verdict.robustness
-    assert hidden.verdict.predicate == "y1 <= 120"
-    assert hidden.verdict.values["y1"] == real.verdict.values["speed"]
-    assert disguise.hidden(replace(real, trajectory=None)).trajectory is None
+    assert hidden.verdict.robustness * 1.3 * 120 == pytest.approx(real.verdict.robustness, rel=1e-6)
+    assert hidden.verdict.predicate == "y1 <= 0.769230769"
+    assert hidden.verdict.critical_time == real.verdict.critical_time
+    bare = disguise.hidden(replace(real, trajectory=None))
+    assert bare.trajectory is None and bare.verdict is not None
+    assert bare.verdict.robustness == pytest.approx(hidden.verdict.robustness, rel=1e-6)
+    assert bare.verdict.values["y1"] == pytest.approx(real.verdict.values["speed"] / 156, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("formula", "hidden"),
+    [
+        ("G[0,10] (x <= 0.9)", "G[0,10] (y1 <= 0.769230769)"),
+        ("G[0,10] (u <= 0.5)", "G[0,10] (u1 <= 0.75)"),
+        ("G[0,10] (abs(x) <= 0.9 and x >= -0.45)", "G[0,10] (abs(y1) <= 0.769230769 and y1 >= -0.384615385)"),
+        ("G[0,10] (x >= 0)", "G[0,10] (y1 >= 0)"),
+        ("G[0,10] (2*x <= 1)", "G[0,10] (z1 <= 0)"),
+        ("G[0,10] (x^2 <= 1 -> abs(x - u) < 3)", "G[0,10] (z1 <= 0 -> z2 < 0)"),
+    ],
+)
+def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
+    problem = lag_problem(formula)
+    disguise = disguised(problem)
+    assert str(disguise.view.requirement.formula) == hidden
+    for value in (-1.0, -0.3, 0.95, 1.0):
+        real = evaluate(problem, problem.space.decode([value] * 4))
+        told = disguise.fitted([real]).hidden(real)
+        assert real.robustness is not None and told.robustness is not None
+        assert (told.robustness < 0) == (real.robustness < 0)
+
+
+def test_integers_become_levels() -> None:
+    problem = lag_problem(limit=5.0)
+    gear = InputRange("u", 1.0, 4.0, control_points=4, interpolation="constant", kind="integer", free=FREE)
+    problem = replace(problem, space=SearchSpace((gear,), (), 10.0))
+    disguise = disguised(problem)
+    (line,) = build_prompt(disguise.view, VARIANTS["MP5"], []).inputs.inputs
+    assert (line.kind, line.items) == ("levels", ("0", "0.333333", "0.666667", "1"))
+    standing = render(build_prompt(disguise.view, VARIANTS["MP5"], []))[0].content
+    assert "one of the numbers 0, 0.333333, 0.666667, 1; " in standing and "integer" not in standing
+    told = Candidate({"u1": Signal.evenly([0.333333, 1, 0, 0.7], stop_time=10.0, interpolation="linear")})
+    back = problem.space.admit(disguise.revealed(told))
+    assert (back.signals["u"].values, back.signals["u"].interpolation) == ((2, 4, 1, 3), "constant")
+
+
+def test_doubts_and_start_values_are_scaled() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)", parameters=[START])
+    violation = evaluate(problem, problem.space.decode([1, 1, 1, 1, 0]))
+    chat = ScriptedChat(['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
+    engine = make_llm_engine(problem, chat, anonymous=True)
+    engine.tell([violation])
+    engine.doubt(
+        Confirmation(
+            problem=problem,
+            evaluation=violation,
+            outcome="refuted",
+            robustness=0.585,
+            reference=None,
+            reason="",
+        )
+    )
+    engine.ask()
+    sent = text_of(chat.requests)
+    assert "a second simulation gave robustness +0.5," in sent or "gave robustness +0.5." in sent
+    assert "y1: " in sent.replace("- y1;", "y1: ") and "p1" in sent
 
 
 def test_every_form_of_formula_is_renamed() -> None:
@@ -64,3 +168,13 @@ def test_every_form_of_formula_is_renamed() -> None:
     swapped = renamed(formula, {"a": "first", "b": "second"})
     assert set(swapped.signals) == {"first", "second"}
     assert renamed(swapped, {"first": "a", "second": "b"}) == formula
+
+
+def test_what_is_simulated_in_place_of_an_answer_is_recognised_when_it_comes_back() -> None:
+    problem = lag_problem(parameters=[START])
+    chat = ScriptedChat(["nothing"] * 3 + ['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
+    engine = make_llm_engine(problem, chat, anonymous=True)
+    (changed,) = engine.ask()
+    engine.tell([evaluate(problem, changed)])
+    engine.ask()
+    assert "Proposed earlier" not in chat.requests[-1].messages[1].content

@@ -79,13 +79,17 @@ def changed(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("reply", "problem"),
     [
-        ("nothing to see", "neither a JSON object"),
-        ('{"answer": 42}', "neither a JSON object"),
+        ("nothing to see", "no JSON object with a candidate"),
+        ('{"answer": 42}', "no JSON object with a candidate"),
         ("<point>1, 2, 3</point>", "expected 6 numbers, got 3"),
         ("<point>1, two, 3, 4, 5, 6</point>", "'two'"),
         ("<point>0 0 0 0 0 2000</point>", r"'mass': 2000 is outside its range \[900, 1100\]"),
         ("<point>0 0 0 0 0 nan</point>", "'nan'"),
         ("<point>0 0 0 0 0 1e999</point>", "finite number"),
+        (
+            "<point>-1 0 101 0 0 2000</point>",
+            r"'throttle' at t = 0, 10 s: -1, 101 are outside .*; parameter 'mass'",
+        ),
         (changed(signals=GOOD["signals"][:1]), "'brake' is missing"),
         (changed(signals=[*GOOD["signals"], {"name": "clutch", "values": [1]}]), "unknown input 'clutch'"),
         (changed(signals=[*GOOD["signals"], GOOD["signals"][0]]), "'throttle' is given twice"),
@@ -279,3 +283,45 @@ def test_one_value_is_a_constant_with_or_without_times(times: str, free: bool) -
     form = ReplyForm(lag_problem(free=FREE if free else None).space, free=free)
     (found,) = form.read(f'{{"signals": [{{"name": "u", "values": [0.5]{times}}}]}}')
     assert found.signals["u"].values == (0.5,) * 4
+
+
+class TestPoints:
+    """Numbers between tags are asked for."""
+
+    def test_the_last_points_count_and_tags_in_words_do_no_harm(self) -> None:
+        text = (
+            "I end with <point> and </point>. <point>0 0 0 0 0 900</point> no: <point>1 2 3 4 5 950</point>"
+        )
+        assert read(text, named=False, points=True).parameters == {"mass": 950}
+        found = ReplyForm(SPACE, points=True, count=2).read(text)
+        assert [c.parameters["mass"] for c in found] == [900, 950]
+
+    def test_json_is_read_too(self) -> None:
+        assert read(GOOD, points=True).key == read(GOOD).key
+
+    @pytest.mark.parametrize(
+        ("text", "problem"),
+        [
+            ("nothing", "no numbers between <point> and </point>"),
+            ("<point>1 two 3 4 5 6</point>", "only numbers between <point> and </point>, got 'two'"),
+            ("<point>1e999 2 3 4 5 6</point>", "finite numbers between <point> and </point>"),
+        ],
+    )
+    def test_tags_are_spoken_of_only_here(self, text: str, problem: str) -> None:
+        with pytest.raises(RejectedReplyError, match=problem):
+            read(text, points=True)
+        with pytest.raises(RejectedReplyError) as caught:
+            read(text)
+        assert "point>" not in str(caught.value)
+
+    def test_a_tool_takes_the_same_numbers(self) -> None:
+        schema = ReplyForm(SPACE, named=False, points=True, reasoned=False).schema()
+        assert list(schema["properties"]) == ["point"]
+
+
+def test_each_of_several_bad_candidates_is_told() -> None:
+    bad = [changed(parameters=[{"name": "mass", "value": v}]) for v in (1, 2)]
+    with pytest.raises(
+        RejectedReplyError, match=r"candidate 1: .*: 1 is outside.*; candidate 2: .*: 2 is outside"
+    ):
+        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": bad}))

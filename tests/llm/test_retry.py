@@ -9,7 +9,7 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
-from falsifier.llm.messages import ChatReply, ChatRequest, Message
+from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.retry import Gate, RetryingChat
 from falsifier.llm.scripted import ScriptedChat
 from tests.llm.server import Step, serving
@@ -170,3 +170,18 @@ def test_a_wait_beyond_the_deadline_is_not_begun() -> None:
     with pytest.raises(ChatError, match=r"no time is left to ask again\. busy"):
         chat.complete(QUESTION.model_copy(update={"deadline": time.monotonic() + 20.0}))
     assert naps.taken == []
+
+
+def test_requests_that_timed_out_are_counted_as_paid() -> None:
+    late = TransientChatError("late")
+    late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, timed_out=1)
+    answered = RetryingChat(ScriptedChat([late, late, "yes"]), Gate(sleep=lambda _: None))
+    usage = answered.complete(QUESTION).usage
+    assert (usage.timed_out, usage.estimated) == (2, True)
+    plain = ScriptedChat(["yes"]).complete(QUESTION).usage
+    assert usage.prompt_tokens == plain.prompt_tokens + 100
+    assert usage.cost == (None if plain.cost is None else plain.cost + 1.0)
+    given_up = RetryingChat(ScriptedChat([late, late]), Gate(sleep=lambda _: None), attempts=2)
+    with pytest.raises(ChatError) as caught:
+        given_up.complete(QUESTION)
+    assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, timed_out=2)

@@ -65,9 +65,9 @@ class TestPredictionTool:
         ("call", "problem"),
         [
             (about(7.0), "outside its range"),
-            (about(), "neither a JSON object"),
+            (about(), "no JSON object"),
             (ToolCall(id="1", name="simulate", arguments="{}"), "no tool 'simulate', only 'predict'"),
-            (ToolCall(id="1", name="predict", arguments='{"candidates": [{"signals": [1'), "neither"),
+            (ToolCall(id="1", name="predict", arguments='{"candidates": [{"signals": [1'), "no JSON"),
         ],
     )
     def test_wrong_calls_say_what_is_wrong_and_do_not_count(self, call: ToolCall, problem: str) -> None:

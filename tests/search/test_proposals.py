@@ -38,7 +38,10 @@ class Mine:
 @pytest.mark.parametrize(
     ("candidate", "message"),
     [
-        (level(5.0), r"engine 'mine': input 'u' at t = 0 s: 5 is outside its range \[-1, 1\]"),
+        (
+            level(5.0),
+            r"input 'u' at t = 0, 3.33333, 6.66667, 10 s: 5, 5, 5, 5 are outside its range \[-1, 1\]",
+        ),
         (level(1.0, "throttle"), "engine 'mine': unknown input or parameter 'throttle'"),
         (Candidate(), "engine 'mine': input 'u' is missing"),
         (Candidate({"u": Signal((0.0,), (1.0,))}), "engine 'mine': input 'u': expected 4 evenly spaced"),

@@ -1,6 +1,9 @@
 """The part of a prompt that advises how to use the rest."""
 
+from falsifier.core.space import InputRange
+from falsifier.core.words import listed
 from falsifier.llm.prompts.blocks import AdviceBlock
+from falsifier.llm.prompts.published import guidance
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl.formula import Always, And, Formula, Implies
@@ -8,21 +11,16 @@ from falsifier.stl.formula import Always, And, Formula, Implies
 
 def advice(view: View, variant: Variant) -> AdviceBlock:
     """Advice that fits what the variant shows, how the requirement is built and what is chosen."""
+    if variant.is_published:
+        return AdviceBlock(lines=guidance(view, variant))
     what = view.chosen
     samples = [
-        f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs."
-    ]
-    if variant.has("critical"):
-        samples.append(
-            f"Look at the time that decided each robustness value, and change the {what} so that the signals "
-            "at that time move towards violating the requirement."
-        )
-    if not variant.has("observations"):
-        return AdviceBlock(lines=tuple(samples))
-    samples.append(
+        f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs.",
+        f"Look at the time that decided each robustness value, and change the {what} so that the signals "
+        "at that time move towards violating the requirement.",
         "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
-        "strategy."
-    )
+        "strategy.",
+    ]
     return AdviceBlock(lines=tuple(_at_any_time(view, variant)), on_samples=tuple(samples))
 
 
@@ -35,6 +33,8 @@ def _at_any_time(view: View, variant: Variant) -> list[str]:
             "The limits of the ranges are good first samples, and so is a single switch from one limit to "
             "the other."
         ]
+    if view.space.inputs and all(_is_discrete(view, r) for r in view.space.inputs):
+        lines = ["One value throughout, and a single switch to another value, are good first samples."]
     if _is_conjunction(formula):
         lines.append(
             "The requirement is a conjunction: it is violated as soon as any one of its conjuncts is. Its "
@@ -51,12 +51,24 @@ def _at_any_time(view: View, variant: Variant) -> list[str]:
             "condition true first."
         )
     if variant.has("freedom") and any(r.free for r in view.space.inputs):
-        lines.append(
-            "Choose the signal shape that a violation needs: constant interpolation with your own times for "
-            "steps and short pulses, few control points for slow changes, pieces of half a period to excite "
-            "a resonance."
-        )
+        free = [r for r in view.space.inputs if r.free]
+        if not all(_is_discrete(view, r) for r in free):
+            lines.append(
+                "Choose the signal shape that a violation needs: constant interpolation with your own times "
+                "for steps and short pulses, few control points for slow changes, pieces of half a period to "
+                "excite a resonance."
+            )
+        if discrete := [r.name for r in free if _is_discrete(view, r)]:
+            lines.append(
+                f"{listed(discrete)} can only jump from value to value: what matters is the order of the "
+                "values, when each begins and how long it lasts. Try unusual orders, switching back, and "
+                "stays that are just too short or too long for what the system does meanwhile."
+            )
     return lines
+
+
+def _is_discrete(view: View, r: InputRange) -> bool:
+    return r.kind != "real" or r.name in view.levels
 
 
 def _is_conjunction(formula: Formula) -> bool:

@@ -13,6 +13,7 @@ class TaskBlock(_Block):
     """The task."""
 
     knows_requirement: bool
+    is_published: bool = Field(default=False, description="Told as the published prompts tell it.")
     chosen: str = Field(default="inputs", description="What is chosen: inputs, or parameters alone.")
     count: int = Field(description="Number of candidates wanted.")
 
@@ -42,6 +43,7 @@ class SignalLine(_Block):
     unit: str = ""
     description: str = ""
     kind: str = "real"
+    items: tuple[str, ...] = Field(default=(), description="Numbers and names of an enumeration.")
     start: str = Field(default="", description="Its value at time 0.")
 
 
@@ -93,11 +95,21 @@ class ParameterLine(_Block):
     nominal: str = ""
 
 
+class CourseLine(_Block):
+    """What one input signal does between its control points."""
+
+    name: str
+    interpolation: Interpolation
+    hold: float | None = None
+    is_constant: bool = Field(default=False, description="It has only one control point.")
+
+
 class InputsBlock(_Block):
     """Everything to choose."""
 
-    stop_time: str
+    stop_time: str = Field(default="", description="Empty: not told.")
     dimensions: tuple[DimensionLine, ...] = ()
+    courses: tuple[CourseLine, ...] = Field(default=(), description="Of the dimensions that are signals.")
     inputs: tuple[InputLine, ...] = ()
     parameters: tuple[ParameterLine, ...] = ()
 
@@ -143,7 +155,9 @@ class AdviceBlock(_Block):
 class ReplyBlock(_Block):
     """The required form of the reply."""
 
-    example: str
+    example: str = Field(default="", description="Empty: numbers between tags are asked for.")
+    order: str = Field(default="", description="Order of the numbers between tags.")
+    has_numbers: bool = Field(default=True, description="Whether the example contains numbers.")
     notes: tuple[str, ...] = ()
 
 

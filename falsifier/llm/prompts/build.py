@@ -1,15 +1,16 @@
 """From a problem and its evaluations to a prompt: selects what is shown and arranges it in blocks."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import InputRange, ParameterRange, nearest_value
+from falsifier.core.space import InputRange, ParameterRange
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
     BudgetBlock,
+    CourseLine,
     DimensionLine,
     HistoryBlock,
     InputLine,
@@ -17,7 +18,6 @@ from falsifier.llm.prompts.blocks import (
     OutputsBlock,
     ParameterLine,
     Prompt,
-    ReplyBlock,
     RequirementBlock,
     SampleLines,
     SignalLine,
@@ -25,8 +25,9 @@ from falsifier.llm.prompts.blocks import (
     TaskBlock,
 )
 from falsifier.llm.prompts.context import Context
-from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain, signed
-from falsifier.llm.prompts.published import published_facts
+from falsifier.llm.prompts.numbers import bounds, number, signed
+from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, clock, published_facts
+from falsifier.llm.prompts.reply import reply_block
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl import in_words
@@ -44,6 +45,7 @@ def build_prompt(
     pending: Sequence[Candidate] = (),
     notes: Sequence[str] = (),
     count: int = 1,
+    reply: ReplyKind = "json",
     context: Context | None = None,
 ) -> Prompt:
     """Build the prompt for the next candidates.
@@ -55,20 +57,26 @@ def build_prompt(
         pending: candidates without an evaluation yet.
         notes: lines about the search as a whole, from the engine that leads it.
         count: number of candidates wanted.
+        reply: what a reply is to consist of.
         context: what is known of the run; default: nothing.
     """
     context = context or Context()
     return Prompt(
         variant=variant.name,
-        task=TaskBlock(knows_requirement=variant.has("requirement"), chosen=view.chosen, count=count),
+        task=TaskBlock(
+            knows_requirement=variant.has("requirement"),
+            is_published=variant.is_published,
+            chosen=view.chosen,
+            count=count,
+        ),
         system=_system(view) if variant.has("system") else None,
         requirement=_requirement(view, variant) if variant.has("requirement") else None,
         outputs=_outputs(view, variant, context) if variant.has("outputs") else None,
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
-        history=_history(view, variant, evaluations, pending, notes, context),
+        history=_history(view, variant, evaluations, pending, notes, context, reply),
         budget=_budget(variant, evaluations, context),
-        advice=advice(view, variant) if variant.has("advice") else None,
-        reply=_reply(view, variant, count),
+        advice=advice(view, variant),
+        reply=reply_block(view, variant, count, reply),
     )
 
 
@@ -107,8 +115,9 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
                 name=name,
                 unit=view.unit(name),
                 description=view.description(name),
-                kind=view.kind(name),
-                start=_start(variant, context, name),
+                kind=view.kind(name) if view.tells_kinds else "real",
+                items=view.items(name),
+                start=_start(view, variant, context, name),
             )
             for name in (*view.formula_outputs, *others)
         ),
@@ -118,29 +127,33 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
 
 _LEGEND = (
     "Signals over time are written as time:value, time in s; between these points they run in straight "
-    "lines. Up to 3 % of a signal's span is rounded off, more where it oscillates, and nothing around the "
-    "time that decided."
+    "lines. Where a signal oscillates, its period and its lower and upper envelope are given. Up to 3 % of a "
+    "signal's span is rounded off, more where it oscillates, and nothing around the time that decided."
 )
 
 
-def _start(variant: Variant, context: Context, name: str) -> str:
+def _start(view: View, variant: Variant, context: Context, name: str) -> str:
     """Value at time 0; a range if it depends on what is chosen."""
     if name not in context.start or not variant.has("circumstances"):
         return ""
-    low, high = (number(value, 5) for value in context.start[name])
+    low, high = (view.labelled(name, value, number(value, 5)) for value in context.start[name])
     return low if low == high else f"{low} to {high}, depending on what you choose"
 
 
 def _dimensions(view: View, variant: Variant) -> InputsBlock:
     """The numbers to choose, with or without their meanings."""
-    clock = decimals_for(view.space.stop_time, 4)
     dimensions = []
     for i, dimension in enumerate(view.space.dimensions, start=1):
         low, high = bounds(dimension.low, dimension.high)
-        at = "" if dimension.time is None else f" at t = {plain(dimension.time, clock)} s"
+        at = "" if dimension.time is None else f" at t = {clock(view, dimension.time)}"
         meaning = f"{dimension.name}{at}" if variant.has("names") else ""
         dimensions.append(DimensionLine(number=i, meaning=meaning, low=low, high=high))
-    return InputsBlock(stop_time=number(view.space.stop_time), dimensions=tuple(dimensions))
+    named = view.space.inputs if variant.has("names") else ()
+    courses = (
+        CourseLine(name=r.name, interpolation=r.interpolation, hold=r.hold, is_constant=r.control_points == 1)
+        for r in named
+    )
+    return InputsBlock(dimensions=tuple(dimensions), courses=tuple(courses))
 
 
 def _named_inputs(view: View, variant: Variant) -> InputsBlock:
@@ -149,7 +162,7 @@ def _named_inputs(view: View, variant: Variant) -> InputsBlock:
     return InputsBlock(
         stop_time=number(view.space.stop_time),
         inputs=tuple(_input(view, r, free=free) for r in view.space.inputs),
-        parameters=tuple(_parameter(p) for p in view.space.parameters),
+        parameters=tuple(_parameter(view, p) for p in view.space.parameters),
     )
 
 
@@ -166,8 +179,8 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
         name=r.name,
         unit=r.unit,
         description=r.description,
-        kind=r.kind,
-        items=_items(r),
+        kind="levels" if r.name in view.levels else r.kind,
+        items=_items(view, r),
         low=low,
         high=high,
         control_points=r.control_points,
@@ -180,22 +193,24 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
     )
 
 
-def _parameter(p: ParameterRange) -> ParameterLine:
+def _parameter(view: View, p: ParameterRange) -> ParameterLine:
     low, high = bounds(p.low, p.high)
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
         name=p.name,
         unit=p.unit,
         description=p.description,
-        kind=p.kind,
-        items=_items(p),
+        kind="levels" if p.name in view.levels else p.kind,
+        items=_items(view, p),
         low=low,
         high=high,
         nominal=nominal,
     )
 
 
-def _items(ranged: InputRange | ParameterRange) -> tuple[str, ...]:
+def _items(view: View, ranged: InputRange | ParameterRange) -> tuple[str, ...]:
+    if ranged.name in view.levels:
+        return tuple(number(level) for level in view.levels[ranged.name])
     return tuple(f"{n} = {name}" for name, n in ranged.items if ranged.low <= n <= ranged.high)
 
 
@@ -206,6 +221,7 @@ def _history(
     pending: Sequence[Candidate],
     notes: Sequence[str],
     context: Context,
+    reply: ReplyKind,
 ) -> HistoryBlock | None:
     if variant.has("selection"):
         chosen = selection.recent_best_and_different(view, evaluations)
@@ -215,14 +231,15 @@ def _history(
         depths = {}
     if not chosen and not pending and not notes:
         return None
-    judged = sum(e.verdict is not None or variant.has("failures") for e in evaluations)
+    # The published prompts count the samples that they show, not all that there were.
+    numbers = {i: n for n, i in enumerate(chosen)} if variant.is_published else {i: i for i in chosen}
     return HistoryBlock(
         samples=tuple(
-            _sample(view, variant, i, mark, evaluations[i], depths.get(i, "close"), context)
+            _sample(view, variant, numbers[i], mark, evaluations[i], depths.get(i, "close"), context, reply)
             for i, mark in chosen.items()
         ),
-        omitted=judged - len(chosen),
-        pending=tuple("; ".join(_chosen(view, variant, c)) for c in pending),
+        omitted=0 if variant.is_published else len(evaluations) - len(chosen),
+        pending=tuple("; ".join(_chosen(view, variant, c, reply)) for c in pending),
         notes=(*(_notes(view, evaluations) if variant.has("observations") else ()), *notes),
     )
 
@@ -235,17 +252,21 @@ def _sample(
     evaluation: Evaluation,
     depth: selection.Depth,
     context: Context,
+    reply: ReplyKind,
 ) -> SampleLines:
-    inputs = _chosen(view, variant, evaluation.candidate)
+    inputs = _chosen(view, variant, evaluation.candidate, reply)
     if evaluation.robustness is None:
         return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
     rich = variant.has("observations")
-    digits = observations.ROBUSTNESS_DIGITS if rich else 3
+    if rich:
+        robustness = signed(evaluation.robustness, observations.ROBUSTNESS_DIGITS)
+    else:
+        robustness = f"{evaluation.robustness:.{ROBUSTNESS_DECIMALS}f}"
     return SampleLines(
         number=index + 1,
         mark=mark,
         inputs=inputs,
-        robustness=signed(evaluation.robustness, digits),
+        robustness=robustness,
         doubt=context.doubts.get(evaluation.candidate.key, ""),
         facts=tuple(
             _observed(view, evaluation, depth) if rich else published_facts(view, variant, evaluation)
@@ -269,8 +290,8 @@ def _failure(evaluation: Evaluation) -> str:
     return f"no verdict, the simulation {how}: {evaluation.reason}".rstrip(": ")
 
 
-def _chosen(view: View, variant: Variant, candidate: Candidate) -> tuple[str, ...]:
-    if not variant.has("names"):
+def _chosen(view: View, variant: Variant, candidate: Candidate, reply: ReplyKind) -> tuple[str, ...]:
+    if not variant.has("names") or (variant.is_published and reply == "points"):
         return choices.as_point(view, candidate)
     return (choices.as_signals if variant.has("system") else choices.as_values)(view, candidate)
 
@@ -285,62 +306,4 @@ def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:
         f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its value "
         "gives no direction. Look instead at how close a condition came to being true, how briefly a "
         "discrete value was held, and how far a signal was from its switching point."
-    ]
-
-
-def _reply(view: View, variant: Variant, count: int) -> ReplyBlock:
-    space = view.space
-    one: dict[str, object] = {"rationale": "why these values"}
-    free = variant.has("freedom") and any(r.free for r in space.inputs)
-    if not variant.has("names"):
-        one["point"] = _spread([(d.low, d.high) for d in space.dimensions])
-    else:
-        if space.inputs:
-            one["signals"] = [_example(view, r, k, free=free) for k, r in enumerate(space.inputs)]
-        if space.parameters:
-            values = _spread([(p.low, p.high) for p in space.parameters])
-            one["parameters"] = [
-                {"name": p.name, "value": nearest_value(p, value)}
-                for p, value in zip(space.parameters, values, strict=True)
-            ]
-    example = json.dumps(one if count == 1 else {"candidates": [one]})
-    return ReplyBlock(example=example, notes=_FREE_NOTES if free else ())
-
-
-_FREE_NOTES = (
-    'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
-    "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
-    'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
-    "stop time.",
-    'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
-)
-# Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
-_PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
-# Share of the stop time at which the pieces of an example begin.
-_BEGINNINGS = (0.0, 0.24, 0.62)
-
-
-def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
-    limits = [(r.low, r.high)]
-    if not free:
-        values = [nearest_value(r, v) for v in _spread(limits * r.control_points, position)]
-        return {"name": r.name, "values": values}
-    times: list[float] = []
-    interpolation: str = r.interpolation
-    count = min(r.control_points, len(_PLACES))
-    stepping = r.free and r.free.max_control_points >= len(_BEGINNINGS)
-    if stepping and r.free and position == 0 and r.free.min_interval <= view.space.stop_time / 5:
-        times = [float(f"{share * view.space.stop_time:.3g}") for share in _BEGINNINGS]
-        interpolation, count = "constant", len(times)
-    elif r.free is None:
-        count = r.control_points
-    values = [nearest_value(r, v) for v in _spread(limits * count, position)]
-    return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
-
-
-def _spread(limits: Sequence[tuple[float, float]], first: int = 0) -> list[float]:
-    """Numbers within their limits that differ from each other."""
-    places = (_PLACES[(first + k) % len(_PLACES)] for k in range(len(limits)))
-    return [
-        float(f"{low + place * (high - low):.4g}") for place, (low, high) in zip(places, limits, strict=True)
     ]

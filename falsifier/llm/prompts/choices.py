@@ -14,6 +14,10 @@ from falsifier.llm.prompts.view import View
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 7
+# Switches of a signal up to which every one is told; of others those by more than a share of the range.
+_MOST_PIECES = 12
+_ROUGHLY = 0.02
+_PUBLISHED_DECIMALS = 3
 
 # Said of values where the sample had other control points than those that are told.
 _READ = " (values at these times of an input with other control points)"
@@ -22,19 +26,28 @@ _READ = " (values at these times of an input with other control points)"
 def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
     """The numbers in the order of the dimensions."""
     is_exact = all(_is_exact(view, r, candidate.signals[r.name]) for r in view.space.inputs)
-    return (f"point = {runs([float(v) for v in view.space.encode(candidate)])}{'' if is_exact else _READ}",)
+    values = zip(view.space.encode(candidate), view.space.dimensions, strict=True)
+    listed = ", ".join(_published(float(value), d.low, d.high) for value, d in values)
+    return (f"point = [{listed}]{'' if is_exact else _READ}",)
 
 
 def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
     """Values of each input at the fixed control points, by name, and parameters."""
     signals = [(r, candidate.signals[r.name]) for r in view.space.inputs]
+    parameters = [(p, candidate.parameters[p.name]) for p in view.space.parameters]
     return (
         *(
-            f"{r.name} = {runs(_fixed_values(view, r, s))}{'' if _is_exact(view, r, s) else _READ}"
+            f"{r.name} = [{', '.join(_published(v, r.low, r.high) for v in _fixed_values(view, r, s))}]"
+            f"{'' if _is_exact(view, r, s) else _READ}"
             for r, s in signals
         ),
-        *_parameters(view, candidate),
+        *(f"{p.name} = {_published(value, p.low, p.high)}" for p, value in parameters),
     )
+
+
+def _published(value: float, low: float, high: float) -> str:
+    """A value with the published three decimals; with more only if the range is too narrow for them."""
+    return plain(value, max(_PUBLISHED_DECIMALS, decimals_for(high - low, 2)))
 
 
 def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:
@@ -57,7 +70,27 @@ def _signal_text_in(r: InputRange, signal: Signal, stop_time: float) -> str:
     """Parameterization with values rounded to some thousandths of the range."""
     decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
     rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
+    if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
+        rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
+        if rough.switches < rounded.switches:
+            return f"told within {_ROUGHLY:.0%} of the range: {signal_text(rough, stop_time=stop_time)}"
     return signal_text(rounded, stop_time=stop_time)
+
+
+def _merged(signal: Signal, tolerance: float) -> Signal:
+    """Constant pieces, those whose values differ from the first of them by no more than this as one."""
+    kept = [(signal.times[0], signal.values[0])]
+    kept += [
+        (time, value)
+        for before, time, value in zip(signal.values, signal.times[1:], signal.values[1:], strict=False)
+        if before != value
+    ]
+    merged = kept[:1]
+    for time, value in kept[1:]:
+        if abs(value - merged[-1][1]) > tolerance:
+            merged.append((time, value))
+    times, values = zip(*merged, strict=True)
+    return replace(signal, times=times, values=values)
 
 
 def signal_text(signal: Signal, *, stop_time: float) -> str:

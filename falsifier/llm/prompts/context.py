@@ -22,25 +22,29 @@ class Context:
     doubts: Mapping[Hashable, str] = field(default_factory=dict)
 
 
-def in_doubt(confirmation: Confirmation) -> str:
-    """Why a violation does not count, without any name, and what would count."""
+def in_doubt(confirmation: Confirmation, unit: float = 1.0) -> str:
+    """Why a violation does not count, without any name, and what would count.
+
+    Args:
+        confirmation: how the violation was repeated.
+        unit: what robustness values are divided by.
+    """
     found = confirmation.evaluation.robustness
     assert found is not None
-    again = confirmation.halved if confirmation.robustness is not None else None
-    if confirmation.robustness is None:
+    robustness, reference, halved = (
+        None if value is None else value / unit
+        for value in (confirmation.robustness, confirmation.reference, confirmation.halved)
+    )
+    found /= unit
+    again = halved if robustness is not None else None
+    if robustness is None:
         why = "a second simulation of it failed"
-    elif confirmation.robustness >= 0:
-        again, why = (
-            confirmation.robustness,
-            f"a second simulation gave robustness {signed(confirmation.robustness)}",
-        )
+    elif robustness >= 0:
+        again, why = robustness, f"a second simulation gave robustness {signed(robustness)}"
     elif again is not None and again >= 0:
         why = f"at half the simulation step its robustness is {signed(again)}"
     else:
-        reference = confirmation.reference
-        told = (
-            "" if reference is None else f", {signed(reference)} instead of {signed(confirmation.robustness)}"
-        )
+        told = "" if reference is None else f", {signed(reference)} instead of {signed(robustness)}"
         why = f"a second monitor does not confirm it{told}"
     text = f"this does not count as a violation, it is {confirmation.outcome}: {why}"
     if again is None or again < 0:

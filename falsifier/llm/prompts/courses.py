@@ -3,7 +3,9 @@
 Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,8 @@ Array = NDArray[np.float64]
 
 # Changes listed individually; of longer lists the beginning and the end.
 _SHOWN_CHANGES = 16
+# Decimals of times, if fewer would give two breakpoints the same time.
+_FINEST_CLOCK = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,20 +39,27 @@ def pieces(times: Array, column: Array) -> list[Piece]:
     ]
 
 
-def change_list(times: Array, column: Array, *, clock: int) -> str:
+Label = Callable[[float, str], str]
+
+
+def change_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
     """Values with the times at which they begin.
 
     Args:
         times: time grid in s.
         column: the signal.
         clock: decimals of times.
+        label: names a value, given it and its text.
 
     >>> change_list(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 1.0, 2.0, 2.0]), clock=2)
     '1, then 2 from 2 s'
     """
     found = pieces(times, column)
-    words = [plain(found[0].value, 6)]
-    words += [f"{plain(p.value, 6)} from {plain(p.start, clock)} s" for p in found[1:]]
+    values = [label(p.value, plain(p.value, 6)) for p in found]
+    words = values[:1]
+    words += [
+        f"{value} from {plain(p.start, clock)} s" for value, p in zip(values[1:], found[1:], strict=True)
+    ]
     if len(words) == 1:
         return f"constant {words[0]}"
     if len(words) > _SHOWN_CHANGES:
@@ -57,7 +68,7 @@ def change_list(times: Array, column: Array, *, clock: int) -> str:
     return f"{words[0]}, then {', '.join(words[1:])}"
 
 
-def dwell_list(times: Array, column: Array, *, clock: int) -> str:
+def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
     """How often each value was entered, and its shortest stay.
 
     The first interval does not count as entered, and the last one is cut off by the end of the simulation.
@@ -69,7 +80,7 @@ def dwell_list(times: Array, column: Array, *, clock: int) -> str:
     for value in sorted({p.value for p in found}):
         again = [p for p in found[1:] if p.value == value]
         complete = [p for p in again if p is not found[-1]]
-        name = plain(value, 6)
+        name = label(value, plain(value, 6))
         if complete:
             shortest = min(complete, key=lambda p: p.end - p.start)
             length = plain(shortest.end - shortest.start, 3)
@@ -117,7 +128,17 @@ def coarse_clock(stop_time: float) -> int:
     return decimals_for(stop_time / 2, 3)
 
 
+def _are_ambiguous(points: Points, decimals: int, clock: int) -> bool:
+    """Whether two breakpoints read as different values at the same time."""
+    return any(
+        plain(a, clock) == plain(b, clock) and plain(v, decimals) != plain(w, decimals)
+        for (a, v), (b, w) in pairwise(points)
+    )
+
+
 def _pairs(points: Points, decimals: int, clock: int) -> str:
+    while clock < _FINEST_CLOCK and _are_ambiguous(points, decimals, clock):
+        clock += 1
     texts = [f"{plain(t, clock)}:{plain(v, decimals)}" for t, v in points]
     return " ".join(dict.fromkeys(texts))
 

@@ -1,7 +1,7 @@
 """Everything observed in one sample: what decided it, the parts of the formula, all signals over time."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,8 +72,9 @@ def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator
     yield from _parts(view, monitor, diagnosis, trajectory)
     for name in view.formula_outputs:
         if is_discrete(trajectory[name], kind=view.kind(name)):
-            yield f"{name}: {change_list(trajectory.times, trajectory[name], clock=clock)}"
-            if stays := dwell_list(trajectory.times, trajectory[name], clock=clock):
+            label = partial(view.labelled, name)
+            yield f"{name}: {change_list(trajectory.times, trajectory[name], clock=clock, label=label)}"
+            if stays := dwell_list(trajectory.times, trajectory[name], clock=clock, label=label):
                 yield f"{name} stays: {stays}"
     if close:
         for predicate in view.requirement.formula.predicates:
@@ -94,14 +95,15 @@ def details(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterat
         return
     times = trajectory.times
     steps = _input_steps(evaluation) if close else ()
-    compared = _compared(view, trajectory)
+    compared = compared_columns(view, trajectory)
     if not close:
         compared = {name: column for name, column in compared.items() if name in _deciding(view, verdict)}
     columns = _shown_columns(view, trajectory, compared) if close else compared
     for name, column in columns.items():
         if is_discrete(column, kind=view.kind(name)):
             if name not in view.formula_outputs:  # facts() shows those
-                yield f"{name}: {change_list(times, column, clock=_clock(view))}"
+                label = partial(view.labelled, name)
+                yield f"{name}: {change_list(times, column, clock=_clock(view), label=label)}"
         else:
             most = MOST_BREAKPOINTS if close and name in compared else _FEWER_BREAKPOINTS
             kept = steps if name in compared else ()
@@ -114,7 +116,7 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
     there = []
     for name, value in trajectory.at(diagnosis.critical_time).items():
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
-        there.append(f"{name} = {plain(value, decimals)}{_unit(view, name)}")
+        there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{_unit(view, name)}")
     return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
 
 
@@ -196,7 +198,7 @@ def _short(margin: float) -> str:
     return f"{margin:.5g}"
 
 
-def _compared(view: View, trajectory: Trajectory) -> dict[str, Array]:
+def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
     formula = view.requirement.formula
     sides = {str(side): side for p in formula.predicates for side in (p.left, p.right)}

@@ -1,13 +1,47 @@
-"""What the published prompts show of a sample: values at the control-point times, and what decided."""
+"""What the published prompts tell: guidance, and of a sample what was compared, when, and what decided.
+
+The digits are theirs too; ``design/published-prompts.md`` compares line by line.
+"""
 
 from collections.abc import Iterator
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.prompts.courses import column_decimals
-from falsifier.llm.prompts.numbers import decimals_for, number
+from falsifier.llm.prompts.numbers import decimals_for
+from falsifier.llm.prompts.observations import Array, compared_columns
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
+from falsifier.stl.expression import number_text
+from falsifier.stl.formula import Always, Eventually, Formula, Until
+
+ROBUSTNESS_DECIMALS = 3
+# Decimals of an output: one, or as many as show that it is not zero.
+_FEWEST_DECIMALS, _MOST_DECIMALS = 1, 3
+# Decimals of a critical time: those of the times in the formula, up to this many.
+_MOST_CLOCK_DECIMALS = 4
+
+
+def guidance(view: View, variant: Variant) -> tuple[str, ...]:
+    """What to consider; the same in every question, as published."""
+    what = view.chosen
+    lines = ["Consider which combinations of values had the lower robustness."]
+    if not variant.has("names"):
+        return (*lines, "Consider what each number may stand for and how it may act on the system.")
+    lines.append(
+        f"Use the meaning of the {what} and of the requirement: how each of the {what} acts on the output "
+        "signals, what the requirement demands of these, and what could break it."
+    )
+    if variant.has("values"):
+        lines.append(
+            f"Study the output values of the samples: how they follow the {what}, and whether they move "
+            "towards a violation."
+        )
+    return tuple(lines)
+
+
+def clock(view: View, time: float) -> str:
+    """A time with one decimal, as published; with more only if the simulation is too short for one."""
+    return f"{time:.{max(1, decimals_for(view.space.stop_time, 2))}f} s"
 
 
 def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Iterator[str]:
@@ -22,36 +56,51 @@ def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Ite
 def _values_at_control_points(view: View, trajectory: Trajectory) -> Iterator[str]:
     stop_time = view.space.stop_time
     times = {time for r in view.space.inputs for time in view.space.fixed_times(r)}
-    for name in view.formula_outputs:
-        if name in trajectory.columns:
-            column = trajectory[name]
-            decimals = column_decimals(column)
-            values = (
-                f"{column[trajectory.index(t)]:.{decimals}f} at {_clock(view, t)}"
-                for t in sorted(times or {0.0, stop_time})
-            )
-            yield f"{name}: {', '.join(values)}"
+    for text, column in _told_columns(view, trajectory).items():
+        values = (
+            f"{_output(column[trajectory.index(t)])} at {clock(view, t)}"
+            for t in sorted(times or {0.0, stop_time})
+        )
+        yield f"{text}: {', '.join(values)}"
+
+
+def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
+    """Outputs of the formula; those that are compared only together, such as ``y5 - y4``, as one term.
+
+    The published models have outputs for such terms.
+    """
+    sides = {str(side): side for p in view.requirement.formula.predicates for side in (p.left, p.right)}
+    columns: dict[str, Array] = {}
+    for text, column in compared_columns(view, trajectory).items():
+        names = sides[text].signals
+        columns |= {text: column} if len(names) > 1 else {name: trajectory[name] for name in names}
+    return columns
 
 
 def _decided(view: View, evaluation: Evaluation) -> str:
-    verdict = evaluation.verdict
+    verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
-    there = (
-        f"{name} = {_valued(evaluation.trajectory, name, verdict.values[name])}"
-        for name in view.requirement.formula.signals
-        if name in verdict.values
-    )
-    values = ", ".join(there)
-    return f"the robustness was decided at t = {_clock(view, verdict.critical_time)}" + (
-        f" with {values}" if values else ""
-    )
+    if trajectory is None:
+        there = {name: verdict.values[name] for name in view.formula_outputs if name in verdict.values}
+    else:
+        at = trajectory.index(verdict.critical_time)
+        there = {text: float(column[at]) for text, column in _told_columns(view, trajectory).items()}
+    values = ", ".join(f"{name} = {_output(value)}" for name, value in there.items())
+    time = f"{verdict.critical_time:.{_clock_decimals(view.requirement.formula)}f} s"
+    return f"the robustness was decided at t = {time}" + (f" with {values}" if values else "")
 
 
-def _valued(trajectory: Trajectory | None, name: str, value: float) -> str:
-    if trajectory is None or name not in trajectory.columns:
-        return number(value)
-    return f"{value:.{column_decimals(trajectory[name])}f}"
+def _clock_decimals(formula: Formula) -> int:
+    windows = [f.window for f in formula.walk() if isinstance(f, Always | Eventually | Until) and f.window]
+    bounds = (number_text(bound) for window in windows for bound in (window.start, window.end))
+    found = max((len(bound.partition(".")[2]) for bound in bounds), default=0)
+    return min(found, _MOST_CLOCK_DECIMALS) or 1
 
 
-def _clock(view: View, time: float) -> str:
-    return f"{time:.{decimals_for(view.space.stop_time, 3)}f} s"
+def _output(value: float) -> str:
+    for decimals in range(_FEWEST_DECIMALS, _MOST_DECIMALS):
+        if float(text := f"{value:.{decimals}f}"):
+            return text
+    if value == 0:
+        return f"{0:.{_FEWEST_DECIMALS}f}"
+    return f"{value:.{_MOST_DECIMALS}f}"

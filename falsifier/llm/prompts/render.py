@@ -6,6 +6,7 @@ from falsifier.core.words import counted
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.blocks import (
     BudgetBlock,
+    CourseLine,
     InputLine,
     InputsBlock,
     OutputsBlock,
@@ -43,12 +44,13 @@ def _standing(prompt: Prompt) -> Iterator[str]:
 
 
 def _task(task: TaskBlock) -> str:
-    sign = "A robustness below 0 is a violation; exactly 0 is not. Smaller values are closer to a violation."
-    if not task.knows_requirement:
+    if task.is_published:
+        what = task.chosen if task.knows_requirement else "values"
         return (
-            "You minimise an unknown function, the robustness of a simulated system. Find a point at which "
-            f"its value is negative, in as few simulations as possible. {sign}"
+            f"Your task is to find {what} with which a system violates its specification. Each sample is "
+            "judged by a number, its robustness: lower is better, and below 0 the specification is violated."
         )
+    sign = "A robustness below 0 is a violation; exactly 0 is not. Smaller values are closer to a violation."
     return (
         f"You search for a counterexample: a system is simulated with {task.chosen} that you choose, and a "
         "monitor returns the robustness, the margin by which the requirement is met. Find "
@@ -75,7 +77,7 @@ def _requirement(block: RequirementBlock) -> str:
 def _outputs(block: OutputsBlock) -> str:
     if not block.signals:
         return "Output signals: none; the requirement refers to inputs only."
-    if not any(s.unit or s.description or s.kind != "real" for s in block.signals):
+    if not block.legend and not any(s.unit or s.description or s.kind != "real" for s in block.signals):
         return f"Output signals: {', '.join(s.name for s in block.signals)}"
     legend = (block.legend,) if block.legend else ()
     return "\n".join(("Recorded signals:", *(_signal(s) for s in block.signals), *legend))
@@ -83,22 +85,32 @@ def _outputs(block: OutputsBlock) -> str:
 
 def _signal(line: SignalLine) -> str:
     kind = "" if line.kind == "real" else f", {line.kind}"
+    if line.items:
+        kind = f", {', '.join(line.items)}"
     start = f"; at t = 0: {line.start}" if line.start else ""
     return f"- {line.name}{_bracketed(line.unit)}{kind}{_described(line.description)}{start}"
 
 
 def _inputs(block: InputsBlock) -> str:
-    length = f"The simulation runs from 0 to {block.stop_time} s."
+    length = f" The simulation runs from 0 to {block.stop_time} s." if block.stop_time else ""
     if block.dimensions:
-        lines = [f"You choose {counted(len(block.dimensions), 'number')}. {length}"]
+        lines = [f"You choose {counted(len(block.dimensions), 'number')}.{length}"]
         for d in block.dimensions:
             meaning = f": {d.meaning}" if d.meaning else ""
             lines.append(f"{d.number}{meaning}, from {d.low} to {d.high}")
+        lines += [_course(line) for line in block.courses]
         return "\n".join(lines)
-    lines = [f"You choose the following. {length}"]
+    lines = [f"You choose the following.{length}"]
     lines += [_input(line) for line in block.inputs]
     lines += [_parameter(line) for line in block.parameters]
     return "\n".join(lines)
+
+
+def _course(line: CourseLine) -> str:
+    if line.is_constant:
+        return f"{line.name}: one value for the whole time"
+    held = "" if line.hold is None else f", sampled and held every {line.hold:g} s"
+    return f"{line.name} between these times: {_INTERPOLATION[line.interpolation]}{held}"
 
 
 def _input(line: InputLine) -> str:
@@ -148,11 +160,18 @@ def _parameter(line: ParameterLine) -> str:
 
 
 def _reply(block: ReplyBlock, count: int) -> str:
+    if not block.example:
+        what = f"{count} different samples" if count > 1 else "the new sample"
+        them = "each sample" if count > 1 else "them"
+        return (
+            f"Think step by step, but write no code. End your reply with {what}: {block.order}; separate the "
+            f"numbers by commas and put {them} between <point> and </point>."
+        )
     many = f" with {count} different candidates" if count > 1 else ""
+    own = "; the numbers below only show the form, choose your own" if block.has_numbers else ""
     return "\n".join(
         (
-            f"Reply with one JSON object{many} in this form, with one or two sentences of rationale; the "
-            "numbers below only show the form, choose your own:",
+            f"Reply with one JSON object{many} in this form, with one or two sentences of rationale{own}:",
             block.example,
             *block.notes,
         )

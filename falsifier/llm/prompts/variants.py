@@ -11,9 +11,10 @@ Part = Literal[
     "names",  # inputs and parameters by name and meaning; otherwise numbered dimensions
     "requirement",  # the formula
     "outputs",  # the signals of the formula
-    "values",  # per sample: outputs at the control-point times
+    "values",  # per sample: what the formula compares, at the control-point times
     "critical",  # per sample: critical time and signal values at that time
-    "advice",  # how to use the other parts
+    "guidance",  # what to consider, as the published prompts say
+    "advice",  # advice that fits the problem
     "system",  # the model's description, all recorded signals with units and descriptions
     "reading",  # the formula in plain words, its terms as derived signals
     "freedom",  # control points and interpolation may be chosen if the problem allows it
@@ -40,17 +41,23 @@ class Variant:
         """Whether the prompt contains this part."""
         return part in self.parts
 
+    @property
+    def is_published(self) -> bool:
+        """Whether the variant follows a published prompt and tells nothing more."""
+        return self.has("guidance")
+
 
 def _variants() -> Mapping[str, Variant]:
     # MP1 to MP4 follow the published prompts, each adding to the one before; MP5 is this project's own.
-    mp1: frozenset[Part] = frozenset()
+    # What is told at which place is compared line by line in design/published-prompts.md.
+    mp1: frozenset[Part] = frozenset({"guidance"})
     mp2: frozenset[Part] = mp1 | {"names", "requirement", "outputs"}
-    mp3: frozenset[Part] = mp2 | {"values", "advice"}
+    mp3: frozenset[Part] = mp2 | {"values"}
     mp4: frozenset[Part] = mp3 | {"critical"}
     more: frozenset[Part] = frozenset(
-        ("system", "reading", "freedom", "observations", "selection", "circumstances", "failures")
+        ("advice", "system", "reading", "freedom", "observations", "selection", "circumstances", "failures")
     )
-    mp5 = (mp4 - {"values"}) | more
+    mp5 = (mp4 - {"values", "guidance"}) | more
     parts = {"MP1": mp1, "MP2": mp2, "MP3": mp3, "MP4": mp4, "MP5": mp5}
     return MappingProxyType({name: Variant(name, found) for name, found in parts.items()})
 

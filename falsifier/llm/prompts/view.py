@@ -1,6 +1,7 @@
 """What an LLM may know about a problem: everything except the model itself."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.space import SearchSpace
@@ -17,12 +18,16 @@ class View:
         requirement: the requirement to violate.
         space: search space.
         experiment: stop time and output grid.
+        levels: values that something searched can take, by name, if they are levels without a type.
+        tells_kinds: whether types of signals are told.
     """
 
     info: ModelInfo
     requirement: Requirement
     space: SearchSpace
     experiment: Experiment
+    levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    tells_kinds: bool = True
 
     @classmethod
     def of(cls, problem: Problem) -> "View":
@@ -40,6 +45,17 @@ class View:
     def kind(self, name: str) -> str:
         """Type of a signal's values; real if unknown."""
         return self.info.kind(name)
+
+    def items(self, name: str) -> tuple[str, ...]:
+        """Numbers of an enumeration with the names of its items; empty if it has none."""
+        literals = self.info[name].literals if name in self.info else {}
+        return tuple(f"{number} = {item}" for item, number in literals.items())
+
+    def labelled(self, name: str, value: float, text: str) -> str:
+        """A value's text, with the name of its item if it has one."""
+        literals = self.info[name].literals if name in self.info else {}
+        item = next((item for item, number in literals.items() if number == value), "")
+        return f"{text} ({item})" if item else text
 
     @property
     def chosen(self) -> str:

@@ -153,6 +153,7 @@ def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
         ("--variant", llm.variant),
         *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
         ("--price", None if llm.price is None else f"{llm.price[0]:g}:{llm.price[1]:g}"),
+        ("--reply", None if llm.reply == "json" else llm.reply),
         ("--anonymous", True if llm.anonymous else None),
         ("--fallback", llm.fallback),
     ]

@@ -1,3 +1,6 @@
+from dataclasses import replace
+
+from falsifier.core.space import InputRange
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.variants import VARIANTS
 from falsifier.llm.prompts.view import View
@@ -12,9 +15,9 @@ def lines(variant: str, formula: str = "G[0,10] (x <= 0.9)", *, free: bool = Fal
 
 
 def test_each_variant_adds_what_it_tells_something_of() -> None:
-    counts = [len(lines(name)) for name in ("MP3", "MP4", "MP5")]
-    assert counts == sorted(set(counts))
-    assert lines("MP4")[: len(lines("MP3"))] == lines("MP3")
+    assert [len(lines(name)) for name in ("MP1", "MP2", "MP3", "MP4")] == [2, 2, 3, 3]
+    assert lines("MP4") == lines("MP3") and lines("MP3")[:2] == lines("MP2")
+    assert not set(lines("MP5")) & set(lines("MP4"))
 
 
 def test_advice_on_samples_waits_for_the_first() -> None:
@@ -56,3 +59,17 @@ def test_units_are_spoken_of_where_they_differ() -> None:
     several = advice(View.of(load_problem("AT6a")), VARIANTS["MP5"]).lines
     assert any("unit" in line for line in several)
     assert not any("unit" in line for line in one)
+
+
+def test_inputs_that_only_jump_get_advice_on_order_and_times() -> None:
+    problem = lag_problem(inputs=2, free=FREE)
+    u, v = problem.space.inputs
+    mode = replace(v, low=0.0, high=1.0, kind="boolean", interpolation="constant")
+
+    def told(*inputs: InputRange) -> str:
+        space = replace(problem.space, inputs=inputs)
+        return " ".join(advice(View.of(replace(problem, space=space)), VARIANTS["MP5"]).lines)
+
+    assert "slow changes" in told(u, mode) and "v can only jump" in told(u, mode)
+    only = told(mode)
+    assert "slow" not in only and "limits" not in only and "One value throughout" in only

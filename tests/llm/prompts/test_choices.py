@@ -40,3 +40,13 @@ def test_repeated_values_of_constant_pieces_are_left_out() -> None:
     assert signal_text(signal, stop_time=10.0).endswith("[[0, 0], [2, 1]]")
     line = Signal((0.0, 1.0, 2.0, 5.0), (0.0, 0.0, 1.0, 1.0), "linear")
     assert signal_text(line, stop_time=10.0).endswith("[[0, 0], [1, 0], [2, 1], [5, 1]]")
+
+
+def test_a_signal_of_many_pieces_is_told_roughly() -> None:
+    values = [0.0, *(0.5 + 0.001 * k for k in range(20)), -1.0]
+    signal = Signal(tuple(0.4 * k for k in range(22)), tuple(values), "constant")
+    made = Candidate({"u": signal, "v": Signal((0.0,), (-1.0,), "pchip")}, {"x0": 0.25})
+    assert as_signals(VIEW, made)[0] == (
+        "u: told within 2% of the range: constant pieces from [time, value] points "
+        "[[0, 0], [0.4, 0.5], [8.4, -1]]"
+    )

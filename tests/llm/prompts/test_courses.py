@@ -87,3 +87,8 @@ def test_digits_follow_the_margin() -> None:
 
 def test_times_of_a_course_show_a_hundredth_of_the_simulation() -> None:
     assert [coarse_clock(stop) for stop in (1000.0, 50.0, 3.0, 0.3)] == [0, 1, 2, 3]
+
+
+def test_two_breakpoints_never_have_the_same_time() -> None:
+    drawn = Course((((0.0, 1.0), (0.11, 2.0), (0.12, 3.0)),), (), 0.1)
+    assert course_text(drawn, decimals=0, clock=1) == "0:1 0.11:2 0.12:3"

@@ -1,11 +1,17 @@
 from dataclasses import replace
 
+import pytest
+
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom
+from falsifier.core.space import Freedom, ParameterRange
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
+from falsifier.llm.prompts.context import Context
+from falsifier.problem.requirement import Requirement
+from falsifier.stl import parse
 from falsifier.testing import lag_problem
-from tests.llm.prompts.support import told
+from tests.llm.prompts.support import told, transmission
 
 
 def test_published_variants_tell_the_ten_most_recent_in_order() -> None:
@@ -13,9 +19,12 @@ def test_published_variants_tell_the_ten_most_recent_in_order() -> None:
     evaluations = [evaluate(problem, problem.space.decode([0.05 * i] * 4)) for i in range(14)]
     evaluations[12] = replace(evaluations[12], verdict=None, status="failed", reason="diverged")
     _, changing = told(problem, "MP4", evaluations)
-    numbers = [line.split()[1] for line in changing.splitlines() if line.startswith("Sample ")]
-    assert numbers == [f"{i}:" for i in (4, 5, 6, 7, 8, 9, 10, 11, 12, 14)]
-    assert "10 of 13" in changing
+    samples = [line for line in changing.splitlines() if line.startswith("Sample ")]
+    values = [0.05 * i for i in (3, 4, 5, 6, 7, 8, 9, 10, 11, 13)]
+    assert samples == [
+        f"Sample {n}: u = [{', '.join([f'{round(v, 3):g}'] * 4)}]" for n, v in enumerate(values, start=1)
+    ]
+    assert "13" not in changing
     assert "diverged" not in changing
 
 
@@ -24,3 +33,120 @@ def test_free_samples_are_told_at_the_fixed_times_by_published_variants() -> Non
     candidate = problem.space.admit(Candidate({"u": Signal((0.0, 5.0), (0.25, -0.75), "constant")}))
     _, changing = told(problem, "MP4", [evaluate(problem, candidate)])
     assert "u = [0.25, 0.25, -0.75, -0.75]" in changing
+
+
+def test_mp1_is_numbers_and_robustness() -> None:
+    problem, evaluation = transmission()
+    standing, changing = told(problem, "MP1", [evaluation])
+    ranges = "\n".join(f"{i}, from 0 to {100 if i < 8 else 325}" for i in range(1, 11))
+    assert standing == (
+        "Your task is to find values with which a system violates its specification. Each sample is judged "
+        "by a number, its robustness: lower is better, and below 0 the specification is violated.\n\n"
+        f"You choose 10 numbers.\n{ranges}\n\n"
+        "Consider which combinations of values had the lower robustness.\n"
+        "Consider what each number may stand for and how it may act on the system.\n\n"
+        "Reply with one JSON object in this form, with one or two sentences of rationale:\n"
+        '{"rationale": "why these values", "point": [10 numbers]}'
+    )
+    assert changing == (
+        "Samples so far, in the order in which they were simulated:\n\n"
+        "Sample 1: point = [100, 100, 100, 0, 0, 0, 0, 0, 0, 0]\n  robustness 0.419\n\n"
+        "Propose the next sample. Do not repeat an earlier one."
+    )
+
+
+def test_mp2_adds_formula_meanings_courses_and_guidance_on_the_requirement() -> None:
+    problem, evaluation = transmission()
+    standing, changing = told(problem, "MP2", [evaluation])
+    _, requirement, outputs, inputs, guidance, reply = standing.split("\n\n")
+    assert requirement.splitlines()[1:] == ["G[0,20] (speed <= 120)"]
+    assert outputs == "Output signals: speed"
+    assert inputs.splitlines()[2] == "2: throttle at t = 8.3 s, from 0 to 100"
+    assert inputs.splitlines()[11:] == [
+        f"{name} between these times: pchip (monotone cubic) interpolation, sampled and held every 0.05 s"
+        for name in ("throttle", "brake")
+    ]
+    assert "what the requirement demands" in guidance and "output values" not in guidance
+    assert '"values": [7 numbers]' in reply
+    (sample,) = (part for part in changing.split("\n\n") if part.startswith("Sample 1:"))
+    assert sample.splitlines() == [
+        "Sample 1: throttle = [100, 100, 100, 0, 0, 0, 0]; brake = [0, 0, 0]",
+        "  robustness 0.419",
+    ]
+
+
+def test_mp3_adds_output_values_and_mp4_what_decided() -> None:
+    problem, evaluation = transmission()
+    values = (
+        "  speed: 0.0 at 0.0 s, 82.5 at 8.3 s, 112.5 at 16.7 s, 115.3 at 25.0 s, 101.8 at 33.3 s, "
+        "90.7 at 41.7 s, 81.5 at 50.0 s"
+    )
+    decided = "  the robustness was decided at t = 20.0 s with speed = 119.6"
+    for variant, facts in (("MP3", [values]), ("MP4", [values, decided])):
+        standing, changing = told(problem, variant, [evaluation])
+        assert changing.split("\n\n")[1].splitlines()[2:] == facts
+        assert "output values of the samples" in standing
+
+
+@pytest.mark.parametrize("variant", ["MP1", "MP2", "MP3", "MP4"])
+def test_nothing_of_the_default_variant_is_told(variant: str) -> None:
+    problem, evaluation = transmission("AT6a")
+    context = Context(30, {"speed": (0.0, 0.0)})
+    prompt = build_prompt(View.of(problem), VARIANTS[variant], [evaluation] * 2, context=context)
+    text = "\n".join(m.content for m in render(prompt))
+    for word in ("mph", "Car with", "50 s", "simulations", "30 ", "In words", "exactly 0", "limits", "switch",
+                 "implication", "flat", "gear", "strategy", "why:", "Alternatively"):  # fmt: skip
+        assert word not in text, word
+
+
+def test_digits_are_the_published_ones() -> None:
+    problem = lag_problem("G[0,9] (x <= 1e-5)", parameters=[ParameterRange("x0", 0.0, 1e-4)])
+    evaluation = evaluate(problem, problem.space.decode([1 / 3, 0, 0, 0, 2.3456e-5]))
+    trajectory = evaluation.trajectory
+    assert trajectory is not None and evaluation.verdict is not None
+    tiny = replace(trajectory, columns={**trajectory.columns, "x": 1e-3 * trajectory["x"]})
+    changed = replace(evaluation, trajectory=tiny, verdict=replace(evaluation.verdict, critical_time=5.0))
+    _, changing = told(problem, "MP4", [changed])
+    assert "u = [0.333, 0, 0, 0]; x0 = 0.00002" in changing, "more than three decimals in a narrow range"
+    assert "x: 0.000 at 0.0 s, " in changing, (
+        "a value that is not zero does not read as zero with one decimal"
+    )
+
+
+def test_what_is_compared_is_told_of_outputs() -> None:
+    problem = lag_problem("G[0,10] (abs(x - u) <= 0.9)")
+    _, changing = told(problem, "MP4", [evaluate(problem, problem.space.decode([0, 1, 0, 1]))])
+    assert "\n  abs(x - u): 0.0 at 0.0 s, " in changing and "with abs(x - u) = " in changing
+    assert "\n  x:" not in changing
+
+
+def test_an_input_with_one_control_point_is_one_value() -> None:
+    problem = lag_problem()
+    (u,) = problem.space.inputs
+    space = replace(problem.space, inputs=(replace(u, control_points=1),))
+    standing, _ = told(replace(problem, space=space), "MP2")
+    assert "u: one value for the whole time" in standing
+
+
+def test_parameters_alone_are_told_with_the_outputs_at_the_beginning_and_the_end() -> None:
+    problem = lag_problem(parameters=[ParameterRange("x0", -0.5, 0.5)])
+    problem = replace(problem, space=replace(problem.space, inputs=()))
+    evaluation = evaluate(problem, problem.space.decode([0.25]))
+    standing, changing = told(problem, "MP3", [evaluation])
+    assert "between these times" not in standing and "find parameters with" in standing
+    assert "\n  x: 0.2 at 0.0 s, 0.000 at 10.0 s" in changing
+
+
+@pytest.mark.parametrize(("formula", "time"), [("G[0,9] (x <= 2)", "0.5"), ("F[0,0.25] (x <= 2)", "0.46")])
+def test_a_critical_time_has_the_decimals_of_the_times_in_the_formula(formula: str, time: str) -> None:
+    problem = lag_problem()
+    evaluation = evaluate(problem, problem.space.decode([0, 1, 0, 1]))
+    assert evaluation.verdict is not None
+    other = replace(problem, requirement=Requirement("R", parse(formula)))
+    decided = replace(evaluation, verdict=replace(evaluation.verdict, critical_time=0.456))
+    assert f"decided at t = {time} s with x = " in told(other, "MP4", [decided])[1]
+
+
+def test_outputs_that_are_compared_alone_are_told_by_themselves() -> None:
+    problem, evaluation = transmission("AT51")
+    assert "\n  gear: 1.0 at 0.0 s, " in told(problem, "MP3", [evaluation])[1]

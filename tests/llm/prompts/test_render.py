@@ -23,12 +23,13 @@ U = InputLine(
 )
 BARE = Prompt(
     variant="MP1",
-    task=TaskBlock(knows_requirement=False, count=1),
+    task=TaskBlock(knows_requirement=False, is_published=True, count=1),
     inputs=InputsBlock(stop_time="10", dimensions=(DimensionLine(number=1, low="0", high="1"),)),
     reply=ReplyBlock(example='{"point": [0.5]}'),
 )
 FULL = BARE.model_copy(
     update={
+        "task": TaskBlock(knows_requirement=True, count=1),
         "system": SystemBlock(name="lag", description="A lag."),
         "requirement": RequirementBlock(
             formula="G (x <= 1)", reading="reads", description="says", terms=("abs(x)",)

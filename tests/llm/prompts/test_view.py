@@ -1,5 +1,9 @@
 from dataclasses import replace
 
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.llm.prompts import VARIANTS, build_prompt, render
+from falsifier.llm.prompts.context import Context
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
@@ -32,3 +36,23 @@ def test_the_formulas_outputs_are_its_signals_that_are_not_searched() -> None:
     problem = lag_problem("G[0,10] (u + x <= 3 and v >= x)", inputs=2)
     partly = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
     assert View.of(partly).formula_outputs == ("x", "v")
+
+
+def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)")
+    mode = Variable("x", kind="enumeration", literals={"Idle": 0, "Run": 1})
+    view = View.of(problem)
+    view = replace(view, info=ModelInfo("m", variables=(mode,)))
+    assert view.items("x") == ("0 = Idle", "1 = Run") and view.items("other") == ()
+    assert view.labelled("x", 1.0, "1") == "1 (Run)" and view.labelled("x", 7.0, "7") == "7"
+    evaluation = evaluate(problem, problem.space.decode([0] * 4))
+    assert evaluation.trajectory is not None
+    steps = (evaluation.trajectory.times >= 5).astype(float)
+    told = replace(
+        evaluation, trajectory=replace(evaluation.trajectory, columns={"x": steps, "u": 0 * steps})
+    )
+    prompt = build_prompt(view, VARIANTS["MP5"], [told], context=Context(start={"x": (0.0, 1.0)}))
+    standing, changing = (m.content for m in render(prompt))
+    assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle) to 1 (Run)" in standing
+    assert "x: 0 (Idle), then 1 (Run) from 5 s" in changing
+    assert "x stays: 0 (Idle): never entered again; 1 (Run): entered at 5 s and kept to the end" in changing

@@ -1,0 +1,109 @@
+"""The part of a prompt that says how to reply."""
+
+import json
+from collections.abc import Sequence
+
+from falsifier.core.space import InputRange, nearest_value
+from falsifier.core.words import counted
+from falsifier.llm.messages import ReplyKind
+from falsifier.llm.prompts.blocks import ReplyBlock
+from falsifier.llm.prompts.variants import Variant
+from falsifier.llm.prompts.view import View
+
+_RATIONALE = "why these values"
+_ALL_NOTE = "Every input and parameter must be given in every reply, also those that stay as they were."
+_FREE_NOTES = (
+    'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
+    "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
+    'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
+    "stop time.",
+    'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
+)
+# Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
+_PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
+# Share of the stop time at which the pieces of an example begin.
+_BEGINNINGS = (0.0, 0.24, 0.62)
+
+
+def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "json") -> ReplyBlock:
+    """Say what form a reply has."""
+    if reply == "points":
+        return ReplyBlock(order=_order(view, variant))
+    if variant.is_published:
+        # The published prompts show no numbers before the first sample.
+        return ReplyBlock(example=_blank(view, variant, count), has_numbers=False)
+    space = view.space
+    one: dict[str, object] = {"rationale": _RATIONALE}
+    free = variant.has("freedom") and any(r.free for r in space.inputs)
+    if space.inputs:
+        one["signals"] = [_example(view, r, k, free=free) for k, r in enumerate(space.inputs)]
+    if space.parameters:
+        values = _spread([(p.low, p.high) for p in space.parameters])
+        one["parameters"] = [
+            {"name": p.name, "value": nearest_value(p, value)}
+            for p, value in zip(space.parameters, values, strict=True)
+        ]
+    example = json.dumps(one if count == 1 else {"candidates": [one]})
+    several = len(space.names) > 1
+    return ReplyBlock(
+        example=example, notes=(*([_ALL_NOTE] if several else ()), *(_FREE_NOTES if free else ()))
+    )
+
+
+def _order(view: View, variant: Variant) -> str:
+    """Which numbers a point has."""
+    numbers = counted(len(view.space.dimensions), "number")
+    if variant.is_published:
+        return f"its {numbers} in the order above"
+    signals = (
+        f"the value of {r.name}"
+        if r.control_points == 1
+        else f"the values of {r.name} at its {r.control_points} control points"
+        for r in view.space.inputs
+    )
+    return f"its {numbers} in this order: {', '.join((*signals, *(p.name for p in view.space.parameters)))}"
+
+
+def _blank(view: View, variant: Variant, count: int) -> str:
+    """The form of a reply with blanks in place of numbers."""
+    space, parts = view.space, [f'"rationale": {json.dumps(_RATIONALE)}']
+    if not variant.has("names"):
+        parts.append(f'"point": [{counted(len(space.dimensions), "number")}]')
+    else:
+        signals = (
+            f'{{"name": {json.dumps(r.name)}, "values": [{counted(r.control_points, "number")}]}}'
+            for r in space.inputs
+        )
+        parameters = (f'{{"name": {json.dumps(p.name)}, "value": number}}' for p in space.parameters)
+        if space.inputs:
+            parts.append(f'"signals": [{", ".join(signals)}]')
+        if space.parameters:
+            parts.append(f'"parameters": [{", ".join(parameters)}]')
+    one = f"{{{', '.join(parts)}}}"
+    return one if count == 1 else f'{{"candidates": [{one}]}}'
+
+
+def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
+    limits = [(r.low, r.high)]
+    if not free:
+        values = [nearest_value(r, v) for v in _spread(limits * r.control_points, position)]
+        return {"name": r.name, "values": values}
+    times: list[float] = []
+    interpolation: str = r.interpolation
+    count = min(r.control_points, len(_PLACES))
+    stepping = r.free and r.free.max_control_points >= len(_BEGINNINGS)
+    if stepping and r.free and position == 0 and r.free.min_interval <= view.space.stop_time / 5:
+        times = [float(f"{share * view.space.stop_time:.3g}") for share in _BEGINNINGS]
+        interpolation, count = "constant", len(times)
+    elif r.free is None:
+        count = r.control_points
+    values = [nearest_value(r, v) for v in _spread(limits * count, position)]
+    return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
+
+
+def _spread(limits: Sequence[tuple[float, float]], first: int = 0) -> list[float]:
+    """Numbers within their limits that differ from each other."""
+    places = (_PLACES[(first + k) % len(_PLACES)] for k in range(len(limits)))
+    return [
+        float(f"{low + place * (high - low):.4g}") for place, (low, high) in zip(places, limits, strict=True)
+    ]
