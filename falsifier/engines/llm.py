@@ -1,6 +1,7 @@
 """A language model as a search engine."""
 
 import logging
+import re
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -29,10 +30,11 @@ from falsifier.llm.prompts import (
     variant_named,
 )
 from falsifier.llm.prompts.context import Context, in_doubt
-from falsifier.llm.prompts.what_if import what_if_tool
+from falsifier.llm.prompts.what_if import predicted, what_if_tool
 from falsifier.llm.replies import ReplyForm
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 
 T = TypeVar("T")
 StartValues = Mapping[str, tuple[float, float]]
@@ -42,6 +44,7 @@ _KEPT_RECENT = 40
 _KEPT_BEST = 10
 # Questions in a row without a valid answer after which an LLM is not worth its money.
 _MOST_WITHOUT_ANSWER = 3
+_WORD = re.compile(r"[^\W\d]\w*")
 _LOG = logging.getLogger(__name__)
 
 
@@ -112,6 +115,9 @@ class LLMEngine:
         if self._disguise:
             shown = self._disguise.hidden_candidate(shown)
         self._doubts[shown.key] = in_doubt(confirmation)
+
+    def timed(self, seconds: float) -> None:
+        """Do nothing: how long an answer took does not change the next question."""
 
     @property
     def handed_over(self) -> bool:
@@ -189,6 +195,19 @@ class LLMEngine:
         if not self._variant.has("names"):
             return "; ".join(choices.as_point(self._view, shown))
         return in_one_line(shown)
+
+    def told(self, reason: str) -> str:
+        """Return a reason as the LLM may read it; empty if it has a name that the variant does not show."""
+        if self._variant.has("names") and not self._disguise:
+            return reason
+        hidden = self._disguise or Disguise.of(self._view)
+        words = set(_WORD.findall(reason))
+        return "" if any(words.intersection(_WORD.findall(name)) for name in hidden.names) else reason
+
+    def foretold(self, verdict: Verdict) -> str:
+        """Return a predicted verdict in words, limited to what the variant shows of samples."""
+        hidden = self._disguise.hidden_verdict(verdict) if self._disguise else verdict
+        return predicted(self._variant, hidden)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, including those of other engines' candidates."""

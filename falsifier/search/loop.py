@@ -274,6 +274,8 @@ class _Loop:
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
         candidates, wanted, seconds = self.steps.ask(target.problem, target.engine, wanted)
+        if isinstance(target.engine, FollowsRun):
+            target.engine.timed(seconds)
         self.think(seconds)
         self.emit(
             Asked(
