@@ -16,6 +16,7 @@ told them afterwards and may revise its candidates once.
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from textwrap import shorten
 
 import numpy as np
 
@@ -35,6 +36,8 @@ from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 
 _LOG = logging.getLogger(__name__)
+# Characters of a reason in a remark.
+_LONGEST_REASON = 240
 
 # The LLM's candidates replace half of the inputs that only show how the system responds, but not the constant
 # extremes if a single one can violate the requirement: they would be missed if the LLM does not help.
@@ -109,6 +112,7 @@ class Hybrid:
         self._own: set[object] = set()
         self._reasons: list[str] = []
         self._numeric: Candidate | None = None
+        self._unanswered: list[str] = []
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the adviser, which has the chat, to a run; note what its exchanges cost."""
@@ -150,6 +154,14 @@ class Hybrid:
         self.adviser.tell(evaluations)
         for evaluation in evaluations:
             self._note(evaluation)
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return how many questions had no valid answer, and why."""
+        if not self._unanswered:
+            return ()
+        why = shorten(self._unanswered[-1], _LONGEST_REASON, placeholder=" ...")
+        count = f"{len(self._unanswered)} of {counted(self._llm.turns, 'question')}"
+        return (f"{count} had no valid answer, and the surrogate continued: {why}",)
 
     @property
     def next(self) -> Who:
@@ -197,11 +209,13 @@ class Hybrid:
         except NoValidReplyError as error:
             _LOG.warning("%s. Continuing with the surrogate.", error)
             queue = []
-        except ChatError:
+            self._unanswered.append(str(error))
+        except ChatError as error:
             # The search does not need advice to continue; the LLM is asked again much later.
             if is_first:
                 raise
             queue = []
+            self._unanswered.append(str(error))
         finally:
             self._ledger.answered()
         self._reasons.clear()

@@ -12,6 +12,7 @@ from falsifier.core.words import in_one_line
 from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
 from falsifier.engines.random_change import random_change
+from falsifier.engines.stand_ins import StandIns
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -45,6 +46,7 @@ _KEPT_BEST = 10
 # Questions in a row without a valid answer after which an LLM is not worth its money.
 _MOST_WITHOUT_ANSWER = 3
 _WORD = re.compile(r"[^\W\d]\w*")
+_RANDOM = "random changes of the best sample"
 _LOG = logging.getLogger(__name__)
 
 
@@ -87,6 +89,7 @@ class LLMEngine:
         self._prompt_tokens = prompt_tokens
         self._fallback = fallback
         self._handed_over = False
+        self._stand_ins = StandIns()
         self._evaluations: list[Evaluation] = []
         self._pending: list[Candidate] = []
         self._start = start
@@ -119,6 +122,10 @@ class LLMEngine:
     def timed(self, seconds: float) -> None:
         """Do nothing: how long an answer took does not change the next question."""
 
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return how many samples are not the LLM's, and why."""
+        return self._stand_ins.remarks(evaluations)
+
     @property
     def handed_over(self) -> bool:
         """Whether the engine has permanently switched to the fallback."""
@@ -134,16 +141,18 @@ class LLMEngine:
         candidates: list[Candidate] = []
         while len(candidates) < n:
             if self._handed_over and self._fallback is not None:
-                return candidates + self._fallback.ask(n - len(candidates))
+                rest = self._fallback.ask(n - len(candidates))
+                self._stand_ins.proposed(_engine_named(self._fallback), rest)
+                return candidates + rest
             try:
                 found = self._ask_once(n - len(candidates), dispensable=self._fallback is not None)
                 self._without_answer = 0
             except NoValidReplyError as error:
                 found = self._replaced(error)
-            except ChatError:
+            except ChatError as error:
                 if self._fallback is None:
                     raise
-                self._handed_over = True
+                self._hand_over(error)
                 continue
             self._pending += found
             candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
@@ -157,7 +166,7 @@ class LLMEngine:
         """
         self._without_answer += 1
         if self._fallback is not None:
-            self._handed_over = True
+            self._hand_over(error)
             return []
         if self._without_answer >= _MOST_WITHOUT_ANSWER:
             raise error
@@ -168,7 +177,17 @@ class LLMEngine:
         _LOG.warning("%s. Continuing with %s.", error, what)
         changed = random_change(self._view.space, best, seed=seed)
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
-        return [replace(changed, origin="random change", rationale=rationale)]
+        replacement = replace(changed, origin="random change", rationale=rationale)
+        self._stand_ins.because(_RANDOM, error)
+        self._stand_ins.proposed(_RANDOM, [replacement])
+        return [replacement]
+
+    def _hand_over(self, error: ChatError) -> None:
+        """Switch to the fallback for the rest of the run."""
+        assert self._fallback is not None
+        self._handed_over = True
+        self._stand_ins.because(_engine_named(self._fallback), error)
+        _LOG.warning("%s. Continuing with %s.", error, _engine_named(self._fallback))
 
     def propose(
         self,
@@ -380,6 +399,10 @@ def _form(view: View, variant: Variant, *, count: int, reasoned: bool = True) ->
         count=count,
         reasoned=reasoned,
     )
+
+
+def _engine_named(engine: Engine) -> str:
+    return f"the engine {engine.name!r}"
 
 
 def _unchanged(value: T) -> T:

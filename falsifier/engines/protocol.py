@@ -56,6 +56,15 @@ class FollowsRun(Protocol):
 
 
 @runtime_checkable
+class HasRemarks(Protocol):
+    """An engine that has something to say at the end of a run."""
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return what a user should know of how it worked, one sentence each, given all evaluations."""
+        ...
+
+
+@runtime_checkable
 class AsksLLM(Protocol):
     """An engine that asks a language model; a run counts, records and replays its exchanges."""
 

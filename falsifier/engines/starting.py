@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
@@ -55,6 +55,10 @@ class Starting:
         """Tell the other engine how long the last ``ask`` took, if it was asked and wants to know."""
         if not self._was_known and isinstance(self.engine, FollowsRun):
             self.engine.timed(seconds)
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return the remarks of the other engine."""
+        return self.engine.remarks(evaluations) if isinstance(self.engine, HasRemarks) else ()
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the other engine to a run if it asks a language model."""

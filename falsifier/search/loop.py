@@ -10,7 +10,7 @@ from typing import Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
@@ -379,6 +379,11 @@ class _Loop:
         limits = inexpressible(target.problem, self.searched)
         return (*target.vacuity.findings(), *([limits] if limits else []))
 
+    def remarks(self, target: _Target) -> tuple[str, ...]:
+        """Return what the engine of a requirement says of how it worked."""
+        engine = target.engine
+        return engine.remarks(target.evaluations) if isinstance(engine, HasRemarks) else ()
+
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample
         return Result(
@@ -394,6 +399,7 @@ class _Loop:
             searched=self.searched,
             findings=() if found is not None else self.findings(target),
             directory=self.directory,
+            remarks=self.remarks(target),
         )
 
 

@@ -179,7 +179,9 @@ def test_without_an_opening_answer_the_run_fails_and_later_it_goes_on() -> None:
     engine, script = hybrid(problem, [[0.1, 0.2], ChatError("timeout")])
     asked = drive(engine, simulated(problem, lambda x: 0.5), rounds=20)
     assert len(script.notes) > 1
-    assert {c.origin for c in asked[2:]} == {"hybrid"}
+    assert {c.origin for c in asked[1:]} == {"hybrid"}
+    (remark,) = engine.remarks([])
+    assert "had no valid answer, and the surrogate continued: timeout" in remark
 
 
 def test_a_scripted_chat_leads_through_the_real_prompts() -> None:

@@ -211,6 +211,8 @@ def test_hands_over_for_good_when_allowed() -> None:
         engine.tell([evaluate(problem, asked[-1])])
     assert [c.origin for c in asked] == ["scripted MP4", "corners", "corners", "corners"]
     assert engine.handed_over
+    simulated = [Evaluation(c, "failed", reason="x") for c in asked]
+    assert engine.remarks(simulated) == ("3 of 4 samples from the engine 'corners', because out of reach",)
     assert [e.reply is None for e in exchanges] == [False, True]
     assert exchanges[1].problem == "out of reach"
     again = make_llm_engine(
@@ -224,6 +226,7 @@ def test_hands_over_for_good_when_allowed() -> None:
         replayed += again.ask()
         again.tell([evaluate(problem, candidate)])
     assert [c.key for c in replayed] == [c.key for c in asked]
+    assert again.remarks(simulated) == engine.remarks(simulated)
 
 
 def test_without_permission_the_failure_ends_the_run_with_everything_kept(tmp_path: Path) -> None:
