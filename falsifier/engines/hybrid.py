@@ -80,8 +80,8 @@ class _Answer:
     """Candidates of one answer: those still to be returned by ``ask``, and those whose evaluation is due."""
 
     queue: list[Candidate]
-    best_before: float
     held: int = 0
+    helped: bool = False
     asked: set[object] = field(default_factory=set)
 
 
@@ -182,10 +182,13 @@ class Hybrid:
             self._numerical = self._numerical.had_turn(helped=helped)
             self._llm = self._llm.yielded()
             self._reasons.append(f"Sample {self._told}: {evaluation.candidate.rationale}")
+            del self._reasons[: -self.settings.reasons]
         if self._answer is not None and key in self._answer.asked:
+            # Against the best just before it: the surrogate may have improved that while the answer waited.
             self._answer.asked.discard(key)
+            self._answer.helped |= helped
             if not self._answer.asked and not self._answer.queue:
-                self._close(helped=helps(self._best, self._answer.best_before))
+                self._close(helped=self._answer.helped)
 
     def _ask_one(self) -> Candidate:
         if self._answer is None and self.next == "llm":
@@ -219,7 +222,7 @@ class Hybrid:
         finally:
             self._ledger.answered()
         self._reasons.clear()
-        self._answer = _Answer(queue, self._best)
+        self._answer = _Answer(queue)
         if not queue:
             self._close(helped=False)
 
@@ -287,14 +290,9 @@ class Hybrid:
             ]
         if not self._since_best:
             return []
-        past = (
-            "The last simulation"
-            if self._since_best == 1
-            else f"The last {counted(self._since_best, 'simulation')}"
-        )
         return [
-            f"{past} brought no new best: suggest other structures (which parts of the time low, high or "
-            "switching); numbers are tuned later."
+            f"The last {counted(self._since_best, 'simulation')} brought no new best: suggest other "
+            "structures (which parts of the time low, high or switching); numbers are tuned later."
         ]
 
     def _reasons_told(self) -> list[str]:
@@ -302,7 +300,7 @@ class Hybrid:
         adviser = self.adviser
         reasons = [told for reason in self._reasons if (told := adviser.told(reason))]
         lines = []
-        if reasons := reasons[-self.settings.reasons :]:
+        if reasons:
             lines.append(f"Why the numerical optimiser that shares this search chose: {'; '.join(reasons)}.")
         self._numeric = self._numeric or self.surrogate.ask(1)[0]
         why = adviser.told(self._numeric.rationale)

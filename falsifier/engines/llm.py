@@ -179,7 +179,8 @@ class LLMEngine:
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
         replacement = replace(changed, origin="random change", rationale=rationale)
         self._stand_ins.because(_RANDOM, error)
-        self._stand_ins.proposed(_RANDOM, [replacement])
+        real = self._disguise.revealed(replacement) if self._disguise else replacement
+        self._stand_ins.proposed(_RANDOM, [real])
         return [replacement]
 
     def _hand_over(self, error: ChatError) -> None:

@@ -137,7 +137,10 @@ def test_a_later_answer_is_ranked_before_one_is_simulated() -> None:
 def test_an_answer_that_is_not_promising_waits_and_is_dropped_after_the_trial() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[-1.0], [-1.1], [-1.2]])
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=40)
+    judge = simulated(problem, lambda x: float(9 - x.max()))
+    asked = drive(engine, judge, rounds=engine.settings.hold + 3)
+    assert engine.next == "surrogate", "what the surrogate found while the answer waited is not the model's"
+    asked += drive(engine, judge, rounds=40 - len(asked))
     course = "".join("L" if c.origin == "scripted" else "S" for c in asked)
     hold = engine.settings.hold
     assert course == "LS" + hold * "S" + "L" + (40 - hold - 3) * "S"
