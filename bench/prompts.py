@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from falsifier.core.trajectory import is_discrete
 from falsifier.engines import make_engine
-from falsifier.engines.llm import preview
+from falsifier.engines.preview import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.courses import column_decimals

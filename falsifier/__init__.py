@@ -54,7 +54,8 @@ if TYPE_CHECKING:
     from falsifier.counterexamples.store import Replayed, StoredCounterexample, replay
     from falsifier.counterexamples.store import load as load_counterexample
     from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
-    from falsifier.engines.llm import make_llm_engine, preview
+    from falsifier.engines.llm import make_llm_engine
+    from falsifier.engines.preview import preview
     from falsifier.engines.protocol import AsksLLM, Engine
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
@@ -152,7 +153,7 @@ _EXPORTS = {
     "monitor_for": "falsifier.evaluation.evaluate",
     "parse": "falsifier.stl",
     "plot": "falsifier.views.plotting",
-    "preview": "falsifier.engines.llm",
+    "preview": "falsifier.engines.preview",
     "progress": "falsifier.views.progress",
     "read_info": "falsifier.fmu",
     "replay": "falsifier.counterexamples.store",

@@ -72,7 +72,7 @@ def prompt(
     With --at, print what a run sent.
     """
     from falsifier.engines.hybrid import Settings as HybridSettings
-    from falsifier.engines.llm import preview, preview_tool
+    from falsifier.engines.preview import preview, preview_tool
     from falsifier.search.journal import read_journal, recorded_evaluations
     from falsifier.search.questions import doubtful_confirmations
 

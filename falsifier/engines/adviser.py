@@ -9,6 +9,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
+from falsifier.stl import Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,14 @@ class Adviser(Protocol):
 
     def describe(self, candidate: Candidate) -> str:
         """Return a candidate in one line, with the names that the LLM knows, for notes."""
+        ...
+
+    def told(self, reason: str) -> str:
+        """Return a reason of the numerical engine as the LLM may read it; empty if it may not."""
+        ...
+
+    def foretold(self, verdict: Verdict) -> str:
+        """Return a predicted verdict in words, as far as the LLM may read it."""
         ...
 
     def propose(

@@ -1,74 +1,88 @@
 """A language model and the surrogate engine, sharing one history.
 
-The LLM proposes the first candidates, because its first guess is better than any corner. Later it is asked
-for several candidates at a time; the surrogate ranks them by predicted robustness before any is simulated,
-and uses them as starts of its own search. Before it answers, the LLM may request predictions from the
-surrogate; if it does not, it is told them afterwards and may revise its candidates once. If its candidates do
-not improve the result, the surrogate continues alone, with changes near the critical time. If the surrogate
-does not improve the result or its predictions fail, the LLM is asked again and told why.
+The LLM proposes the first candidate, because its first guess is better than any corner; the surrogate then
+shows how the system responds, with an input that steps or switches. From then on the rule in
+``falsifier.engines.turns`` decides who is next: from what each half has brought, and from what a simulation
+and a question cost. The times are those of the run's record, so a resumed run decides in the same way.
+
+A later answer has several candidates. The surrogate predicts them before any is simulated, and uses them as
+starts of its own search. One that is predicted to improve on the best sample, or to be better than what the
+surrogate would do next, is simulated at once. Any other waits for a few turns of the surrogate; if the LLM
+has failed its trial and predictions are trusted, it is not simulated. Before it answers, the LLM is told why
+the surrogate chose its samples and what it would do next, and may request predictions; if it does not, it is
+told them afterwards and may revise its candidates once.
 """
 
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from textwrap import shorten
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
 from falsifier.engines.adviser import Adviser
 from falsifier.engines.protocol import FollowsRun
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
+from falsifier.engines.turns import TRIAL, Half, Ledger, Who, helps, next_turn
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import NoValidReplyError, OnExchange
-from falsifier.llm.messages import Chat
+from falsifier.llm.messages import Chat, Exchange
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 
 _LOG = logging.getLogger(__name__)
+# Characters of a reason in a remark.
+_LONGEST_REASON = 240
 
-# The LLM's first candidates replace the constant extremes; one switching or stepping input is still
-# informative.
-ADVISED = SurrogateSettings(constants=0, bangs=1, probes=1)
+# The LLM's candidates replace half of the inputs that only show how the system responds, but not the constant
+# extremes if a single one can violate the requirement: they would be missed if the LLM does not help.
+ADVISED = SurrogateSettings(pauses=0, bangs=1, probes=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """When the LLM is asked, and how its answers are used.
+    """How the LLM is asked, and how its answers are used.
 
     Attributes:
         opening: number of candidates of the first answer, all simulated.
         count: number of candidates requested later.
         tries: maximum number of candidates of a later answer that are simulated, best predicted first.
-        patience: number of simulations without improvement after which the LLM is asked.
-        patience_growth: factor of the patience after each answer without improvement, so that an LLM that
-            does not help costs little.
+        promising: share of the best robustness by which an answer must be predicted to lower it to be
+            simulated at once, unless it is predicted to be better than what the surrogate would do next.
+        hold: number of the surrogate's turns for which any other answer on trial waits.
         misses: number of successive predicted violations that did not occur after which predictions are no
             longer trusted and the LLM is told so.
+        reasons: maximum number of the surrogate's latest samples of which the LLM is told the reason.
         what_if: whether the LLM gets predictions of its candidates before any is simulated.
         what_if_calls: maximum number of requests for predictions per question. Each sends the whole
             conversation again, so three cost up to four requests plus rejected replies: enough to compare,
             correct and check.
     """
 
-    opening: int = 2
+    opening: int = 1
     count: int = 5
-    tries: int = 2
-    patience: int = 4
-    patience_growth: float = 2.0
+    tries: int = 1
+    promising: float = 0.1
+    hold: int = 4
     misses: int = 3
+    reasons: int = 4
     what_if: bool = True
     what_if_calls: int = 3
 
 
 @dataclass(slots=True)
-class _Turn:
+class _Answer:
     """Candidates of one answer: those still to be returned by ``ask``, and those whose evaluation is due."""
 
     queue: list[Candidate]
-    best_before: float
+    held: int = 0
+    helped: bool = False
     asked: set[object] = field(default_factory=set)
 
 
@@ -89,21 +103,36 @@ class Hybrid:
         self.adviser = adviser
         self.settings = settings or Settings()
         self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
+        self._llm, self._numerical = Half(), Half()
+        self._ledger = Ledger()
+        self._simulations: int | None = None
         self._best = np.inf
-        self._since_best = 0
-        self._patience = float(self.settings.patience)
-        self._turn: _Turn | None = None
-        self._is_opened = False
+        self._best_candidate: Candidate | None = None
+        self._since_best = self._told = 0
+        self._answer: _Answer | None = None
+        self._own: set[object] = set()
+        self._reasons: list[str] = []
         self._numeric: Candidate | None = None
+        self._unanswered: list[str] = []
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """Connect the adviser, which has the chat, to a run."""
-        self.adviser.attach(on_exchange, wrap)
+        """Connect the adviser, which has the chat, to a run; note what its exchanges cost."""
+
+        def noted(exchange: Exchange) -> None:
+            self._ledger.exchanged(exchange)
+            on_exchange(exchange)
+
+        self.adviser.attach(noted, wrap)
 
     def begin(self, simulations: int | None) -> None:
-        """Tell the adviser the maximum number of simulations."""
+        """Be told the maximum number of simulations, and tell the adviser."""
+        self._simulations = simulations
         if isinstance(self.adviser, FollowsRun):
             self.adviser.begin(simulations)
+
+    def timed(self, seconds: float) -> None:
+        """Be told how long the last ``ask`` took, which counts if the LLM was not asked."""
+        self._ledger.asked(seconds)
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Tell the adviser that a violation does not count."""
@@ -117,91 +146,182 @@ class Hybrid:
             ChatError: if the LLM cannot be reached for the first question; later, and if its replies are not
                 valid, the surrogate continues without it.
         """
+        self._ledger.begin(max(n, 1))
         return [self._ask_one() for _ in range(max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """Tell both sides the evaluations, and note improvements, which decide who has the next turn."""
+        """Tell both sides the evaluations, and note what each half has brought."""
         self.surrogate.tell(evaluations)
         self.adviser.tell(evaluations)
         for evaluation in evaluations:
-            self._since_best += 1
-            if self._turn is not None:
-                self._turn.asked.discard(evaluation.candidate.key)
-            if evaluation.robustness is not None and evaluation.robustness < self._best:
-                self._best, self._since_best = evaluation.robustness, 0
+            self._note(evaluation)
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return how many questions had no valid answer, and why."""
+        if not self._unanswered:
+            return ()
+        why = shorten(self._unanswered[-1], _LONGEST_REASON, placeholder=" ...")
+        count = f"{len(self._unanswered)} of {counted(self._llm.turns, 'question')}"
+        return (f"{count} had no valid answer, and the surrogate continued: {why}",)
+
+    @property
+    def next(self) -> Who:
+        """Which half has the next turn."""
+        return next_turn(self._llm, self._numerical, self._ledger.costs, simulations=self._simulations)
+
+    def _note(self, evaluation: Evaluation) -> None:
+        self._told += 1
+        self._since_best += 1
+        self._ledger.simulated(evaluation.seconds)
+        key, robustness = evaluation.candidate.key, evaluation.robustness
+        helped = helps(robustness, self._best)
+        if robustness is not None and robustness < self._best:
+            self._best, self._since_best = robustness, 0
+            self._best_candidate = evaluation.candidate
+        if key in self._own:
+            self._own.discard(key)
+            self._numerical = self._numerical.had_turn(helped=helped)
+            self._llm = self._llm.yielded()
+            self._reasons.append(f"Sample {self._told}: {evaluation.candidate.rationale}")
+            del self._reasons[: -self.settings.reasons]
+        if self._answer is not None and key in self._answer.asked:
+            # Against the best just before it: the surrogate may have improved that while the answer waited.
+            self._answer.asked.discard(key)
+            self._answer.helped |= helped
+            if not self._answer.asked and not self._answer.queue:
+                self._close(helped=self._answer.helped)
 
     def _ask_one(self) -> Candidate:
-        if not self._is_opened:
-            self._is_opened = True
-            try:
-                opening = self.adviser.propose(self.settings.opening).candidates
-                self._turn = _Turn(opening[: self.settings.opening], self._best)
-            except NoValidReplyError as error:
-                _LOG.warning("%s. Continuing with the surrogate.", error)
-        elif self._turn is None and (reason := self._reason_to_ask()):
-            self._consult(reason)
-        if self._turn is not None:
-            if self._turn.queue:
-                candidate = self._turn.queue.pop(0)
-                self._turn.asked.add(candidate.key)
-                return candidate
-            if not self._turn.asked:
-                self._close_turn(self._turn)
+        if self._answer is None and self.next == "llm":
+            self._question()
+        answer = self._answer
+        if answer is not None and answer.queue and self._is_due(answer):
+            candidate = answer.queue.pop(0)
+            answer.asked.add(candidate.key)
+            return candidate
         candidate, self._numeric = self._numeric or self.surrogate.ask(1)[0], None
+        self._own.add(candidate.key)
+        if answer is not None and answer.queue:
+            answer.held += 1
         return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
 
-    def _reason_to_ask(self) -> str:
-        """Return why the LLM should be asked now, in the words it is told; empty if it should not."""
-        if self._since_best < self._patience:
-            return ""
+    def _question(self) -> None:
+        """Ask the LLM; what it brought is noted as soon as its candidates are simulated."""
+        is_first = self._llm.turns == 0
+        try:
+            queue = self._opened() if is_first else self._advised()
+        except NoValidReplyError as error:
+            _LOG.warning("%s. Continuing with the surrogate.", error)
+            queue = []
+            self._unanswered.append(str(error))
+        except ChatError as error:
+            # The search does not need advice to continue; the LLM is asked again much later.
+            if is_first:
+                raise
+            queue = []
+            self._unanswered.append(str(error))
+        finally:
+            self._ledger.answered()
+        self._reasons.clear()
+        self._answer = _Answer(queue)
+        if not queue:
+            self._close(helped=False)
+
+    def _close(self, *, helped: bool) -> None:
+        self._answer = None
+        self._llm = self._llm.had_turn(helped=helped)
+        self._numerical = self._numerical.yielded()
+
+    def _opened(self) -> list[Candidate]:
+        return self.adviser.propose(self.settings.opening).candidates[: self.settings.opening]
+
+    def _advised(self) -> list[Candidate]:
+        """Ask for several candidates; return those to simulate, the most promising one first."""
+        settings = self.settings
+        notes = [*self._standing(), *self._reasons_told()]
+        advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
+        candidates = advice.candidates
+        predictions = self._trusted_predictions(candidates)
+        unheard = settings.what_if and not advice.foresaw
+        if unheard and predictions is not None and min(p.robustness for p in predictions) >= 0:
+            heard = self._predictions_told(candidates, predictions)
+            try:
+                revised = self.adviser.propose(settings.count, [*notes, *heard], dispensable=True)
+            except ChatError:  # the first answer has been paid for
+                revised = advice
+            candidates = list({c.key: c for c in (*candidates, *revised.candidates)}.values())
+            predictions = self._trusted_predictions(candidates)
+        self.surrogate.suggest(candidates)
+        if predictions is not None:
+            order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
+            candidates = [_ranked(candidates[i], predictions[i].robustness) for i in order]
+        return candidates[: settings.tries]
+
+    def _is_due(self, answer: _Answer) -> bool:
+        """Whether the next candidate of an answer is simulated now; drop it if that is not worth it."""
+        if self._llm.turns == 0 or len(self.surrogate.history.samples) < 2:
+            return True
+        if self._is_promising(answer.queue[0]):
+            return True
+        if self._llm.turns < TRIAL or not self._is_trusted:
+            return answer.held >= self.settings.hold
+        answer.queue.clear()
+        if not answer.asked:
+            self._close(helped=False)
+        return False
+
+    def _is_promising(self, candidate: Candidate) -> bool:
+        """Whether a candidate is predicted to improve on the best sample, or to be better than the rival."""
+        if self._best_candidate is None:
+            return True
+        rivals = [] if self._numeric is None else [self._numeric]
+        # Against the prediction of the best sample, not its robustness: early predictions are off as a whole.
+        new, best, *other = (
+            v.robustness for v in self.surrogate.foresee([candidate, self._best_candidate, *rivals])
+        )
+        return best - new >= self.settings.promising * abs(self._best) or any(new < r for r in other)
+
+    def _standing(self) -> list[str]:
+        """Return how the search stands, in the words that the LLM is told."""
         if self.surrogate.misses >= self.settings.misses:
-            return (
+            return [
                 "A numerical optimiser shares this search and fits a model to the samples above. It "
                 f"predicted a violation {self.surrogate.misses} times in a row and was wrong each time: do "
                 "not rely on small changes of the best sample, try another structure."
-            )
-        return (
-            f"The last {self._since_best} simulations, most of them chosen by a numerical optimiser that "
-            "shares this search, brought no new best: suggest other structures (which parts of the time low, "
-            "high or switching); numbers are tuned later."
+            ]
+        if not self._since_best:
+            return []
+        return [
+            f"The last {counted(self._since_best, 'simulation')} brought no new best: suggest other "
+            "structures (which parts of the time low, high or switching); numbers are tuned later."
+        ]
+
+    def _reasons_told(self) -> list[str]:
+        """Return why the surrogate chose its samples and what it would do next, in words for the LLM."""
+        adviser = self.adviser
+        reasons = [told for reason in self._reasons if (told := adviser.told(reason))]
+        lines = []
+        if reasons:
+            lines.append(f"Why the numerical optimiser that shares this search chose: {'; '.join(reasons)}.")
+        self._numeric = self._numeric or self.surrogate.ask(1)[0]
+        why = adviser.told(self._numeric.rationale)
+        because = f" ({why})" if why else ""
+        lines.append(
+            "The optimiser would simulate this next, if you propose nothing better: "
+            f"{adviser.describe(self._numeric)}{because}."
         )
-
-    def _consult(self, reason: str) -> None:
-        """Ask the LLM, rank its candidates, and queue the most promising ones."""
-        settings = self.settings
-        notes = [reason, *self._prediction_notes()]
-        try:
-            advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
-            candidates = advice.candidates
-            predictions = self._trusted_predictions(candidates)
-            unheard = settings.what_if and not advice.foresaw
-            if unheard and predictions is not None and min(predictions) >= 0:
-                heard = self._predictions_told(candidates, predictions)
-                revised = self.adviser.propose(settings.count, [*notes, *heard], dispensable=True)
-                candidates = [*candidates, *revised.candidates]
-                predictions = self._trusted_predictions(candidates)
-        except ChatError:
-            # The search does not need advice to continue; the LLM is asked again much later.
-            self._grow_patience()
-            return
-        self.surrogate.suggest(candidates)
-        ranked = candidates
-        if predictions is not None:
-            order = sorted(range(len(candidates)), key=lambda i: predictions[i])
-            ranked = [_ranked(candidates[i], predictions[i]) for i in order]
-        self._turn = _Turn(ranked[: settings.tries], self._best)
-
-    def _close_turn(self, turn: _Turn) -> None:
-        self._turn = None
-        self._since_best = 0
-        if self._best < turn.best_before:
-            self._patience = float(self.settings.patience)
-        else:
-            self._grow_patience()
-
-    def _grow_patience(self) -> None:
-        self._patience *= self.settings.patience_growth
-        self._since_best = 0
+        if not self._is_trusted:
+            return [
+                *lines,
+                "Its recent predictions were poor, or there are none yet; rely on the samples only.",
+            ]
+        for verdict in self.surrogate.foresee([self._numeric]):
+            lines.append(
+                f"The model that it fits to the samples expects of this: {adviser.foretold(verdict)}; "
+                f"its recent predictions erred by {100 * self.surrogate.recent_error:.2g} % of the signals' "
+                "usual spread."
+            )
+        return lines
 
     @property
     def _is_trusted(self) -> bool:
@@ -215,29 +335,17 @@ class Hybrid:
             return None
         return WhatIf(self.surrogate, settings.what_if_calls)
 
-    def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[float] | None:
-        """Return the predicted robustness of candidates; None if recent predictions were poor."""
+    def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[Verdict] | None:
+        """Return the predicted verdicts on candidates; None if recent predictions were poor."""
         if not self._is_trusted:
             return None
-        return [verdict.robustness for verdict in self.surrogate.foresee(candidates)] or None
+        return self.surrogate.foresee(candidates) or None
 
-    def _prediction_notes(self) -> list[str]:
-        """Return what the surrogate would simulate next, and its prediction, in words for the LLM."""
-        self._numeric = self._numeric or self.surrogate.ask(1)[0]
-        predictions = self._trusted_predictions([self._numeric])
-        if predictions is None:
-            return ["The optimiser's recent predictions were poor; rely on the samples only."]
-        told = self.adviser.describe(self._numeric)
-        return [
-            f"The optimiser would simulate this next, if you propose nothing better: {told}. The model that "
-            f"it fits to the samples predicts robustness {predictions[0]:.4g}; predictions can be wrong."
-        ]
-
-    def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[float]) -> list[str]:
+    def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[Verdict]) -> list[str]:
         """Return the predictions of the LLM's candidates, one line each, in words for the LLM."""
         lines = [
             f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; the optimiser's model of "
-            f"the samples predicts robustness {p:.4g}."
+            f"the samples says: {self.adviser.foretold(p)}."
             for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
         ]
         return [*lines, "None is predicted to violate the requirement: revise them, or insist with a reason."]

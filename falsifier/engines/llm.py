@@ -1,6 +1,7 @@
 """A language model as a search engine."""
 
 import logging
+import re
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,13 +12,15 @@ from falsifier.core.words import in_one_line
 from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
 from falsifier.engines.random_change import random_change
+from falsifier.engines.stand_ins import StandIns
+from falsifier.engines.told import doubts_told, reply_form, told_view
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.disguise import Disguise
-from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, ReplyKind, Tool
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, ReplyKind
 from falsifier.llm.prompts import (
     DEFAULT_PROMPT_TOKENS,
     Variant,
@@ -28,11 +31,11 @@ from falsifier.llm.prompts import (
     trimmed,
     variant_named,
 )
-from falsifier.llm.prompts.context import Context, in_doubt
-from falsifier.llm.prompts.what_if import what_if_tool
-from falsifier.llm.replies import ReplyForm
+from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.what_if import predicted
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 
 T = TypeVar("T")
 StartValues = Mapping[str, tuple[float, float]]
@@ -42,6 +45,8 @@ _KEPT_RECENT = 40
 _KEPT_BEST = 10
 # Questions in a row without a valid answer after which an LLM is not worth its money.
 _MOST_WITHOUT_ANSWER = 3
+_WORD = re.compile(r"[^\W\d]\w*")
+_RANDOM = "random changes of the best sample"
 _LOG = logging.getLogger(__name__)
 
 
@@ -77,7 +82,7 @@ class LLMEngine:
         fallback: Engine | None = None,
         start: Callable[[], StartValues] = dict,
     ) -> None:
-        view = _told_view(view, reply)
+        view = told_view(view, reply)
         self._reply = reply
         self._disguise = Disguise.of(view) if anonymous else None
         self._view = self._disguise.view if self._disguise else view
@@ -88,6 +93,7 @@ class LLMEngine:
         self._prompt_tokens = prompt_tokens
         self._fallback = fallback
         self._handed_over = False
+        self._stand_ins = StandIns()
         self._evaluations: list[Evaluation] = []
         self._pending: list[Candidate] = []
         self._start = start
@@ -112,7 +118,14 @@ class LLMEngine:
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Be told that a violation does not count, which prompts state with the reason."""
-        self._doubts |= _doubts([confirmation], self._disguise)
+        self._doubts |= doubts_told([confirmation], self._disguise)
+
+    def timed(self, seconds: float) -> None:
+        """Do nothing: how long an answer took does not change the next question."""
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return how many samples are not the LLM's, and why."""
+        return self._stand_ins.remarks(evaluations)
 
     @property
     def handed_over(self) -> bool:
@@ -129,16 +142,18 @@ class LLMEngine:
         candidates: list[Candidate] = []
         while len(candidates) < n:
             if self._handed_over and self._fallback is not None:
-                return candidates + self._fallback.ask(n - len(candidates))
+                rest = self._fallback.ask(n - len(candidates))
+                self._stand_ins.proposed(_engine_named(self._fallback), rest)
+                return candidates + rest
             try:
                 found = self._ask_once(n - len(candidates), dispensable=self._fallback is not None)
                 self._without_answer = 0
             except NoValidReplyError as error:
                 found = self._replaced(error)
-            except ChatError:
+            except ChatError as error:
                 if self._fallback is None:
                     raise
-                self._handed_over = True
+                self._hand_over(error)
                 continue
             self._pending += found
             candidates += [self._disguise.revealed(c) for c in found] if self._disguise else found
@@ -152,7 +167,7 @@ class LLMEngine:
         """
         self._without_answer += 1
         if self._fallback is not None:
-            self._handed_over = True
+            self._hand_over(error)
             return []
         if self._without_answer >= _MOST_WITHOUT_ANSWER:
             raise error
@@ -165,7 +180,18 @@ class LLMEngine:
         if self._disguise:
             changed = self._disguise.canonical(changed)
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
-        return [replace(changed, origin="random change", rationale=rationale)]
+        replacement = replace(changed, origin="random change", rationale=rationale)
+        self._stand_ins.because(_RANDOM, error)
+        real = self._disguise.revealed(replacement) if self._disguise else replacement
+        self._stand_ins.proposed(_RANDOM, [real])
+        return [replacement]
+
+    def _hand_over(self, error: ChatError) -> None:
+        """Switch to the fallback for the rest of the run."""
+        assert self._fallback is not None
+        self._handed_over = True
+        self._stand_ins.because(_engine_named(self._fallback), error)
+        _LOG.warning("%s. Continuing with %s.", error, _engine_named(self._fallback))
 
     def propose(
         self,
@@ -193,6 +219,19 @@ class LLMEngine:
             return "; ".join(choices.as_point(self._view, shown))
         return in_one_line(shown)
 
+    def told(self, reason: str) -> str:
+        """Return a reason as the LLM may read it; empty if it has a name that the variant does not show."""
+        if self._variant.has("names") and not self._disguise:
+            return reason
+        hidden = self._disguise or Disguise.of(self._view)
+        words = set(_WORD.findall(reason))
+        return "" if any(words.intersection(_WORD.findall(name)) for name in hidden.names) else reason
+
+    def foretold(self, verdict: Verdict) -> str:
+        """Return a predicted verdict in words, limited to what the variant shows of samples."""
+        hidden = self._disguise.hidden_verdict(verdict) if self._disguise else verdict
+        return predicted(self._variant, hidden)
+
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, including those of other engines' candidates."""
         if self._fallback is not None:
@@ -210,7 +249,7 @@ class LLMEngine:
         disguise = self._disguise
         return PredictionTool(
             what_if,
-            _form(self._view, self._variant, self._reply, count=MOST_CANDIDATES, reasoned=False),
+            reply_form(self._view, self._variant, self._reply, count=MOST_CANDIDATES, reasoned=False),
             self._variant,
             reveal=disguise.revealed if disguise else _unchanged,
             hide=disguise.hidden_verdict if disguise else _unchanged,
@@ -225,7 +264,7 @@ class LLMEngine:
         dispensable: bool,
     ) -> list[Candidate]:
         variant = self._variant
-        form = _form(self._view, variant, self._reply, count=count)
+        form = reply_form(self._view, variant, self._reply, count=count)
         prompt = build_prompt(
             self._view,
             variant,
@@ -329,85 +368,8 @@ def make_llm_engine(
     )
 
 
-def preview(
-    problem: Problem,
-    *,
-    variant: str | None = None,
-    evaluations: Sequence[Evaluation] = (),
-    count: int = 1,
-    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
-    anonymous: bool = False,
-    reply: ReplyKind = "json",
-    simulations: int | None = None,
-    doubtful: Sequence[Confirmation] = (),
-) -> tuple[Message, ...]:
-    """Return the messages that would be sent next, without sending them.
-
-    Args:
-        problem: the problem to search.
-        variant: name of the prompt variant; None: the default one.
-        evaluations: what was simulated so far, in order.
-        count: number of candidates to ask for.
-        prompt_tokens: maximum number of tokens of a prompt.
-        anonymous: whether the LLM gets neutral names instead of real ones.
-        reply: what a reply is to consist of.
-        simulations: maximum number of simulations of the run; None: no limit.
-        doubtful: violations among the evaluations that do not count.
-    """
-    told = variant_named(variant)
-    view = _told_view(View.of(problem), reply)
-    start = start_values(problem) if told.has("circumstances") else {}
-    disguise = None
-    if anonymous:
-        disguise = Disguise.of(view).fitted_to_start(start).fitted(evaluations)
-        view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
-        start = disguise.hidden_values(start)
-    doubts = _doubts(doubtful, disguise)
-    prompt = build_prompt(
-        view, told, evaluations, count=count, reply=reply, context=Context(simulations, start, doubts)
-    )
-    return render(trimmed(prompt, prompt_tokens))
-
-
-def preview_tool(
-    problem: Problem,
-    *,
-    calls: int,
-    variant: str | None = None,
-    anonymous: bool = False,
-    reply: ReplyKind = "json",
-) -> Tool:
-    """Return the tool that a question with permission to request predictions would offer; sends nothing."""
-    view = _told_view(View.of(problem), reply)
-    shown = Disguise.of(view).view if anonymous else view
-    form = _form(shown, variant_named(variant), reply, count=MOST_CANDIDATES, reasoned=False)
-    return what_if_tool(form.schema(), calls=calls)
-
-
-def _told_view(view: View, reply: ReplyKind) -> View:
-    """The view that can be asked about: lists of numbers have the control points of the spec."""
-    return view if reply == "json" else replace(view, space=view.space.fixed)
-
-
-def _form(view: View, variant: Variant, reply: ReplyKind, *, count: int, reasoned: bool = True) -> ReplyForm:
-    return ReplyForm(
-        view.space,
-        named=variant.has("names") and reply == "json",
-        points=reply == "points",
-        free=variant.has("freedom"),
-        count=count,
-        reasoned=reasoned,
-    )
-
-
-def _doubts(confirmations: Sequence[Confirmation], disguise: Disguise | None) -> dict[Hashable, str]:
-    """Why violations do not count, by the keys of their candidates as they are told."""
-    if disguise is None:
-        return {c.candidate.key: in_doubt(c) for c in confirmations}
-    return {
-        disguise.hidden_candidate(c.candidate).key: in_doubt(c, disguise.unit_of(c.evaluation))
-        for c in confirmations
-    }
+def _engine_named(engine: Engine) -> str:
+    return f"the engine {engine.name!r}"
 
 
 def _unchanged(value: T) -> T:

@@ -47,6 +47,22 @@ class FollowsRun(Protocol):
         """Be told that a violation does not count, before its evaluation is told."""
         ...
 
+    def timed(self, seconds: float) -> None:
+        """Be told how long the last ``ask`` took, in s.
+
+        A resumed run states the recorded time: an engine that reads a clock itself cannot be resumed.
+        """
+        ...
+
+
+@runtime_checkable
+class HasRemarks(Protocol):
+    """An engine that has something to say at the end of a run."""
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return what a user should know of how it worked, one sentence each, given all evaluations."""
+        ...
+
 
 @runtime_checkable
 class AsksLLM(Protocol):

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
@@ -23,6 +23,7 @@ class Starting:
     def __init__(self, engine: Engine, known: deque[Candidate]) -> None:
         self.engine = engine
         self.known = known
+        self._was_known = False
 
     @property
     def name(self) -> str:
@@ -31,7 +32,8 @@ class Starting:
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return known candidates as long as there are any, then those of the other engine."""
-        if self.known:
+        self._was_known = bool(self.known)
+        if self._was_known:
             return [self.known.popleft() for _ in range(min(max(n, 1), len(self.known)))]
         return self.engine.ask(n)
 
@@ -48,6 +50,15 @@ class Starting:
         """Tell the other engine that a violation does not count if it wants to know."""
         if isinstance(self.engine, FollowsRun):
             self.engine.doubt(confirmation)
+
+    def timed(self, seconds: float) -> None:
+        """Tell the other engine how long the last ``ask`` took, if it was asked and wants to know."""
+        if not self._was_known and isinstance(self.engine, FollowsRun):
+            self.engine.timed(seconds)
+
+    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+        """Return the remarks of the other engine."""
+        return self.engine.remarks(evaluations) if isinstance(self.engine, HasRemarks) else ()
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the other engine to a run if it asks a language model."""

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
@@ -276,6 +276,8 @@ class _Loop:
     def ask(self, target: _Target, batch: int) -> list[Candidate]:
         wanted = max(1, self.budget.remaining(self.spent, batch))
         candidates, wanted, seconds = self.steps.ask(target.problem, target.engine, wanted)
+        if isinstance(target.engine, FollowsRun):
+            target.engine.timed(seconds)
         self.think(seconds)
         self.emit(
             Asked(
@@ -382,6 +384,11 @@ class _Loop:
         limits = inexpressible(target.problem, self.searched)
         return (*target.vacuity.findings(), *([limits] if limits else []))
 
+    def remarks(self, target: _Target) -> tuple[str, ...]:
+        """Return what the engine of a requirement says of how it worked."""
+        engine = target.engine
+        return engine.remarks(target.evaluations) if isinstance(engine, HasRemarks) else ()
+
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample
         return Result(
@@ -397,6 +404,7 @@ class _Loop:
             searched=self.searched,
             findings=() if found is not None else self.findings(target),
             directory=self.directory,
+            remarks=self.remarks(target),
         )
 
 

@@ -32,6 +32,7 @@ class Result:
         searched: the part of the search space that the engine used; None: all of it.
         findings: what the search could not show; empty if falsified.
         directory: the run directory, or None.
+        remarks: what the engine says of how it worked, such as how many samples are a fallback's.
         unrecorded: why the end of the run could not be recorded, such as a full disk; empty if it was.
     """
 
@@ -48,6 +49,7 @@ class Result:
     findings: tuple[Finding, ...] = ()
     directory: Path | None = None
     unrecorded: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         # All trajectories and variables would fill pages of a terminal.

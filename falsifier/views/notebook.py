@@ -20,6 +20,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl import in_words
 from falsifier.stl.verdict import Verdict
+from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join
 from falsifier.views.text import seconds_text
 
@@ -29,6 +30,8 @@ _DPI = 80
 _LEFT = "text-align: left"
 # Maximum number of signals in a trajectory's figure; the table lists all.
 _DRAWN_SIGNALS = 6
+# Maximum number of questions to a language model that a result shows; each adds its prompt to the notebook.
+_SHOWN_QUESTIONS = 5
 
 Fact = tuple[str, str]
 
@@ -103,11 +106,14 @@ def result_html(result: Result) -> str:
     if shown is not None:
         facts += _verdict_facts(shown.verdict) if shown.verdict else []
         facts += _candidate_facts(shown.candidate)
+    facts += [("fallback", remark) for remark in result.remarks]
     facts.append(("time", seconds_text(spent)))
     parts = [el("b", title), _facts(facts)]
     if shown is not None and shown.trajectory is not None:
         drawn = plot_evaluation(result.problem, shown)
         parts.append(_picture(png(drawn, dpi=_DPI), "counterexample" if found else "best evaluation"))
+    if result.directory is not None and spent.calls:
+        parts.append(exchanges_html(result.directory, result.problem.name, most=_SHOWN_QUESTIONS))
     return join(*parts)
 
 

@@ -35,6 +35,7 @@ def result_text(result: Result) -> str:
     lines += [f"  note           {finding.text}" for finding in result.findings]
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
+    lines += [f"  fallback       {remark}" for remark in result.remarks]
     if result.spent.calls:
         lines.append(f"  language model {_llm_use(result.spent)}")
     if result.directory is not None:
@@ -61,6 +62,7 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.spent.simulations_text}{robustness}{where}"
         )
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
+        lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
@@ -89,6 +91,7 @@ def result_json(result: Result) -> dict[str, Any]:
         "parameterization": parameterization_of(result.searched or result.problem.space),
         "findings": [asdict(finding) for finding in result.findings],
         "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
+        "remarks": list(result.remarks),
         "not_confirmed": [c.reason for c in result.refuted],
         "spent": spent,
         "directory": result.directory and str(result.directory),

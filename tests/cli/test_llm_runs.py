@@ -56,6 +56,7 @@ def test_after_three_bad_replies_the_run_goes_on_with_a_random_change(tmp_path: 
         done = falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
         assert len(server.received) == 5
     assert done.code == 1, done.err
+    assert "fallback       1 of 3 samples from random changes of the best sample, because" in done.out
     records = read_journal(tmp_path / "run")
     one = ["asked", "evaluated"]
     assert [r.kind for r in records] == [

@@ -10,7 +10,8 @@ import pytest
 
 from falsifier.core.space import Freedom
 from falsifier.engines import make_engine
-from falsifier.engines.llm import make_llm_engine, preview
+from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.preview import preview
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
@@ -75,18 +76,6 @@ def test_transmission_in_two_simulations(form: str) -> None:
     assert result.spent.cost is None
     exchanges = [event.exchange for event in events if isinstance(event, Exchanged)]
     assert [e.reply.source for e in exchanges if e.reply] == ["llm", "llm"]
-
-
-def test_preview_is_what_is_sent() -> None:
-    problem = lag_problem()
-    for variant in ("MP1", "MP2", "MP5"):
-        chat = ScriptedChat(["<point>0 0 0 0</point>", "<point>0 0 0 1</point>"])
-        engine = make_llm_engine(problem, chat, variant=variant)
-        evaluation = evaluate(problem, *engine.ask())
-        engine.tell([evaluation])
-        engine.ask()
-        assert chat.requests[0].messages == preview(problem, variant=variant)
-        assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
 
 
 @pytest.mark.parametrize("variant", ["MP1", "MP4", "MP5"])
@@ -231,6 +220,8 @@ def test_hands_over_for_good_when_allowed() -> None:
         engine.tell([evaluate(problem, asked[-1])])
     assert [c.origin for c in asked] == ["scripted MP4", "corners", "corners", "corners"]
     assert engine.handed_over
+    simulated = [Evaluation(c, "failed", reason="x") for c in asked]
+    assert engine.remarks(simulated) == ("3 of 4 samples from the engine 'corners', because out of reach",)
     assert [e.reply is None for e in exchanges] == [False, True]
     assert exchanges[1].problem == "out of reach"
     again = make_llm_engine(
@@ -244,6 +235,7 @@ def test_hands_over_for_good_when_allowed() -> None:
         replayed += again.ask()
         again.tell([evaluate(problem, candidate)])
     assert [c.key for c in replayed] == [c.key for c in asked]
+    assert again.remarks(simulated) == engine.remarks(simulated)
 
 
 def test_without_permission_the_failure_ends_the_run_with_everything_kept(tmp_path: Path) -> None:

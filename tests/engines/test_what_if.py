@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.engines.hybrid import Hybrid, Settings
-from falsifier.engines.llm import make_llm_engine, preview_tool
+from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.preview import preview_tool
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
@@ -25,7 +26,7 @@ from tests.engines.support import wide_problem
 from tests.engines.test_hybrid import SETTINGS
 from tests.llm.server import Received, Step, serving
 
-EAGER = Settings(patience=2)
+EAGER = Settings(hold=0, promising=-9.0)
 Line = str | ChatReply | Exception
 OnExchange = Callable[[Exchange], None]
 
@@ -103,7 +104,7 @@ def test_the_limit_of_calls() -> None:
         return candidates(1.75) if "limit of 2 calls" in "".join(answers(request)) else call(1.0)
 
     chat = ScriptedChat(script)
-    run(hybrid(chat, settings=Settings(patience=2, what_if_calls=2)))
+    run(hybrid(chat, settings=Settings(hold=0, promising=-9.0, what_if_calls=2)))
     at = first_offer(chat.requests)
     assert "At most 2 calls" in chat.requests[at].tools[0].description
     told = answers(chat.requests[at + 3])
@@ -138,7 +139,7 @@ def test_who_does_not_call_is_told_afterwards() -> None:
     run(hybrid(chat))
     at = first_offer(chat.requests)
     assert (
-        "was not simulated; the optimiser's model of the samples predicts robustness"
+        "was not simulated; the optimiser's model of the samples says: predicted robustness"
         in chat.requests[at + 1].messages[-1].content
     )
     assert not chat.requests[at + 1].tools
@@ -149,7 +150,7 @@ def test_no_tool_where_no_call_is_allowed() -> None:
         return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
 
     chat = ScriptedChat(script)
-    run(hybrid(chat, settings=Settings(patience=2, what_if_calls=0)))
+    run(hybrid(chat, settings=Settings(hold=0, promising=-9.0, what_if_calls=0)))
     assert not any(r.tools for r in chat.requests)
     assert any("was not simulated" in m.content for r in chat.requests for m in r.messages)
 

@@ -10,7 +10,8 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
-from falsifier.engines.llm import make_llm_engine, preview
+from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.preview import preview
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.disguise import Disguise

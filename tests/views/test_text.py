@@ -4,10 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.engines import make_engine
+from falsifier.engines.llm import make_llm_engine
+from falsifier.errors import ChatError
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.result import Result
-from falsifier.search.run import falsify
+from falsifier.search.run import falsify, resume
 from falsifier.views.text import (
     counterexample_name,
     result_json,
@@ -122,3 +126,18 @@ def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
 def test_seconds_say_where_they_went() -> None:
     spent = Spent(seconds=12.34, simulation_seconds=10.0, engine_seconds=2.0)
     assert seconds_text(spent) == "12.3 s; simulator 10.00 s, engine 2.00 s"
+
+
+def test_samples_of_a_fallback_are_told_with_the_reason(tmp_path: Path) -> None:
+    chat = ScriptedChat([ChatError("the server is gone")])
+    fallback = make_engine("uniform", impossible(), seed=0)
+    engine = make_llm_engine(impossible(), chat, fallback=fallback)
+    result = falsify(impossible(), engine, budget=3, directory=tmp_path / "run")
+    remark = "3 of 3 samples from the engine 'uniform', because the server is gone"
+    assert f"  fallback       {remark}" in result_text(result).splitlines()
+    assert remark in results_text([result])
+    assert result_json(result)["remarks"] == [remark]
+    # A resumed run counts what is recorded too.
+    again = make_llm_engine(impossible(), chat, fallback=make_engine("uniform", impossible(), seed=0))
+    (resumed,) = resume(tmp_path / "run", problems=[impossible()], engine=again, budget=5)
+    assert resumed.remarks == (remark.replace("3 of 3", "5 of 5"),)

@@ -30,6 +30,7 @@ def opening(
     constants: list[Kind] = ["constant"] * settings.constants
     steps: list[Kind] = ["stepping"] * settings.probes
     if windows:
-        turns = zip_longest(switches, constants)
+        pauses: list[Kind] = ["constant"] * settings.pauses
+        turns = zip_longest(switches, pauses)
         return tuple(kind for turn in turns for kind in turn if kind is not None)
     return tuple(steps if needs_several else constants)

@@ -10,7 +10,9 @@ class Settings:
     Attributes:
         cells: number of grid cells over the formula's horizon, on which traces are predicted and free inputs
             are held; enough for pieces of 1 % of the horizon, few enough for a rollout in milliseconds.
-        constants: number of constant extremes among the first simulations; each reaches one steady state.
+        constants: number of constant extremes among the first simulations of a formula that a single extreme
+            can violate; each reaches one steady state.
+        pauses: number of constant extremes between the first switching signals.
         bangs: number of switching signals among the first simulations of a formula with nested windows.
         most_bangs: maximum number of switching signals in total; if that many random ones did not violate,
             more will not.
@@ -64,6 +66,7 @@ class Settings:
 
     cells: int = 100
     constants: int = 2
+    pauses: int = 2
     bangs: int = 2
     most_bangs: int = 8
     probes: int = 2

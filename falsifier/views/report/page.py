@@ -9,10 +9,11 @@ from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
 
-from falsifier.campaigns.analysis import Table
+from falsifier.campaigns.analysis import Run, Table
 from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
 from falsifier.core.words import choices, counted
+from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.content import (
     Content,
@@ -31,6 +32,10 @@ _HINT = (
     "Plots: drag a rectangle to zoom, point at a curve to read its values; the buttons beside a plot "
     "move it, zoom with the wheel, reset and save it. The plots of one simulation are zoomed together."
 )
+# Maximum number of runs per requirement, and of questions on the whole page, that are shown: a prompt has
+# some 20 kB, and a page that is sent around should stay below a few MB.
+_MOST_TALKS = 3
+_MOST_QUESTIONS = 30
 
 
 def html_report(directory: Path) -> str:
@@ -46,6 +51,8 @@ def page(content: Content) -> str:
     """Lay out a report."""
     run = scripts() if content.sections else []
     fineness = columns(sum(len(shown.panels) for section in content.sections for shown in section.shown))
+    asking = sum(min(_MOST_TALKS, sum(s.run.spent.calls > 0 for s in c.shown)) for c in content.sections)
+    most = max(1, _MOST_QUESTIONS // max(1, asking))
     style = Html(files("falsifier.views.report").joinpath("style.css").read_text(encoding="utf-8"))
     title = f"Falsification report: {content.title}"
     head = el(
@@ -65,7 +72,7 @@ def page(content: Content) -> str:
         el(
             "main",
             _summary(content),
-            *(_section(section, fineness) for section in content.sections),
+            *(_section(section, fineness, most) for section in content.sections),
             _environment(content),
         ),
         *(el("script", Html(text)) for text in run),
@@ -130,7 +137,27 @@ def _scrolling(content: Html, label: str) -> Html:
     return el("div", content, class_="scroll", tabindex="0", role="region", aria_label=label)
 
 
-def _section(section: Section, fineness: int) -> Html:
+def _questions(section: Section, most: int) -> Html:
+    """What the runs of a requirement asked a language model."""
+    asked = [shown.run for shown in section.shown if shown.run.spent.calls]
+    if not asked:
+        return Html("")
+    parts = [
+        join(
+            el("h4", f"{run.method.label}, seed {run.seed}"),
+            exchanges_html(run.directory, run.requirement, most=most),
+        )
+        for run in asked[:_MOST_TALKS]
+    ]
+    rest = "".join(
+        f" {run.method.label}, seed {run.seed}: falsifier report {run.directory}."
+        for run in asked[_MOST_TALKS:]
+    )
+    note = el("p", f"Not shown here:{rest}", class_="note") if rest else Html("")
+    return join(el("h3", "What was asked, and what came of it"), *parts, note)
+
+
+def _section(section: Section, fineness: int, most: int) -> Html:
     drawn = [history_figure(runs, label) for label, runs in section.by_method.items()]
     if len(section.runs) > 1:
         drawn.append(rate_figure(section.by_method))
@@ -144,6 +171,7 @@ def _section(section: Section, fineness: int) -> Html:
         *drawn,
         el("h3", title),
         *(_shown(shown, fineness, opened=i == 0) for i, shown in enumerate(section.shown)),
+        _questions(section, most),
         _findings(section),
         _troubles(section),
         id=_anchor(section),
@@ -163,6 +191,8 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
             ("values then", values),
         ]
     facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
+    if run.simulations:
+        facts.append(("time per iteration", _time(run)))
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
         commands.insert(0, ("replay the counterexample", replay_command(run)))
@@ -175,6 +205,15 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
         el("blockquote", rationale, title="the engine's rationale") if rationale else Html(""),
         el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),
         open="" if opened else None,
+    )
+
+
+def _time(run: Run) -> str:
+    """Mean times of a run."""
+    spent, count = run.spent, run.simulations
+    return (
+        f"simulation {spent.simulation_seconds / count:.3g} s, proposal {spent.engine_seconds / count:.3g} s"
+        f"{', questions included' if spent.calls else ''}, on average"
     )
 
 

@@ -1,0 +1,70 @@
+"""What would be asked of a language model next, without asking."""
+
+from collections.abc import Sequence
+
+from falsifier.engines.told import doubts_told, reply_form, told_view
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.initial import start_values
+from falsifier.llm.disguise import Disguise
+from falsifier.llm.messages import Message, ReplyKind, Tool
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, View, build_prompt, render, trimmed, variant_named
+from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.what_if import what_if_tool
+from falsifier.llm.tools import MOST_CANDIDATES
+from falsifier.problem.problem import Problem
+
+
+def preview(
+    problem: Problem,
+    *,
+    variant: str | None = None,
+    evaluations: Sequence[Evaluation] = (),
+    count: int = 1,
+    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+    anonymous: bool = False,
+    reply: ReplyKind = "json",
+    simulations: int | None = None,
+    doubtful: Sequence[Confirmation] = (),
+) -> tuple[Message, ...]:
+    """Return the messages that would be sent next, without sending them.
+
+    Args:
+        problem: the problem to search.
+        variant: name of the prompt variant; None: the default one.
+        evaluations: what was simulated so far, in order.
+        count: number of candidates to ask for.
+        prompt_tokens: maximum number of tokens of a prompt.
+        anonymous: whether the LLM gets neutral names instead of real ones.
+        reply: what a reply is to consist of.
+        simulations: maximum number of simulations of the run; None: no limit.
+        doubtful: violations among the evaluations that do not count.
+    """
+    told = variant_named(variant)
+    view = told_view(View.of(problem), reply)
+    start = start_values(problem) if told.has("circumstances") else {}
+    disguise = None
+    if anonymous:
+        disguise = Disguise.of(view).fitted_to_start(start).fitted(evaluations)
+        view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
+        start = disguise.hidden_values(start)
+    doubts = doubts_told(doubtful, disguise)
+    prompt = build_prompt(
+        view, told, evaluations, count=count, reply=reply, context=Context(simulations, start, doubts)
+    )
+    return render(trimmed(prompt, prompt_tokens))
+
+
+def preview_tool(
+    problem: Problem,
+    *,
+    calls: int,
+    variant: str | None = None,
+    anonymous: bool = False,
+    reply: ReplyKind = "json",
+) -> Tool:
+    """Return the tool that a question with permission to request predictions would offer; sends nothing."""
+    view = told_view(View.of(problem), reply)
+    shown = Disguise.of(view).view if anonymous else view
+    form = reply_form(shown, variant_named(variant), reply, count=MOST_CANDIDATES, reasoned=False)
+    return what_if_tool(form.schema(), calls=calls)

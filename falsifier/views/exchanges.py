@@ -1,0 +1,177 @@
+"""What a run asked a language model, why it proposed what it did, and what came of it, as HTML.
+
+Prompts are folded; nothing needs a script.
+"""
+
+import re
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from falsifier.core.words import counted, in_one_line
+from falsifier.llm.messages import Exchange, Message
+from falsifier.llm.tokens import count_tokens
+from falsifier.search.journal import read_journal
+from falsifier.search.questions import Iteration, Outcome, iterations
+from falsifier.views.html import Html, el, join
+
+# Characters of a part's first line that name it.
+_LONGEST_NAME = 60
+# Notebook front ends align table cells to the right by default.
+_LEFT = "text-align: left"
+_WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
+
+
+def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
+    """Show the exchanges of a recorded run, and the time of each iteration; empty if it asked nothing.
+
+    Args:
+        directory: run directory.
+        requirement: name of the requirement whose engine asked.
+        most: maximum number of iterations to show, the latest; the text says what is left out.
+    """
+    found = iterations(read_journal(directory), requirement)
+    if not any(one.exchanges for one in found):
+        return Html("")
+    asked = [one for one in found if one.exchanges]
+    parts = []
+    before: tuple[Message, ...] = ()
+    for one in asked[-most:]:
+        parts.append(_iteration(one, before))
+        before = one.exchanges[-1].messages
+    return join(
+        _left_out(directory, asked[: len(asked) - len(parts)], "question"),
+        *parts,
+        el(
+            "details",
+            el("summary", "Time per iteration"),
+            _left_out(directory, found[:-most], "iteration"),
+            _times(found[-most:]),
+            class_="times",
+        ),
+    )
+
+
+def _left_out(directory: Path, missing: Sequence[Iteration], what: str) -> Html:
+    if not missing:
+        return Html("")
+    command = f"falsifier prompt {shlex.quote(str(directory))} --at N"
+    return el(
+        "p",
+        f"The first {counted(len(missing), what)} are not shown; the question before sample N: ",
+        el("code", command),
+        class_="note",
+    )
+
+
+def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
+    first = f"before sample {one.outcomes[0].index + 1}" if one.outcomes else "at the end"
+    asked = counted(len(one.exchanges), "question")
+    tokens = sum(exchange.usage.tokens for exchange in one.exchanges)
+    came = "; ".join(o.text or "not simulated" for o in one.outcomes) or "no candidate"
+    heading = f"{asked} {first}, {tokens} tokens, {one.question_seconds:.3g} s: {came}"
+    shown = []
+    for exchange in one.exchanges:
+        shown.append(_exchange(exchange, before))
+        before = exchange.messages
+    proposals = [el("li", el("b", f"Sample {o.index + 1}: "), _proposal(o)) for o in one.outcomes]
+    return el("details", el("summary", heading), el("ul", *proposals), *shown, class_="exchange")
+
+
+def _proposal(outcome: Outcome) -> Html:
+    candidate = outcome.candidate
+    why = el("blockquote", candidate.rationale) if candidate.rationale else Html("")
+    came = outcome.text or "not simulated"
+    return join(f"{candidate.origin}: {in_one_line(candidate)}. ", el("b", came), why)
+
+
+def _exchange(exchange: Exchange, before: tuple[Message, ...]) -> Html:
+    """One question and its reply; messages that the question before had are not repeated."""
+    known = 0
+    while known < min(len(before), len(exchange.messages)) and before[known] == exchange.messages[known]:
+        known += 1
+    prompt = [
+        el("p", f"{counted(known, 'message')} as in the question before", class_="note")
+        if known
+        else Html(""),
+        *(join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]),
+    ]
+    usage = exchange.usage
+    reply = exchange.reply
+    return join(
+        el(
+            "details",
+            el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}"),
+            _parts(exchange),
+            *prompt,
+            class_="prompt",
+        ),
+        el("p", f"Reply of {exchange.llm}: {counted(usage.completion_tokens, 'token')}"),
+        _text(_reply_text(exchange) if reply else "(none)"),
+        el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem)
+        if exchange.problem
+        else Html(""),
+    )
+
+
+def _reply_text(exchange: Exchange) -> str:
+    assert exchange.reply is not None
+    calls = [f"{call.name}({call.arguments})" for call in exchange.reply.tool_calls]
+    return "\n".join([exchange.reply.text, *calls]).strip()
+
+
+def _text(text: str) -> Html:
+    return el("pre", text, style=_WRAPPED)
+
+
+def _parts(exchange: Exchange) -> Html:
+    """How many tokens each part of the prompt has, by our count; samples together."""
+    counts: Counter[str] = Counter()
+    for message in exchange.messages:
+        for part in message.content.split("\n\n"):
+            if part.strip():
+                counts[_name(part)] += count_tokens(part, exchange.llm)
+    total = sum(counts.values()) or 1
+    rows = [(name, str(n), f"{100 * n / total:.0f} %") for name, n in counts.items()]
+    return _table(("part of the prompt", "tokens", "share"), rows)
+
+
+def _name(part: str) -> str:
+    line = part.strip().partition("\n")[0]
+    if re.match(r"Sample \d", line):
+        return "samples"
+    return line if len(line) <= _LONGEST_NAME else f"{line[:_LONGEST_NAME]} ..."
+
+
+def _times(shown: Sequence[Iteration]) -> Html:
+    rows = []
+    for one in shown:
+        numbers = [str(o.index + 1) for o in one.outcomes]
+        rows.append(
+            (
+                ", ".join(numbers) or "\u2013",
+                ", ".join(dict.fromkeys(o.candidate.origin for o in one.outcomes)) or "\u2013",
+                f"{one.question_seconds:.3g}",
+                f"{max(0.0, one.seconds - one.question_seconds):.3g}",
+                f"{one.simulation_seconds:.3g}",
+                "; ".join(o.text for o in one.outcomes),
+            )
+        )
+    return _table(
+        ("sample", "proposed by", "questions [s]", "other proposal time [s]", "simulation [s]", "outcome"),
+        rows,
+    )
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Html:
+    head = el("tr", *(el("th", name, scope="col", style=_LEFT) for name in header))
+    body = (el("tr", *(el("td", cell, style=_LEFT) for cell in row)) for row in rows)
+    return el(
+        "div",
+        el("table", el("thead", head), el("tbody", *body)),
+        class_="scroll",
+        tabindex="0",
+        role="region",
+        aria_label=header[0],
+    )

@@ -1,0 +1,84 @@
+"""What a run asked a language model, as the report and a notebook show it."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from falsifier.llm.messages import ChatReply, ChatRequest, Usage
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.search.run import falsify
+from falsifier.views.exchanges import exchanges_html
+from falsifier.views.notebook import result_html
+from falsifier.views.report import html_report
+from tests.problems import impossible
+
+EVIL = "<script>alert(1)</script>"
+
+
+def script(request: ChatRequest) -> ChatReply:
+    """Answer with a constant input; the second reply is useless, and one rationale is an attack."""
+    script_.append(len(request.messages))
+    level = 0.01 * len(script_)
+    signals = [{"name": "u", "interpolation": "constant", "times": [0], "values": [level]}]
+    reply = json.dumps({"rationale": f"{EVIL} answer {len(script_)}", "signals": signals})
+    text = "no idea" if len(script_) == 2 else reply
+    return ChatReply(text=text, seconds=1.5, usage=Usage(prompt_tokens=700, completion_tokens=50, cost=0.0))
+
+
+script_: list[int] = []
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six samples of a model, the second after a rejected reply."""
+    directory = tmp_path_factory.mktemp("asked") / "run"
+    falsify(impossible(), llm=ScriptedChat(script), budget=6, directory=directory)
+    return directory
+
+
+def name() -> str:
+    return impossible().name
+
+
+def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path) -> None:
+    html = exchanges_html(run, name(), most=10)
+    assert html.count('class="exchange"') == 6 and html.count('class="prompt"') == 7
+    assert "2 questions before sample 2, 1500 tokens, 3 s: robustness +" in html
+    assert "no idea" in html and "<b>Rejected: </b>" in html
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; answer 1" in html and EVIL not in html
+    assert '<td style="text-align: left">samples</td>' in html
+    assert "as in the question before" in html
+    assert html.count("You search for a counterexample") == 1 + 7, "the text once, its share in each question"
+
+
+def test_the_time_of_each_iteration_is_told(run: Path) -> None:
+    times = exchanges_html(run, name(), most=10).partition('class="times"')[2]
+    rows = times.partition("<tbody>")[2].split("<tr>")[1:]
+    assert len(rows) == 6
+    questions = [re.findall(r">([^<]*)</td>", row)[2] for row in rows]
+    assert questions == ["1.5", "3", "1.5", "1.5", "1.5", "1.5"]
+
+
+def test_long_runs_are_cut_and_say_how_the_rest_is_seen(run: Path) -> None:
+    html = exchanges_html(run, name(), most=2)
+    assert html.count('class="exchange"') == 2
+    assert "The first 4 questions are not shown" in html
+    assert f"falsifier prompt {run} --at N" in html
+    assert "before sample 6" in html and "before sample 2," not in html
+
+
+def test_the_report_and_a_notebook_show_them(run: Path) -> None:
+    page = html_report(run)
+    assert "What was asked, and what came of it" in page
+    assert page.count('class="exchange"') == 6
+    assert "questions included, on average" in page
+    result = falsify(impossible(), llm=ScriptedChat(script), budget=2, directory=run.parent / "second")
+    assert result_html(result).count('class="exchange"') == 2
+
+
+def test_a_run_that_asked_nothing_shows_nothing(tmp_path: Path) -> None:
+    falsify(impossible(), "uniform", budget=2, directory=tmp_path / "run")
+    assert exchanges_html(tmp_path / "run", name(), most=5) == ""
+    assert "What was asked" not in html_report(tmp_path / "run")
