@@ -77,6 +77,12 @@ class _OneTarget(click.Command):
 @jobs_option("simulations")
 @click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
 @start_from_option
+@click.option(
+    "--refine",
+    is_flag=True,
+    help="Search the spec's own control points first, then faster inputs, in up to three levels. Each gets "
+    "the same share of the budget.",
+)
 @quiet_option
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @click.option(
@@ -97,6 +103,7 @@ def run(
     jobs: int,
     together: bool,
     start_from: tuple[Path, ...],
+    refine: bool,
     quiet: bool,
     out: Path | None,
     fmu_log: Path | None,
@@ -133,6 +140,7 @@ def run(
             jobs=jobs,
             directory=out or _new_directory(source.name),
             start_from=known,
+            refine=refine,
             listeners=[display, *logs],
         )
     _finish(results, as_json=as_json)

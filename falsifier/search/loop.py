@@ -9,7 +9,6 @@ from time import perf_counter
 from typing import Protocol
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
@@ -30,6 +29,7 @@ from falsifier.search.events import (
     RunStarted,
 )
 from falsifier.search.findings import Finding
+from falsifier.search.levels import Level, reached
 from falsifier.search.parameterization import inexpressible
 from falsifier.search.proposals import proposals
 from falsifier.search.result import Result, ResultStatus
@@ -107,7 +107,7 @@ def search(
     *,
     steps: Steps | None = None,
     batch: int = 1,
-    searched: SearchSpace | None = None,
+    levels: Sequence[Level] = (),
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
 ) -> list[Result]:
@@ -123,7 +123,8 @@ def search(
         budget: limits of the run.
         steps: how to ask, simulate and confirm; default: everything in this process.
         batch: number of candidates to ask for and simulate at a time.
-        searched: the part of the search space that the engines use; default: all of it.
+        levels: the parts of the search space that the engines use, and from which simulation on; default: all
+            of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
 
@@ -140,7 +141,8 @@ def search(
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
-    loop = _Loop(targets, searched or problems[0].space, budget, steps or Live(), directory, tuple(listeners))
+    levels = tuple(levels) or (Level(0, problems[0].space),)
+    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners))
     status: ResultStatus
     try:
         loop.attach()
@@ -191,14 +193,14 @@ class _Loop:
     def __init__(
         self,
         targets: list[_Target],
-        searched: SearchSpace,
+        levels: tuple[Level, ...],
         budget: Budget,
         steps: Steps,
         directory: Path | None,
         listeners: tuple[Listener, ...],
     ) -> None:
         self.targets = targets
-        self.searched = searched
+        self.levels = levels
         self.budget = budget
         self.steps = steps
         self.directory = directory
@@ -228,7 +230,8 @@ class _Loop:
                 problems=tuple(t.problem for t in self.targets),
                 engines=tuple(t.engine.name for t in self.targets),
                 budget=self.budget,
-                searched=self.searched,
+                searched=self.levels[-1].space,
+                levels=self.levels if len(self.levels) > 1 else (),
                 replayed=self.steps.replayed,
             )
         )
@@ -374,11 +377,12 @@ class _Loop:
         """Return what the search could not show about a requirement that it did not falsify."""
         if target.best is None:
             return ()
-        limits = inexpressible(target.problem, self.searched)
+        limits = inexpressible(target.problem, self.levels, len(target.evaluations))
         return (*target.vacuity.findings(), *([limits] if limits else []))
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample
+        begun = reached(self.levels, len(target.evaluations))
         return Result(
             problem=target.problem,
             status=status if found is None else "falsified",
@@ -389,7 +393,8 @@ class _Loop:
             refuted=tuple(c for c in target.doubtful if c.outcome == "refuted"),
             fragile=tuple(c for c in target.doubtful if c.outcome == "fragile"),
             spent=target.spent or self.clock(),
-            searched=self.searched,
+            searched=begun[-1].space,
+            levels=self.levels if len(self.levels) > 1 else (),
             findings=() if found is not None else self.findings(target),
             directory=self.directory,
         )

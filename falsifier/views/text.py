@@ -14,6 +14,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search import manifest
 from falsifier.search.assurance import Assurance
 from falsifier.search.budget import Spent
+from falsifier.search.levels import Outcome, outcomes
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 
@@ -30,7 +31,9 @@ def result_text(result: Result) -> str:
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += evaluation_lines(result.problem, shown)
-    if result.counterexample is None and result.searched is not None and result.searched.inputs:
+    if result.levels:
+        lines += [f"  {line}" for line in level_lines(result)]
+    elif result.counterexample is None and result.searched is not None and result.searched.inputs:
         lines.append(f"  inputs         {parameterization_note(result.searched)}")
     lines += [f"  note           {finding.text}" for finding in result.findings]
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
@@ -60,6 +63,7 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{robustness}{where}"
         )
+        lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: spent.simulations)
@@ -86,13 +90,43 @@ def result_json(result: Result) -> dict[str, Any]:
         "reason": result.reason,
         "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
         "best": result.best and evaluation_json(result.best),
-        "parameterization": parameterization_of(result.searched or result.problem.space),
+        "parameterization": "refined"
+        if result.levels
+        else parameterization_of(result.searched or result.problem.space),
+        "levels": _levels_json(result),
         "findings": [asdict(finding) for finding in result.findings],
         "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "not_confirmed": [c.reason for c in result.refuted],
         "spent": spent,
         "directory": result.directory and str(result.directory),
     }
+
+
+def level_lines(result: Result) -> list[str]:
+    """Say of each level of a search that refined its inputs what was searched, and what came of it."""
+    return [
+        f"{found.name:<14} {found.text}: {parameterization_note(level.space)}"
+        for level, found in zip(result.levels, _outcomes(result), strict=True)
+    ]
+
+
+def _outcomes(result: Result) -> tuple[Outcome, ...]:
+    if not result.levels:
+        return ()
+    starts = [level.first for level in result.levels]
+    return outcomes(starts, [e.robustness for e in result.evaluations], falsified=result.falsified)
+
+
+def _levels_json(result: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            "searched": parameterization_note(level.space),
+            "simulations": found.simulations,
+            "smallest": found.smallest,
+            "falsified": found.falsified,
+        }
+        for level, found in zip(result.levels, _outcomes(result), strict=True)
+    ]
 
 
 def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.core.candidate import Candidate
+from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
+from falsifier.search.levels import outcomes
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse
 from falsifier.views.panels import Panel, panels
@@ -97,6 +99,15 @@ def findings_lines(section: Section) -> list[str]:
     ]
 
 
+def level_facts(run: Run) -> list[tuple[str, str]]:
+    """Return what came of each level of a run that refined its inputs, and what the level searched."""
+    levels = run.manifest.levels
+    if not levels:
+        return []
+    found = outcomes([level.first for level in levels], list(run.robustness), falsified=run.falsified)
+    return [(each.name, f"{each.text}: {level.searched}") for level, each in zip(levels, found, strict=True)]
+
+
 def replay_command(run: Run) -> str:
     """Shell command that replays a run's counterexample."""
     place = run.counterexample_file if run.shared else run.directory
@@ -129,7 +140,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--stl", problem.stl),
         ("--profile", problem.profile),
         ("--parameterization", None if problem.parameterization == "free" else problem.parameterization),
-        *options_from(problem.changes),
+        *options_from(without_limits(problem.changes) if request.levels else problem.changes),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
@@ -138,6 +149,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
         ("--all", True if shared else None),
+        ("--refine", True if request.levels else None),
     ]
     words = ["falsifier", "run", target]
     for name, value in options:

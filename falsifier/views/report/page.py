@@ -20,6 +20,7 @@ from falsifier.views.report.content import (
     Shown,
     findings_lines,
     gather,
+    level_facts,
     replay_command,
     run_command,
     searches,
@@ -163,6 +164,7 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
             ("values then", values),
         ]
     facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
+    facts += level_facts(run)
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
         commands.insert(0, ("replay the counterexample", replay_command(run)))
