@@ -180,6 +180,7 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "tail": found.tail and asdict(found.tail),
         "estimate": found.splitting and asdict(found.splitting),
         "optimum": found.optimum,
+        "findings": [asdict(finding) for finding in found.findings],
         "interrupted": found.interrupted,
     }
 
