@@ -37,6 +37,7 @@ class Section:
 
     Attributes:
         name: name of the requirement.
+        heading: the name; of a formula without a name, the formula.
         formula: text of the formula.
         description: what it means.
         by_method: its runs by method.
@@ -44,6 +45,7 @@ class Section:
     """
 
     name: str
+    heading: str
     formula: str
     description: str
     by_method: dict[str, list[Run]]
@@ -174,8 +176,12 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
     found = [run for run in runs if run.falsified] or _best(runs)
+    heading = requirement.formula if runs[0].is_ad_hoc else name
+    if heading != name and name != requirement.name:
+        heading = f"{name}: {heading}"
     return Section(
         name,
+        heading,
         requirement.formula,
         requirement.description,
         by_method,

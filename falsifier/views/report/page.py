@@ -139,9 +139,11 @@ def _section(section: Section, fineness: int) -> Html:
     title = "Counterexamples" if found else "Closest to a violation"
     return el(
         "section",
-        el("h2", section.name),
+        el("h2", section.heading),
         el("p", section.description) if section.description else Html(""),
-        el("p", el("code", section.formula), class_="formula"),
+        el("p", el("code", section.formula), class_="formula")
+        if section.heading == section.name
+        else Html(""),
         *drawn,
         el("h3", title),
         *(_shown(shown, fineness, opened=i == 0) for i, shown in enumerate(section.shown)),
