@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
+from falsifier.campaigns.progress import total
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
 from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
@@ -90,6 +92,38 @@ def gather(directory: Path, published: Published | None = None) -> Content:
         main_table(runs, read_published() if published is None else published),
         [_section(name, by_method) for name, by_method in grouped.items()],
     )
+
+
+def outcome(section: Section) -> str:
+    """Return in words what came of a requirement, over all its runs."""
+    runs = section.runs
+    count = counted(total(run.spent for run in searches(runs)).simulations, "simulation")
+    found = [run for run in runs if run.falsified]
+    if found:
+        least = min(found, key=lambda run: run.simulations)
+        after = counted(least.simulations, "simulation")
+        of = "" if len(runs) == 1 else f" in {len(found)} of {len(runs)} runs, the quickest"
+        return f"falsified{of} after {after}{_where(least)}"
+    failed = [run for run in runs if run.status == "failed"]
+    if len(failed) == len(runs):
+        return f"failed: {failed[0].reason}"
+    if not any(run.finished for run in runs):
+        return "not finished"
+    tested = ""
+    if any(finding.vacuous for run in runs for finding in run.findings):
+        tested = ", and a part of it was not tested"
+    return f"not falsified in {count}{tested}{''.join(map(_where, _best(runs)))}"
+
+
+def _where(run: Run) -> str:
+    """Say how near a run came, and when, with the values of what decided."""
+    if run.verdict is None:
+        return ""
+    signals = parse(run.verdict.predicate).signals
+    values = "".join(f", {name} = {v:.6g}" for name, v in run.verdict.values.items() if name in signals)
+    robustness, time = abs(run.verdict.robustness), run.verdict.critical_time
+    what = f"by {robustness:.4g}" if run.falsified else f"{robustness:.4g} away from a violation"
+    return f": {what} at t = {time:.6g} s ({run.verdict.predicate}{values})"
 
 
 def findings_lines(section: Section) -> list[str]:

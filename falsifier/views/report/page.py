@@ -21,6 +21,7 @@ from falsifier.views.report.content import (
     findings_lines,
     gather,
     level_facts,
+    outcome,
     replay_command,
     run_command,
     searches,
@@ -32,6 +33,10 @@ _HINT = (
     "Plots: drag a rectangle to zoom, point at a curve to read its values; the buttons beside a plot "
     "move it, zoom with the wheel, reset and save it. The plots of one simulation are zoomed together."
 )
+
+# Columns of the table that name a row, and those that are folded away so that the others fit on a screen.
+_KEYS = ("requirement", "method")
+_FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
 def html_report(directory: Path) -> str:
@@ -60,11 +65,12 @@ def page(content: Content) -> str:
     )
     body = el(
         "body",
-        el("a", "Skip to the results", href="#summary", class_="skip"),
+        el("a", "Skip to the results", href="#requirements", class_="skip"),
         el("header", el("h1", title), el("p", _overview(content))),
         _navigation(content),
         el(
             "main",
+            _requirements(content),
             _summary(content),
             *(_section(section, fineness) for section in content.sections),
             _environment(content),
@@ -99,31 +105,48 @@ def _overview(content: Content) -> str:
 
 
 def _navigation(content: Content) -> Html:
-    names = [("summary", "Summary"), *((_anchor(s), s.name) for s in content.sections)]
-    links = [el("li", el("a", name, href=f"#{anchor}")) for anchor, name in names]
-    links.append(el("li", el("a", "Environment", href="#environment")))
+    names = {"requirements": "Requirements", "summary": "Numbers"}
+    names |= {_anchor(section): section.name for section in content.sections} | {"environment": "Environment"}
+    links = [el("li", el("a", name, href=f"#{anchor}")) for anchor, name in names.items()]
     return el("nav", el("ul", *links), aria_label="Sections")
 
 
+def _requirements(content: Content) -> Html:
+    """One line per requirement: what came of it, and what it means."""
+    rows = tuple((s.name, outcome(s), s.description or s.formula) for s in content.sections)
+    table = Table("Requirements", ("requirement", "result", "meaning"), rows)
+    return el(
+        "section", el("h2", "Requirements"), _table(table, _anchors(content), "words"), id="requirements"
+    )
+
+
 def _summary(content: Content) -> Html:
-    anchors = {section.name: _anchor(section) for section in content.sections}
+    anchors, table = _anchors(content), content.table
+    main = table.only(*(name for name in table.header if name not in _FOLDED))
+    folded = table.only(*(name for name in table.header if name in (*_KEYS, *_FOLDED)))
     return el(
         "section",
-        el("h2", "Summary"),
-        _table(content.table, anchors),
+        el("h2", "Numbers"),
+        _table(main, anchors),
+        el("details", el("summary", "Spread, times, tokens and cost"), _table(folded, anchors)),
         *(el("p", note, class_="note") for note in content.table.notes),
         el("p", _HINT, class_="note hint"),
         id="summary",
     )
 
 
-def _table(table: Table, anchors: dict[str, str]) -> Html:
+def _anchors(content: Content) -> dict[str, str]:
+    return {section.name: _anchor(section) for section in content.sections}
+
+
+def _table(table: Table, anchors: dict[str, str], kind: str = "") -> Html:
     header = el("tr", *(el("th", name, scope="col") for name in table.header))
     rows = []
     for row in table.rows:
         first = el("a", row[0], href=f"#{anchors[row[0]]}") if row[0] in anchors else row[0]
         rows.append(el("tr", el("th", first, scope="row"), *(el("td", cell) for cell in row[1:])))
-    return _scrolling(el("table", el("thead", header), el("tbody", *rows)), table.title)
+    body = el("table", el("thead", header), el("tbody", *rows), class_=kind or None)
+    return _scrolling(body, table.title)
 
 
 def _scrolling(content: Html, label: str) -> Html:
