@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted
+from falsifier.core.words import candidate_lines, counted, margin_words
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -21,7 +21,8 @@ from falsifier.search.result import Result
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
+    untested = ", and a part of it was not tested" if any(f.vacuous for f in result.findings) else ""
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{untested}"
     lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
@@ -139,7 +140,7 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
             f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
             for name, value in verdict.values.items()
         )
-        lines.append(f"  robustness     {verdict.robustness:+.6g}")
+        lines.append(f"  robustness     {verdict.robustness:+.6g} ({margin_words(verdict.robustness)})")
         lines.append(f"  critical time  {verdict.critical_time:.6g} s, decided by {verdict.predicate}")
         lines.append(f"  values then    {values}")
     lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import counted
+from falsifier.core.words import counted, margin_words
 from falsifier.engines.box import UnitBox
 from falsifier.engines.uniform import Uniform
 from falsifier.errors import SimulationError, SpecError
@@ -79,7 +79,8 @@ class Assurance:
         if any(finding.vacuous for finding in self.findings):
             lines.append("That is true, but says little: a part of the requirement was not tested.")
         lines += [f"Note: {finding.text}" for finding in self.findings]
-        lines.append(f"The smallest robustness of these was {self.smallest.robustness:+.6g}.")
+        smallest = _robustness(self.smallest)
+        lines.append(f"The smallest robustness of these was {smallest:+.6g} ({margin_words(smallest)}).")
         if self.optimum is not None:
             lines.append(_optimum_text(self.optimum, _robustness(self.smallest)))
         if self.tail is not None:
