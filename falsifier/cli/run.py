@@ -37,6 +37,7 @@ from falsifier.counterexamples.known_inputs import known_inputs
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.problem.loading import find_spec, load_source, sources_of
 from falsifier.problem.problem import Problem
+from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
@@ -129,7 +130,8 @@ def run(
     known = []
     if start_from:
         searched = loaded = [load_source(each) for each in sources]
-        known = [_known(place, loaded[0]) for place in start_from]
+        (fitting,) = widened(loaded[:1]) if refine else loaded[:1]
+        known = [_known(place, fitting) for place in start_from]
     with make_display(quiet=quiet) as display:
         results = falsify(
             searched,

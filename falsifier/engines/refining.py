@@ -57,6 +57,7 @@ class Refining:
         self._constant: dict[object, Evaluation] = {}
         self._earlier: dict[object, Evaluation] = {}
         self._copies: list[Candidate] = []
+        self._doubts: list[Confirmation] = []
 
     @property
     def name(self) -> str:
@@ -89,7 +90,8 @@ class Refining:
         self._begin(told=0)
 
     def doubt(self, confirmation: Confirmation) -> None:
-        """Tell the engine of the current level that a violation does not count if it wants to know."""
+        """Tell the engines of this level and the next ones that a violation does not count if they ask."""
+        self._doubts.append(confirmation)
         engine = self._stages[self._level].engine
         if isinstance(engine, FollowsRun):
             engine.doubt(confirmation)
@@ -125,6 +127,8 @@ class Refining:
         if isinstance(engine, FollowsRun):
             end = self._simulations if self._end is None else self._end
             engine.begin(None if end is None else end - self._stages[self._level].first + told)
+            for confirmation in self._doubts:
+                engine.doubt(confirmation)
 
     def _asked(self, n: int) -> list[Candidate]:
         """Ask the engine; what earlier levels have simulated is told to it at once."""

@@ -9,6 +9,7 @@ from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine
 from falsifier.engines.refining import COPIES, Refining, Stage
 from falsifier.engines.uniform import Uniform
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.problem.refinement import level_spaces
@@ -26,6 +27,7 @@ class Listening(Uniform):
         self.told: list[Evaluation] = []
         self.first = list(first)
         self.begun: int | None = None
+        self.doubted: list[object] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
         return [self.first.pop(0)] if self.first else super().ask(n)
@@ -37,7 +39,7 @@ class Listening(Uniform):
         self.begun = simulations
 
     def doubt(self, confirmation: object) -> None:
-        pass
+        self.doubted.append(confirmation)
 
 
 def spaces(*, free: bool) -> tuple[SearchSpace, ...]:
@@ -129,3 +131,23 @@ def test_known_inputs_that_a_coarse_level_cannot_express_wait_for_a_finer_one() 
     drive(engine, simulated(PROBLEM, lambda x: 1.0), rounds=2)
     assert known.key not in {e.candidate.key for e in first.told}
     assert known.key in {e.candidate.key for e in second.told}
+
+
+def test_a_violation_that_does_not_count_is_told_to_the_next_level_too() -> None:
+    coarse, fine, _ = spaces(free=True)
+    second = listening(fine)
+    engine = Refining([Stage(listening(coarse), coarse, 0), Stage(second, fine, 1)])
+    engine.begin(5)
+    candidate = engine.ask()[0]
+    doubtful = Confirmation(
+        problem=PROBLEM,
+        evaluation=judge(candidate),
+        outcome="fragile",
+        robustness=-1.0,
+        reference=-1.0,
+        reason="",
+    )
+    engine.doubt(doubtful)
+    engine.tell([judge(candidate)])
+    engine.ask()
+    assert second.doubted == [doubtful]
