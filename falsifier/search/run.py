@@ -314,7 +314,7 @@ def carry_out(
 def _engines(
     request: RunRequest, problems: Sequence[Problem], levels: Sequence[Level], chat: Chat | None
 ) -> list[Engine]:
-    if len(levels) > 1:
+    if request.levels:
         return list(make_refining(request, problems, levels, chat))
     return make_engines(request, problems, chat)
 

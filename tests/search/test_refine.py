@@ -137,6 +137,14 @@ def test_known_inputs_come_first_and_count_for_the_first_level() -> None:
     assert result.falsified
 
 
+def test_a_budget_for_one_level_is_spent_on_the_coarse_one() -> None:
+    result = falsify(fast_only(), "surrogate", budget=1, refine=True)
+    (only,) = result.evaluations
+    assert only.candidate.signals["u"].interpolation == "linear"
+    assert result.searched == fast_only().space
+    assert any(f.kind == "parameterization" for f in result.findings)
+
+
 def test_nothing_to_refine_is_one_level() -> None:
     result = falsify(lag_problem(inputs=0, parameters=[START, BIAS]), "uniform", budget=4, refine=True)
     assert not result.levels
