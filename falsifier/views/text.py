@@ -21,7 +21,7 @@ from falsifier.search.result import Result
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    untested = ", and a part of it was not tested" if any(f.vacuous for f in result.findings) else ""
+    untested = ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
     head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{untested}"
     lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best

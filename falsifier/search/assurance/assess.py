@@ -76,7 +76,7 @@ class Assurance:
             lines.append(
                 f"{counted(self.failures, 'simulation')} failed; the bound counts them as violations."
             )
-        if any(finding.vacuous for finding in self.findings):
+        if any(finding.untested for finding in self.findings):
             lines.append("That is true, but says little: a part of the requirement was not tested.")
         lines += [f"Note: {finding.text}" for finding in self.findings]
         smallest = _robustness(self.smallest)

@@ -110,7 +110,7 @@ def outcome(section: Section) -> str:
     if not any(run.finished for run in runs):
         return "not finished"
     tested = ""
-    if any(finding.vacuous for run in runs for finding in run.findings):
+    if any(finding.untested for run in runs for finding in run.findings):
         tested = ", and a part of it was not tested"
     return f"not falsified in {count}{tested}{''.join(map(_where, _best(runs)))}"
 
