@@ -23,7 +23,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import open_journal, read_journal, save_trajectory, write_manifest
-from falsifier.search.loop import Live, search
+from falsifier.search.loop import search
 from falsifier.search.manifest import describe, environment
 from falsifier.search.records import (
     AskedRecord,
@@ -36,6 +36,7 @@ from falsifier.search.records import (
 )
 from falsifier.search.request import RunRequest
 from falsifier.search.run import falsify
+from falsifier.search.steps import Live
 from falsifier.views.report import html_report
 
 SIMULATIONS = 1000

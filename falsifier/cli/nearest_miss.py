@@ -10,7 +10,7 @@ import click
 from falsifier.cli.files import check_out, draw_evaluation, write_counterexample
 from falsifier.cli.output import say
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted, in_one_line
+from falsifier.core.words import candidate_lines, counted, in_one_line, margin_words
 from falsifier.counterexamples.nearest_miss import NearestMiss
 from falsifier.counterexamples.shrink import Shrunk, shrink_miss
 from falsifier.evaluation.confirm import confirm
@@ -24,7 +24,7 @@ def nearest_miss_line(miss: NearestMiss) -> str:
     """Say what a nearest miss is, before anything is said about it."""
     return (
         f"{miss.requirement} was not falsified in {counted(miss.simulations, 'simulation')}; this is about "
-        f"the nearest miss, with robustness {miss.robustness:+.6g}."
+        f"the nearest miss, with robustness {miss.robustness:+.6g} ({margin_words(miss.robustness)})."
     )
 
 

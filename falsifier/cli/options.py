@@ -67,7 +67,13 @@ def problem_options(command: Function) -> Function:
     return _add(
         command,
         click.argument("target"),
-        click.option("--stl", metavar="FORMULA", help="Formula to use instead of the spec's requirement."),
+        click.option(
+            "--stl",
+            multiple=True,  # so that a second one is an error and does not silently replace the first
+            callback=_only_one,
+            metavar="FORMULA",
+            help="Formula to use instead of the spec's requirement.",
+        ),
         profile_option,
         parameterization_option(),
         click.option(
@@ -104,6 +110,15 @@ def problem_options(command: Function) -> Function:
             help="Maximum wall-clock time of one simulation; default: the spec's, or 60.",
         ),
     )
+
+
+def _only_one(_context: click.Context, _option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
+    if len(formulas) > 1:
+        raise click.UsageError(
+            f"--stl: given {len(formulas)} times; run one after the other, or write the formulas to a spec "
+            "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml --all"
+        )
+    return formulas[0] if formulas else None
 
 
 def problem_source(options: dict[str, Any]) -> ProblemSource:

@@ -37,6 +37,7 @@ from falsifier.counterexamples.known_inputs import known_inputs
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.problem.loading import find_spec, load_source, sources_of
 from falsifier.problem.problem import Problem
+from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
@@ -77,6 +78,12 @@ class _OneTarget(click.Command):
 @jobs_option("simulations")
 @click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
 @start_from_option
+@click.option(
+    "--refine",
+    is_flag=True,
+    help="Search the spec's own control points first, then faster inputs, in up to three levels. Each gets "
+    "the same share of the budget.",
+)
 @quiet_option
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @click.option(
@@ -97,6 +104,7 @@ def run(
     jobs: int,
     together: bool,
     start_from: tuple[Path, ...],
+    refine: bool,
     quiet: bool,
     out: Path | None,
     fmu_log: Path | None,
@@ -122,7 +130,8 @@ def run(
     known = []
     if start_from:
         searched = loaded = [load_source(each) for each in sources]
-        known = [_known(place, loaded[0]) for place in start_from]
+        (fitting,) = widened(loaded[:1]) if refine else loaded[:1]
+        known = [_known(place, fitting) for place in start_from]
     with make_display(quiet=quiet) as display:
         results = falsify(
             searched,
@@ -133,6 +142,7 @@ def run(
             jobs=jobs,
             directory=out or _new_directory(source.name),
             start_from=known,
+            refine=refine,
             listeners=[display, *logs],
         )
     _finish(results, as_json=as_json)

@@ -86,12 +86,13 @@ class Explanation:
         requirement = self.problem.requirement
         demand = requirement.description or in_words(requirement.formula)
         robustness = self.diagnosis.robustness
-        found = f"It is violated by {-robustness:.5g}"
+        named = "robustness, the margin by which it holds"
+        found = f"It is violated by {-robustness:.5g} ({named}: {robustness:+.5g})"
         if not self.violated:
-            found = f"It is not violated here; {robustness:.5g} is missing to a violation"
+            found = f"It is not violated here; {robustness:.5g} is missing to a violation ({named})"
         sentences = [
             f"{self.problem.name} requires: {demand.rstrip('.')}.",
-            f"{found}: {self.diagnosis.text}",
+            f"{found}: {self.diagnosis.plain}",
             *(self._effect_sentences() if self.violated else self._miss_sentences()),
         ]
         return " ".join(sentences)

@@ -81,7 +81,9 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
             reference=fresh.reference,
             reason=reason,
         )
-    reason = f"a fresh simulation gives {fresh.robustness:+.6g}, rtamt {fresh.reference:+.6g}"
+    reason = (
+        f"a fresh simulation gives {fresh.robustness:+.6g}, the second monitor (rtamt) {fresh.reference:+.6g}"
+    )
     finer = half_step(problem)
     halved = _repeat(finer, evaluation.candidate, known=fresh)
     outcome: Outcome = "confirmed"

@@ -13,12 +13,13 @@ from pathlib import Path
 
 from falsifier.core.files import bundled
 from falsifier.core.model import Interface
+from falsifier.core.space import Freedom
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.joining import Joined, join, join_fmu
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import Parameterization, ProblemSource, Target
-from falsifier.problem.spec import read_spec
+from falsifier.problem.spec import InputSection, ModelChanges, read_spec
 
 
 def find_spec(target: str) -> tuple[Path, str | None]:
@@ -142,11 +143,13 @@ def load_source(source: ProblemSource) -> Problem:
     """
     kind = source.parts.kind
     if kind == "python":
-        if source.model_copy(update={"parameterization": "free"}) != ProblemSource(target=source.target):
+        freed = {name: InputSection(free=s.free) for name, s in source.changes.inputs.items() if s.free}
+        allowed = ProblemSource(target=source.target, changes=ModelChanges(inputs=freed))
+        if source.model_copy(update={"parameterization": "free"}) != allowed:
             raise SpecError(
                 f"{source.target}: a problem made in Python takes no options; change it where it is made"
             )
-        problem = replace(_python_problem(source.target), source=source)
+        problem = replace(_with_limits(_python_problem(source.target), freed), source=source)
     elif kind == "fmu":
         if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
@@ -210,6 +213,18 @@ def _made(joined: Joined, source: ProblemSource) -> Problem:
         source,
         joined.notes,
     )
+
+
+def _with_limits(problem: Problem, freed: Mapping[str, InputSection]) -> Problem:
+    """Return the problem with the limits of free control points that a search with refined inputs has."""
+    limits = {name: s.free for name, s in freed.items() if s.free is not None}
+    inputs = tuple(
+        replace(r, free=Freedom(limits[r.name].max_control_points, limits[r.name].min_interval))
+        if r.name in limits
+        else r
+        for r in problem.space.inputs
+    )
+    return replace(problem, space=replace(problem.space, inputs=inputs))
 
 
 def _python_problem(target: str) -> Problem:

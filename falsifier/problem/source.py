@@ -10,6 +10,8 @@ from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.spec import ModelChanges
 
 Parameterization = Literal["free", "fixed"]
+# What a search did with it; refined: the spec's own control points first, then freer ones.
+Searched = Literal["free", "fixed", "refined"]
 
 
 @dataclass(frozen=True, slots=True)

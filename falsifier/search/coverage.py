@@ -7,7 +7,6 @@ time. Trajectories are read one by one: a long run's would not fit in memory tog
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
-from math import ceil, floor
 from os import PathLike
 from pathlib import Path
 
@@ -21,24 +20,25 @@ from falsifier.errors import SpecError
 from falsifier.search import manifest
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
 from falsifier.search.manifest import InputRecord, Manifest
+from falsifier.search.parts import (
+    PACES,
+    Array,
+    Counts,
+    allowed_labels,
+    cells_of,
+    edges_of,
+    fastest_rate,
+    labels_of,
+    pace_of,
+)
 from falsifier.search.records import EvaluatedRecord
 
-# Parts of a range: enough to see gaps, few enough that a hundred simulations can try most pairs of them.
-PARTS = 10
 # Slices of the simulated time in which the values of an input are counted.
 SLICES = 40
 # Samples of an input over the simulated time: several per slice.
 _SAMPLES = 201
-# How fast an input changed, slowest first; see _pace.
-PACES = ("constant", "slow", "medium", "fast", "steps")
-# An input is slow if its range takes at least this share of the simulated time, and fast if at most that.
-SLOW, FAST = 1 / 2, 1 / 20
-# Points of a cubic piece at which its slope is calculated.
-_PER_PIECE = np.linspace(0.0, 1.0, 5)
 
 Tried = Iterable[tuple[Candidate, Trajectory | None]]
-Array = NDArray[np.float64]
-Counts = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,7 @@ class RangeCoverage:
     @property
     def edges(self) -> list[tuple[float, float]]:
         """Lower and upper end of each part; both are equal if a part is one whole number."""
-        return _edges(self.searched)
+        return edges_of(self.searched)
 
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
@@ -234,12 +234,12 @@ class _Range:
     apart: float | None = None
 
     def __post_init__(self) -> None:
-        count = len(_edges(self.searched))
+        count = len(edges_of(self.searched))
         self.parts, self.times = np.zeros(count, np.intp), np.zeros((SLICES, count), np.intp)
 
     def add(self, values: Array) -> Counts:
         """Add the values of one simulation over time; return the part of each."""
-        cells = _cells(self.searched, values)
+        cells = cells_of(self.searched, values)
         self.parts[np.unique(cells)] += 1
         within = np.arange(len(values)) * SLICES // len(values)
         for slice_, part in np.unique(np.stack([within, cells]), axis=1).T:
@@ -249,8 +249,8 @@ class _Range:
         return cells
 
     def add_changes(self, signal: Signal, stop_time: float) -> None:
-        rate = _rate(signal, stop_time)
-        self.paces[_pace(signal, rate, self.searched, stop_time)] += 1
+        rate = fastest_rate(signal, stop_time)
+        self.paces[pace_of(signal, rate, self.searched, stop_time)] += 1
         self.rate = max((x for x in (self.rate, rate) if x is not None), default=None)
         self.apart = min((x for x in (self.apart, signal.shortest_dwell) if x is not None), default=None)
 
@@ -282,8 +282,8 @@ class _Count:
         self.times = np.linspace(0.0, described.stop_time, _SAMPLES)
         self.outputs: dict[str, OutputCoverage] = {}
         searched = [r.searched for r in self.ranges if r.searched.kind != "real"]
-        self.labels = {r.name: _labels(r.kind, r.items) or _allowed_labels(r) for r in searched}
-        self.labels |= {m.name: _labels(m.kind, m.items) for m in described.modes}
+        self.labels = {r.name: labels_of(r.kind, r.items) or allowed_labels(r) for r in searched}
+        self.labels |= {m.name: labels_of(m.kind, m.items) for m in described.modes}
         self.seen: dict[str, set[int]] = {name: set() for name in self.labels}
         self.changes: dict[str, set[tuple[int, int]]] = {name: set() for name in self.labels}
 
@@ -351,62 +351,3 @@ class _Count:
             rows, columns = (slice(self.starts[j], self.starts[j + 1]) for j in (i, k))
             names = self.ranges[i].searched.name, self.ranges[k].searched.name
             yield PairCoverage(*names, self.together[rows, columns])
-
-
-def _allowed(r: InputRecord) -> list[int]:
-    """Return the numbers that an integer, Boolean or enumeration may have; empty if there are many."""
-    if r.items:
-        return sorted(n for _, n in r.items if r.low <= n <= r.high)
-    first, last = ceil(r.low), floor(r.high)
-    return list(range(first, last + 1)) if last - first < PARTS else []
-
-
-def _edges(r: InputRecord) -> list[tuple[float, float]]:
-    """Return the ends of each part of a range; a part of a short list of numbers is one number."""
-    if r.kind != "real" and (numbers := _allowed(r)):
-        return [(float(n), float(n)) for n in numbers]
-    if r.low == r.high:
-        return [(r.low, r.high)]
-    return list(pairwise(np.linspace(r.low, r.high, PARTS + 1).tolist()))
-
-
-def _cells(r: InputRecord, values: Array) -> Counts:
-    """Return the part of the range in which each value is, shape (n,)."""
-    edges = np.array(_edges(r))
-    between = (edges[1:, 0] + edges[:-1, 1]) / 2
-    return np.searchsorted(between, values, side="right")
-
-
-def _labels(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
-    if kind == "boolean":
-        return {0: "false", 1: "true"}
-    return {number: label for label, number in items}
-
-
-def _allowed_labels(r: InputRecord) -> dict[int, str]:
-    return {n: str(n) for n in _allowed(r)}
-
-
-def _rate(signal: Signal, stop_time: float) -> float | None:
-    """Return the fastest continuous change in units per s; None if the value only changes in steps.
-
-    A signal that is sampled and held counts as what is sampled: its period is the model's, not the search's.
-    """
-    if len(signal.times) == 1 or signal.interpolation == "constant":
-        return None
-    pieces = signal.held(None).pieces(stop_time)[:-1]
-    at = np.diff(signal.times)[:, np.newaxis] * _PER_PIECE
-    slopes = pieces[:, 2:3] + 2 * pieces[:, 3:4] * at + 3 * pieces[:, 4:5] * at**2
-    return float(np.abs(slopes).max(initial=0.0))
-
-
-def _pace(signal: Signal, rate: float | None, r: InputRecord, stop_time: float) -> str:
-    """Return which of PACES an input had at its fastest."""
-    if signal.switches == 0:
-        return "constant"
-    if rate is None:
-        return "steps"
-    duration = (r.high - r.low) / rate
-    if duration >= SLOW * stop_time:
-        return "slow"
-    return "fast" if duration <= FAST * stop_time else "medium"

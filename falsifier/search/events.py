@@ -10,6 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget, Spent
+from falsifier.search.levels import Level
 from falsifier.search.result import Result, ResultStatus
 
 
@@ -22,6 +23,7 @@ class RunStarted:
         engines: name of each problem's engine.
         budget: limits of the run.
         searched: the part of the search space that the engines use.
+        levels: if the inputs are refined step by step: all levels, coarse first.
         replayed: number of evaluations taken from the run's journal.
     """
 
@@ -29,6 +31,7 @@ class RunStarted:
     engines: tuple[str, ...]
     budget: Budget
     searched: SearchSpace
+    levels: tuple[Level, ...] = ()
     replayed: int = 0
 
 

@@ -1,20 +1,16 @@
 """The loop: ask, simulate, judge, tell, until every requirement is falsified or the budget is used up."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Protocol
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.errors import ChatError, SpecError
-from falsifier.evaluation.confirm import Confirmation, confirm
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge
-from falsifier.evaluation.workers import evaluate_all
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
 from falsifier.search.bounded import BoundedChat
@@ -30,74 +26,14 @@ from falsifier.search.events import (
     RunStarted,
 )
 from falsifier.search.findings import Finding
+from falsifier.search.levels import Level, reached
 from falsifier.search.parameterization import inexpressible
-from falsifier.search.proposals import proposals
 from falsifier.search.result import Result, ResultStatus
+from falsifier.search.steps import Live, Steps
 from falsifier.search.vacuity import Vacuity
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
-
-
-class Steps(Protocol):
-    """The steps that the loop delegates: carried out live, or taken from a record."""
-
-    @property
-    def replayed(self) -> int:
-        """Number of evaluations taken from a record."""
-        ...
-
-    @property
-    def seconds(self) -> float:
-        """Wall-clock seconds of the recorded part of the run."""
-        ...
-
-    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
-        ...
-
-    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Yield the candidates' evaluations in order."""
-        ...
-
-    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
-        """Check a violation, given the index of its evaluation."""
-        ...
-
-    def chat(self, inner: Chat) -> Chat:
-        """Return the chat that an engine should ask instead of its own."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Live:
-    """Carries out every step.
-
-    Attributes:
-        executor: runs the simulations; None: this process.
-    """
-
-    executor: Executor | None = None
-    replayed: int = 0
-    seconds: float = 0.0
-
-    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Ask the engine, and measure the time."""
-        started = perf_counter()
-        candidates = proposals(engine, problem.space, wanted)
-        return candidates, wanted, perf_counter() - started
-
-    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Simulate and judge on the executor."""
-        return evaluate_all(problem, candidates, self.executor)
-
-    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
-        """Simulate again with a fresh instance; the index is for replay only."""
-        return confirm(problem, evaluation)
-
-    def chat(self, inner: Chat) -> Chat:
-        """Return the engine's own chat."""
-        return inner
 
 
 def search(
@@ -107,7 +43,7 @@ def search(
     *,
     steps: Steps | None = None,
     batch: int = 1,
-    searched: SearchSpace | None = None,
+    levels: Sequence[Level] = (),
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
 ) -> list[Result]:
@@ -123,7 +59,8 @@ def search(
         budget: limits of the run.
         steps: how to ask, simulate and confirm; default: everything in this process.
         batch: number of candidates to ask for and simulate at a time.
-        searched: the part of the search space that the engines use; default: all of it.
+        levels: the parts of the search space that the engines use, and from which simulation on; default: all
+            of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
 
@@ -140,7 +77,8 @@ def search(
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
-    loop = _Loop(targets, searched or problems[0].space, budget, steps or Live(), directory, tuple(listeners))
+    levels = tuple(levels) or (Level(0, problems[0].space),)
+    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners))
     status: ResultStatus
     try:
         loop.attach()
@@ -193,14 +131,14 @@ class _Loop:
     def __init__(
         self,
         targets: list[_Target],
-        searched: SearchSpace,
+        levels: tuple[Level, ...],
         budget: Budget,
         steps: Steps,
         directory: Path | None,
         listeners: tuple[Listener, ...],
     ) -> None:
         self.targets = targets
-        self.searched = searched
+        self.levels = levels
         self.budget = budget
         self.steps = steps
         self.directory = directory
@@ -230,7 +168,8 @@ class _Loop:
                 problems=tuple(t.problem for t in self.targets),
                 engines=tuple(t.engine.name for t in self.targets),
                 budget=self.budget,
-                searched=self.searched,
+                searched=self.levels[-1].space,
+                levels=self.levels if len(self.levels) > 1 else (),
                 replayed=self.steps.replayed,
             )
         )
@@ -381,7 +320,7 @@ class _Loop:
         """Return what the search could not show about a requirement that it did not falsify."""
         if target.best is None:
             return ()
-        limits = inexpressible(target.problem, self.searched)
+        limits = inexpressible(target.problem, self.levels, len(target.evaluations))
         return (*target.vacuity.findings(), *([limits] if limits else []))
 
     def remarks(self, target: _Target) -> tuple[str, ...]:
@@ -391,6 +330,7 @@ class _Loop:
 
     def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample
+        begun = reached(self.levels, len(target.evaluations))
         return Result(
             problem=target.problem,
             status=status if found is None else "falsified",
@@ -401,7 +341,8 @@ class _Loop:
             refuted=tuple(c for c in target.doubtful if c.outcome == "refuted"),
             fragile=tuple(c for c in target.doubtful if c.outcome == "fragile"),
             spent=target.spent or self.clock(),
-            searched=self.searched,
+            searched=begun[-1].space,
+            levels=self.levels if len(self.levels) > 1 else (),
             findings=() if found is not None else self.findings(target),
             directory=self.directory,
             remarks=self.remarks(target),

@@ -18,9 +18,10 @@ from falsifier.errors import JournalError, rejected
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.source import Parameterization
+from falsifier.problem.source import Searched
 from falsifier.search.journal import MANIFEST, read_manifest
-from falsifier.search.parameterization import parameterization_of, searched_space
+from falsifier.search.parameterization import parameterization_note, parameterization_of
+from falsifier.search.refine import levels_of
 from falsifier.search.request import RunRequest
 
 _RECORDED_PACKAGES = ("fmpy", "litellm", "numba", "numpy", "rtamt", "scipy")
@@ -65,6 +66,13 @@ class RequirementRecord(_Strict):
         )
 
 
+class LevelRecord(_Strict):
+    """One level of a search that refines its inputs."""
+
+    first: int = Field(description="Number of simulations before it.")
+    searched: str = Field(description="How it searches the inputs, in words.")
+
+
 class Manifest(_Strict):
     """Content of manifest.json: everything needed to repeat the run and to report on it."""
 
@@ -80,8 +88,12 @@ class Manifest(_Strict):
         description="Hash of what is searched and how it is simulated, by requirement."
     )
     model: str = Field(description="Name of the model.")
-    parameterization: Parameterization = Field(
-        description="free: the engine could choose the control points of at least one input."
+    parameterization: Searched = Field(
+        description="free: the engine could choose the control points of at least one input; refined: only "
+        "after a search with the spec's own."
+    )
+    levels: tuple[LevelRecord, ...] = Field(
+        (), description="If the inputs are refined step by step: the levels, coarse first."
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
@@ -142,6 +154,8 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
     """Make the manifest of a run before it starts."""
     problem = problems[0]
     space = problem.space
+    levels = levels_of(request, space)
+    is_refined = len(levels) > 1
     return Manifest(
         **environment(),
         request=request,
@@ -149,7 +163,11 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
-        parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
+        parameterization="refined" if is_refined else parameterization_of(levels[0].space),
+        levels=tuple(
+            LevelRecord(first=level.first, searched=parameterization_note(level.space))
+            for level in (levels if is_refined else ())
+        ),
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
         modes=tuple(_modes(problem)),

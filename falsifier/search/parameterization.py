@@ -5,11 +5,16 @@ from collections.abc import Sequence
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted, parameterization_text
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.problem.freedom import default_freedom, smallest_window
+from falsifier.problem.freedom import smallest_window
 from falsifier.problem.problem import Problem
+from falsifier.problem.refinement import coarse_inputs, limits_of
 from falsifier.problem.source import Parameterization
 from falsifier.search.findings import Finding
+from falsifier.search.levels import Level, reached
 from falsifier.search.request import LLMSettings
+
+# The option that tries faster inputs after the slow ones.
+_REFINE = "falsifier run ... --refine (slow inputs first, then faster ones)"
 
 
 def engine_parameterization(engine: str | None, llm: LLMSettings | None) -> Parameterization:
@@ -45,19 +50,29 @@ def parameterization_note(space: SearchSpace) -> str:
     return f"{parameterization_of(space)} parameterization: {'; '.join(told)}" if told else ""
 
 
-def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
-    """Return what the fixed control points of a search could not express; None if they left nothing out."""
-    formula, experiment = problem.requirement.formula, problem.experiment
-    limits = default_freedom([str(formula)], stop_time=experiment.stop_time, step=experiment.output_interval)
-    coarse = [r for r in searched.inputs if r.free is None and r.control_points < limits.max_control_points]
+def inexpressible(problem: Problem, levels: Sequence[Level], simulations: int) -> Finding | None:
+    """Return what the fixed control points of a search could not express; None if they left nothing out.
+
+    Args:
+        problem: what was searched.
+        levels: the levels of the search, coarse first.
+        simulations: number of simulations of the search.
+    """
+    formula = problem.requirement.formula
+    begun = reached(levels, simulations)
+    searched = begun[-1].space
+    coarse = coarse_inputs(searched, limits_of([problem]))
     if not coarse:
         return None
     slow = "; ".join(_fastest(r, searched) for r in coarse)
     window = smallest_window([formula])
     against = "" if window is None else f". The formula's smallest window is {window:g} s"
+    remedy = _remedy(problem, coarse)
+    if len(begun) < len(levels):
+        remedy = f"a larger budget; the search ended on level {len(begun)} of {len(levels)}"
     return Finding(
         kind="parameterization",
-        text=f"Faster inputs were not tried: {slow}{against}. To try them: {_remedy(problem, coarse)}.",
+        text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}.",
     )
 
 
@@ -75,7 +90,7 @@ def _fastest(r: InputRange, space: SearchSpace) -> str:
 
 
 def _remedy(problem: Problem, coarse: Sequence[InputRange]) -> str:
-    """Say what allows faster inputs, depending on why they were not."""
+    """Say what allows faster inputs, depending on why there were none."""
     source, own = problem.source, {r.name: r for r in problem.space.inputs}
     if any(own[r.name].free for r in coarse):
         return f"--engine {DEFAULT_ENGINE}, which chooses control points itself"
@@ -85,14 +100,12 @@ def _remedy(problem: Problem, coarse: Sequence[InputRange]) -> str:
     open_ = [r for r in coarse if r.name in stated]
     if open_:
         options = " ".join(f"--input {r.name}={r.low:g}:{r.high:g}" for r in open_)
-        return f"{options}, without a number of control points"
-    limits = default_freedom(
-        [str(problem.requirement.formula)],
-        stop_time=problem.experiment.stop_time,
-        step=problem.experiment.output_interval,
-    )
+        return f"{_REFINE}, or {options} without a number of control points"
+    limits = limits_of([problem])
     count, shortest = limits.max_control_points, limits.min_interval
-    if source is None or source.parts.kind == "python":
-        return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
-    name = coarse[0].name
-    return f"free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in [inputs.{name}]"
+    if source is None:
+        return f"falsify(..., refine=True), or InputRange(..., free=Freedom({count}, {shortest:g}))"
+    if source.parts.kind == "python":
+        return f"{_REFINE}, or InputRange(..., free=Freedom({count}, {shortest:g}))"
+    free = f"free = {{ max_control_points = {count}, min_interval = {shortest:g} }}"
+    return f"{_REFINE}, or {free} in [inputs.{coarse[0].name}]"

@@ -18,9 +18,9 @@ from falsifier.llm.messages import Chat
 from falsifier.llm.replay import RecordedChat, Recording
 from falsifier.problem.problem import Problem
 from falsifier.search.journal import recorded_evaluations, recorded_exchanges
-from falsifier.search.loop import Steps
 from falsifier.search.proposals import proposals
 from falsifier.search.records import AskedRecord, ConfirmedRecord, EndedRecord, Record
+from falsifier.search.steps import Steps
 
 
 @dataclass(slots=True)

@@ -10,6 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
+from falsifier.search.levels import Level
 
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
@@ -30,6 +31,7 @@ class Result:
         fragile: violations that disappear at half the communication step.
         spent: what the run has spent; if falsified, until the counterexample was confirmed.
         searched: the part of the search space that the engine used; None: all of it.
+        levels: if the inputs are refined step by step: all levels, coarse first.
         findings: what the search could not show; empty if falsified.
         directory: the run directory, or None.
         remarks: what the engine says of how it worked, such as how many samples are a fallback's.
@@ -46,6 +48,7 @@ class Result:
     fragile: tuple[Confirmation, ...] = ()
     spent: Spent = field(default_factory=Spent)
     searched: SearchSpace | None = None
+    levels: tuple[Level, ...] = ()
     findings: tuple[Finding, ...] = ()
     directory: Path | None = None
     unrecorded: str = ""

@@ -18,18 +18,21 @@ from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
+from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.events import Listener
 from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.search.leaders import make_engines
-from falsifier.search.loop import Live, Steps, search
+from falsifier.search.levels import Level
+from falsifier.search.loop import search
 from falsifier.search.manifest import Manifest
-from falsifier.search.parameterization import searched_space
+from falsifier.search.refine import level_starts, levels_of, make_refining
 from falsifier.search.replay import replayed
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
+from falsifier.search.steps import Live, Steps
 
 Falsifiable = Problem | ProblemSource | str
 LLM = LLMSettings | Chat | str
@@ -46,6 +49,7 @@ def falsify(
     directory: Path | str | None = ...,
     jobs: int = ...,
     start_from: Iterable[Candidate] = ...,
+    refine: bool = ...,
     listeners: Iterable[Listener] = ...,
 ) -> Result: ...
 
@@ -61,6 +65,7 @@ def falsify(
     directory: Path | str | None = ...,
     jobs: int = ...,
     start_from: Iterable[Candidate] = ...,
+    refine: bool = ...,
     listeners: Iterable[Listener] = ...,
 ) -> list[Result]: ...
 
@@ -77,6 +82,7 @@ def falsify(
     directory: Path | str | None = ...,
     jobs: int = ...,
     start_from: Iterable[Candidate] = ...,
+    refine: bool = ...,
     listeners: Iterable[Listener] = ...,
 ) -> list[Result]: ...
 
@@ -91,6 +97,7 @@ def falsify(
     directory: Path | str | None = None,
     jobs: int = 1,
     start_from: Iterable[Candidate] = (),
+    refine: bool = False,
     listeners: Iterable[Listener] = (),
 ) -> Result | list[Result]:
     """Search for inputs that violate one requirement, or several.
@@ -110,6 +117,8 @@ def falsify(
         jobs: number of simulations at a time.
         start_from: known candidates, which are simulated first and count in the budget; they are fitted to
             the search space.
+        refine: search inputs with their own control points first, then faster ones, level by level; each
+            level gets the same share of the budget.
         listeners: called with every event.
 
     Returns:
@@ -134,18 +143,24 @@ def falsify(
     check_names(problems)
     _check_engine(engine)
     seed, jobs, limits = whole("seed", seed, least=0), whole("jobs", jobs, least=1), _budget(budget)
+    if refine and not isinstance(engine, str | None):
+        raise SpecError("refine: each level has an engine of its own: pass the name of an engine instead")
     groups, known = alike(problems), list(start_from)
     chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
+    name, settings = engine if isinstance(engine, str) or engine is None else engine.name, _settings(llm)
     results: dict[str, Result] = {}
-    for group in groups:
+    for same in groups:
+        group = widened(same) if refine else same
+        space = group[0].space
         request = RunRequest(
             problems=_sources(group) if directory is not None else (),
-            engine=engine if isinstance(engine, str) or engine is None else engine.name,
-            llm=_settings(llm),
+            engine=name,
+            llm=settings,
+            levels=level_starts(space, name, settings, limits) if refine else (),
             seed=seed,
             budget=limits,
             jobs=jobs,
-            start_from=tuple(fit(group[0].space, each).candidate.to_json() for each in known),
+            start_from=tuple(fit(space, each).candidate.to_json() for each in known),
         )
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
@@ -214,7 +229,11 @@ def resume(
             raise JournalError(
                 f"{place}: this run's engine was made in Python: call resume() with engine=..."
             )
-        loaded = _given(problems, described, place) if problems else load_sources(request.problems)
+        if problems:
+            loaded = _given(problems, described, place)
+            loaded = widened(loaded) if request.levels else loaded
+        else:
+            loaded = load_sources(request.problems)
         results += carry_out(
             request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
         )
@@ -263,7 +282,8 @@ def carry_out(
                 "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
-        made = [engine] if engine is not None else make_engines(request, problems, chat)
+        levels = levels_of(request, problems[0].space)
+        made = [engine] if engine is not None else _engines(request, problems, levels, chat)
         known = deque(map(Candidate.from_json, request.start_from))
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
         live = Live(stack.enter_context(local_executor(request.jobs)))
@@ -286,10 +306,18 @@ def carry_out(
             request.budget,
             steps=steps,
             batch=request.jobs,
-            searched=searched_space(problems[0].space, request.engine, request.llm),
+            levels=levels,
             directory=directory,
             listeners=all_listeners,
         )
+
+
+def _engines(
+    request: RunRequest, problems: Sequence[Problem], levels: Sequence[Level], chat: Chat | None
+) -> list[Engine]:
+    if request.levels:
+        return list(make_refining(request, problems, levels, chat))
+    return make_engines(request, problems, chat)
 
 
 def _given(problems: Sequence[Problem], described: Manifest, place: Path) -> list[Problem]:

@@ -1,5 +1,6 @@
 """Why a robustness value is what it is, in words and as data for plots."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,8 @@ class Step:
         time: time in s at which it was evaluated.
         value: its robustness at that time.
         window: start and end in s of its operator's window; None if it has no window.
-        text: what happened here, in words.
+        text: what happened here, in words that name the operator.
+        plain: the same for readers who do not know the operators.
     """
 
     formula: Formula
@@ -41,6 +43,7 @@ class Step:
     value: float
     window: tuple[float, float] | None
     text: str
+    plain: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +102,15 @@ class Diagnosis:
     @property
     def text(self) -> str:
         """The path in words, followed by the vacuous implications."""
-        *above, predicate = (step.text for step in self.path)
+        return self._told([step.text for step in self.path])
+
+    @property
+    def plain(self) -> str:
+        """The same for readers who do not know the operators of formulas."""
+        return self._told([step.plain for step in self.path])
+
+    def _told(self, steps: Sequence[str]) -> str:
+        *above, predicate = steps
         decided = f"{'; '.join(above)}: {predicate}" if above else predicate
         return " ".join((f"{decided}.", *(v.text for v in self.vacuities)))
 
@@ -119,11 +130,12 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
         formula, time = here.part.formula, float(times[here.sample])
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
         if isinstance(formula, Predicate):
-            text = _comparison(formula, here.value, trajectory.at(time))
+            text = plain = _comparison(formula, here.value, trajectory.at(time))
         else:
             decided_at = float(times[following.sample])
             text = _words(formula, following.part.formula, window, decided_at, here.value)
-        steps.append(Step(formula, time, here.value, window, text))
+            plain = _plain(formula, following.part.formula, window, decided_at, here.value) or text
+        steps.append(Step(formula, time, here.value, window, text, plain))
     vacuities = {
         v.implication: v for part in root.walk() for v in [_vacuity(part, buffer, times)] if v is not None
     }
@@ -167,6 +179,26 @@ def _words(
         case And(left, _) | Or(left, _) | Iff(left, _):
             name = {And: "and", Or: "or", Iff: "<->"}[type(formula)]
             return f"the {'left' if decider is left else 'right'} side of '{name}' decided"
+    return ""
+
+
+def _plain(
+    formula: Formula, decider: Formula, window: tuple[float, float] | None, time: float, value: float
+) -> str:
+    """Say what happened without the name of the operator; empty if that has no name of its own."""
+    start, end = window or (0.0, 0.0)
+    match formula:
+        case Always():
+            return f"from {_n(start)} to {_s(end)}, the worst moment is {_s(time)}"
+        case Eventually():
+            return f"from {_n(start)} to {_s(end)}, the best moment is {_s(time)}"
+        case Until(left, _):
+            what = "what must hold until then" if decider is left else "what must happen"
+            return f"from {_n(start)} to {_s(end)}, {what} decided at {_s(time)}"
+        case Implies(left, _):
+            if decider is left:
+                return "the condition (the part after 'if') decided"
+            return f"the condition was met, and what must follow {'decided' if value >= 0 else 'failed'}"
     return ""
 
 

@@ -5,15 +5,8 @@ from typing import Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, listed
-from falsifier.search.coverage import (
-    FAST,
-    PACES,
-    SLOW,
-    Coverage,
-    ModeCoverage,
-    PairCoverage,
-    RangeCoverage,
-)
+from falsifier.search.coverage import Coverage, ModeCoverage, PairCoverage, RangeCoverage
+from falsifier.search.parts import FAST, PACES, SLOW
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8

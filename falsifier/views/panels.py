@@ -3,8 +3,8 @@
 Both the matplotlib figures and the charts in reports are drawn from these panels.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -77,6 +77,7 @@ class Panel:
         points: control points (time, value) of an input.
         limits: range of an input.
         steps: whether values are held until the next sample.
+        labels: names of its numbers if these are whole, empty if they have none; None for real values.
     """
 
     title: str
@@ -87,6 +88,7 @@ class Panel:
     points: tuple[tuple[float, float], ...] = ()
     limits: tuple[float, float] | None = None
     steps: bool = False
+    labels: Mapping[int, str] | None = None
 
 
 def panels(
@@ -95,10 +97,21 @@ def panels(
     candidate: Candidate,
     inputs: Iterable[Range],
     verdict: Verdict | None,
+    labels: Mapping[str, Mapping[int, str]] | None = None,
 ) -> list[Panel]:
-    """Make the panels of one simulation: one per compared quantity, then one per searched input."""
+    """Make the panels of one simulation: one per compared quantity, then one per searched input.
+
+    Args:
+        formula: the requirement.
+        trajectory: what was simulated.
+        candidate: the inputs.
+        inputs: the searched inputs.
+        verdict: robustness, and what decided it.
+        labels: names of the numbers of signals that are not real, by signal.
+    """
     quantities = [_quantity(trajectory, predicates, verdict) for predicates in _compared(formula).values()]
-    return quantities + [_input(r, trajectory, candidate) for r in inputs]
+    drawn = quantities + [_input(r, trajectory, candidate) for r in inputs]
+    return [_discrete(panel, labels or {}) for panel in drawn]
 
 
 def judged_windows(
@@ -159,6 +172,11 @@ def _input(r: Range, trajectory: Trajectory, candidate: Candidate) -> Panel:
         limits=(float(_drawable(r.low)), float(_drawable(r.high))),
         steps=signal.interpolation == "constant",
     )
+
+
+def _discrete(panel: Panel, labels: Mapping[str, Mapping[int, str]]) -> Panel:
+    name = panel.title.partition(" [")[0]
+    return replace(panel, labels=labels[name], steps=True) if name in labels else panel
 
 
 def _evaluated(expression: Expression, trajectory: Trajectory) -> Array:

@@ -16,6 +16,7 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
+from falsifier.search.levels import Level, level_name
 from falsifier.search.parameterization import parameterization_note
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
@@ -52,17 +53,18 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     progress = Progress(*columns, console=console, transient=True)
     with moving(progress):
         task = progress.add_task("starting", total=None, note="")
-        warn, aims = FailureWarning(), AimNote()
+        warn, aims, levels = FailureWarning(), AimNote(), LevelNote()
 
         def show(event: Event) -> None:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
+                    levels.begin(event)
                     for line in _notes(event):
                         progress.console.print(line, highlight=False, markup=False)
                     progress.update(task, description=_title(event), total=total)
                 case Asked():
-                    for line in aims(event):
+                    for line in (*levels(event), *aims(event)):
                         progress.console.print(one_line(line), highlight=False, markup=False)
                 case Evaluated():
                     if warning := warn(event):
@@ -93,7 +95,7 @@ class PlainDisplay:
     def __init__(self, console: "Console") -> None:
         self._console = console
         self._warn = FailureWarning()
-        self._aims = AimNote()
+        self._aims, self._levels = AimNote(), LevelNote()
 
     def __call__(self, event: Event) -> None:
         """Print a line if the event deserves one."""
@@ -104,10 +106,11 @@ class PlainDisplay:
                 for problem in event.problems:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
+                self._levels.begin(event)
                 for line in _notes(event):
                     self._line(line)
             case Asked():
-                for line in self._aims(event):
+                for line in (*self._levels(event), *self._aims(event)):
                     self._line(line)
             case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
                 how = "timed out" if evaluation.status == "timeout" else evaluation.status
@@ -143,6 +146,29 @@ class FailureWarning:
             f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run counts as "
             "failed if more than half do"
         )
+
+
+class LevelNote:
+    """Tells what each level of a search that refines its inputs searches, when it begins."""
+
+    def __init__(self) -> None:
+        self._levels: list[tuple[int, Level]] = []
+        self._count = 0
+
+    def begin(self, event: RunStarted) -> None:
+        """Learn the levels of a run that starts."""
+        self._levels = list(enumerate(event.levels, start=1))
+        self._count = len(event.levels)
+
+    def __call__(self, event: Asked) -> list[str]:
+        """Return the lines to print; none if there is nothing to tell."""
+        begun = [pair for pair in self._levels if pair[1].first <= event.first]
+        self._levels = self._levels[len(begun) :]
+        return [
+            f"{level_name(number, self._count)}, from simulation {level.first + 1} on: "
+            f"{parameterization_note(level.space)}"
+            for number, level in begun
+        ]
 
 
 class AimNote:
@@ -215,6 +241,8 @@ def _notes(event: RunStarted) -> list[str]:
     """Return the parameterization, and what was chosen or ignored when the problems were loaded, once."""
     chosen = dict.fromkeys(note for problem in event.problems for note in problem.notes)
     parameterization = parameterization_note(event.searched)
+    if event.levels:
+        parameterization = f"inputs are refined in {len(event.levels)} levels, from coarse to fine"
     return [*([parameterization] if parameterization else []), *chosen]
 
 

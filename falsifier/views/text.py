@@ -7,20 +7,22 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted
+from falsifier.core.words import candidate_lines, counted, margin_words
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search import manifest
 from falsifier.search.assurance import Assurance
 from falsifier.search.budget import Spent
+from falsifier.search.levels import Outcome, outcomes
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
+    untested = ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{untested}"
     lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
@@ -30,7 +32,9 @@ def result_text(result: Result) -> str:
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += evaluation_lines(result.problem, shown)
-    if result.counterexample is None and result.searched is not None and result.searched.inputs:
+    if result.levels:
+        lines += [f"  {line}" for line in level_lines(result)]
+    elif result.counterexample is None and result.searched is not None and result.searched.inputs:
         lines.append(f"  inputs         {parameterization_note(result.searched)}")
     lines += [f"  note           {finding.text}" for finding in result.findings]
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
@@ -61,6 +65,7 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{robustness}{where}"
         )
+        lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
         lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
     falsified = sum(result.counterexample is not None for result in results)
@@ -88,7 +93,10 @@ def result_json(result: Result) -> dict[str, Any]:
         "reason": result.reason,
         "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
         "best": result.best and evaluation_json(result.best),
-        "parameterization": parameterization_of(result.searched or result.problem.space),
+        "parameterization": "refined"
+        if result.levels
+        else parameterization_of(result.searched or result.problem.space),
+        "levels": _levels_json(result),
         "findings": [asdict(finding) for finding in result.findings],
         "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "remarks": list(result.remarks),
@@ -96,6 +104,33 @@ def result_json(result: Result) -> dict[str, Any]:
         "spent": spent,
         "directory": result.directory and str(result.directory),
     }
+
+
+def level_lines(result: Result) -> list[str]:
+    """Say of each level of a search that refined its inputs what was searched, and what came of it."""
+    return [
+        f"{found.name:<14} {found.text}: {parameterization_note(level.space)}"
+        for level, found in zip(result.levels, _outcomes(result), strict=True)
+    ]
+
+
+def _outcomes(result: Result) -> tuple[Outcome, ...]:
+    if not result.levels:
+        return ()
+    starts = [level.first for level in result.levels]
+    return outcomes(starts, [e.robustness for e in result.evaluations], falsified=result.falsified)
+
+
+def _levels_json(result: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            "searched": parameterization_note(level.space),
+            "simulations": found.simulations,
+            "smallest": found.smallest,
+            "falsified": found.falsified,
+        }
+        for level, found in zip(result.levels, _outcomes(result), strict=True)
+    ]
 
 
 def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
@@ -108,7 +143,7 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
             f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
             for name, value in verdict.values.items()
         )
-        lines.append(f"  robustness     {verdict.robustness:+.6g}")
+        lines.append(f"  robustness     {verdict.robustness:+.6g} ({margin_words(verdict.robustness)})")
         lines.append(f"  critical time  {verdict.critical_time:.6g} s, decided by {verdict.predicate}")
         lines.append(f"  values then    {values}")
     lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]
@@ -149,6 +184,7 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "tail": found.tail and asdict(found.tail),
         "estimate": found.splitting and asdict(found.splitting),
         "optimum": found.optimum,
+        "findings": [asdict(finding) for finding in found.findings],
         "interrupted": found.interrupted,
     }
 

@@ -1,6 +1,6 @@
 """Small campaigns over Python functions, and what is compared of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,8 +10,13 @@ import pytest
 from falsifier.campaigns import CampaignRequest, Method, cross
 from falsifier.campaigns.analysis import Run, load
 from falsifier.evaluation.workers import Workers
+from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
+from falsifier.search.journal import write_manifest
+from falsifier.search.manifest import describe
+from falsifier.search.request import RunRequest
+from tests.fmu.fixtures import path as fixture
 
 
 def request(
@@ -59,3 +64,12 @@ def _outcome(run: Run) -> tuple[object, ...]:
         run.counterexample,
         run.verdict,
     )
+
+
+def record_ad_hoc(folder: Path, formulas: Mapping[str, str]) -> None:
+    """Begin a run per formula without a name, each in the directory that it is given by."""
+    for place, formula in formulas.items():
+        problem = Problem.from_fmu(fixture("CheapLag_2"), formula, inputs={"u": (-1, 1, 3)}, stop_time=1.0)
+        asked = RunRequest(problems=(problem.source,) if problem.source else ())
+        (folder / place).mkdir()
+        write_manifest(folder / place, describe(asked, [problem], "uniform").model_dump(mode="json"))

@@ -3,6 +3,8 @@ from pathlib import Path
 from typing import Any
 
 from tests.cli.support import bench
+from tests.command import falsifier
+from tests.fmu.fixtures import path as fixture
 
 
 def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> None:
@@ -31,3 +33,10 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
     assert "1 of 2 counterexamples accepted" in result.stdout
     (found, other) = json.loads(command("validate", "v.csv", "--json").stdout)
     assert (found["holds"], other["holds"]) == (True, False)
+
+
+def test_two_formulas_are_refused_instead_of_the_last_one_taken(tmp_path: Path) -> None:
+    twice = ("--stl", "G (y <= 5)", "--stl", "G (y <= 6)")
+    done = falsifier("run", str(fixture("CheapLag_2")), *twice, cwd=tmp_path)
+    assert done.code == 2
+    assert "--stl: given 2 times" in done.err and "--all" in done.err

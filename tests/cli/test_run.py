@@ -217,3 +217,33 @@ def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) ->
     log = (tmp_path / "logs" / "fmu.txt").read_text()
     assert log.count("simulation ") == 8
     assert "  error: the solver did not converge: the valve is open too far" in log
+
+
+def test_refined_inputs_are_told_level_by_level(tmp_path: Path) -> None:
+    """A bug that only fast inputs reach: a level with the command's own control points does not find it."""
+    stl = ("--stl", "G[0,10] (u - y <= 1.5)", "--input", "u=-1:1:3", "--stop-time", "10")
+    search = ("--engine", "cma", "--budget", "30", "--out", "run", "--refine")
+    done = falsifier("run", str(fixture("CheapLag_2")), *stl, *search, cwd=tmp_path)
+    assert done.code == 1, done.err
+    first, second, third = re.findall(r"^  (level \d of 3 .*)$", done.out, re.MULTILINE)
+    assert "10 simulations, smallest robustness +0.5" in first
+    assert "falsified after" in second
+    assert "not begun" in third
+    assert "level 2 of 3, from simulation 11 on: fixed parameterization: u (4 control points" in done.err
+    again = falsifier("resume", "run", "--json", cwd=tmp_path)
+    assert again.code == 1
+    assert [level["falsified"] for level in again.json["levels"]] == [False, True, False]
+    page = falsifier("report", "run", "--out", "page.html", cwd=tmp_path)
+    assert page.code == 0
+    text = (tmp_path / "page.html").read_text()
+    assert "--refine</code>" in text
+    assert "falsified after" in text
+    assert falsifier("explain", "run", cwd=tmp_path).code == 0
+
+
+def test_known_inputs_of_a_refined_search_keep_what_its_finer_levels_can_express(tmp_path: Path) -> None:
+    (tmp_path / "u.csv").write_text("time,u\n0,-1\n4,-1\n4,1\n10,1\n")
+    known = ("--engine", "uniform", "--budget", "3", "--start-from", "u.csv", "--refine", "--json")
+    done = falsifier("run", "python:tests.problems:fast_only", *known, cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert done.json["spent"]["simulations"] == 1

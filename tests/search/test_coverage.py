@@ -40,25 +40,6 @@ def test_values_are_counted_where_they_were_in_time() -> None:
     assert (u.times[:19, 9] == 0).all() and (u.times[21:, 9] == 1).all()
 
 
-@pytest.mark.parametrize(
-    ("signal", "pace", "rate"),
-    [
-        (Signal((0.0,), (5.0,)), "constant", None),
-        (Signal((0.0, 10.0), (0.0, 100.0), "linear"), "slow", 10.0),
-        (Signal((0.0, 5.0, 6.0), (0.0, 0.0, 60.0), "linear"), "medium", 60.0),
-        (Signal((0.0, 5.0, 5.1), (0.0, 0.0, 60.0), "linear"), "fast", 600.0),
-        (Signal((0.0, 5.0), (0.0, 1.0), "constant"), "steps", None),
-        # Sampled and held: as what is sampled. Cubics are steepest between their points.
-        (Signal((0.0, 10.0), (0.0, 100.0), "linear", 0.5), "slow", 10.0),
-        (Signal((0.0, 5.0, 10.0), (0.0, 100.0, 0.0)), "medium", 40.0),
-    ],
-)
-def test_how_fast_an_input_changed(signal: Signal, pace: str, rate: float | None) -> None:
-    (u,) = tried(signal).ranges
-    assert [name for name, count in u.paces.items() if count] == [pace]
-    assert u.rate == (None if rate is None else pytest.approx(rate, rel=0.01))
-
-
 def test_the_shortest_time_between_two_changes_is_of_all_simulations() -> None:
     slow = Signal((0.0, 2.0, 6.0), (0.0, 1.0, 2.0), "constant")
     quick = Signal((0.0, 2.0, 2.5), (0.0, 1.0, 2.0), "constant")

@@ -16,9 +16,10 @@ from falsifier.search.assurance.assess import assess
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
 from falsifier.search.journal import read_journal
-from falsifier.search.loop import Live, search
+from falsifier.search.loop import search
 from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
 from falsifier.search.run import falsify
+from falsifier.search.steps import Live
 from falsifier.testing import lag_problem
 from tests.problems import broken, mostly_broken, never
 from tests.search.support import run

@@ -8,6 +8,7 @@ from falsifier.engines.box import BoxEngine
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.search.events import Event, RunStarted
+from falsifier.search.levels import Level
 from falsifier.search.parameterization import (
     engine_parameterization,
     inexpressible,
@@ -60,7 +61,7 @@ def test_an_input_that_only_a_free_parameterization_has_is_found_without_further
 
 
 def told(problem: Problem, engine: str = "surrogate") -> str:
-    finding = inexpressible(problem, searched_space(problem.space, engine, None))
+    finding = inexpressible(problem, [Level(0, searched_space(problem.space, engine, None))], 20)
     return finding.text if finding else ""
 
 
@@ -69,9 +70,12 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     stated = Problem.from_fmu(fmu_path("Lag_2"), formula, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
     assert told(stated) == (
         "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
-        "formula's smallest window is 1 s. To try them: --input u=-1:1, without a number of control points."
+        "formula's smallest window is 1 s. To try them: falsifier run ... --refine (slow inputs first, then "
+        "faster ones), or --input u=-1:1 without a number of control points."
     )
-    assert told(replace(stated, source=None)).endswith("InputRange(..., free=Freedom(200, 0.05)).")
+    assert told(replace(stated, source=None)).endswith(
+        "falsify(..., refine=True), or InputRange(..., free=Freedom(200, 0.05))."
+    )
 
 
 def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:

@@ -15,6 +15,7 @@ from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.plan import Method, method_of
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
+from falsifier.problem.defaults import STL_NAME
 from falsifier.search import manifest as manifests
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
@@ -45,6 +46,7 @@ class Run:
         trajectories: names of kept trajectory files, by index.
         spent: what it has spent.
         findings: what the search could not show; empty before it has ended.
+        requirement: name of the requirement; numbered if another run has another formula of the same name.
     """
 
     directory: Path
@@ -61,16 +63,18 @@ class Run:
     trajectories: dict[int, str]
     spent: Spent
     findings: tuple[Finding, ...] = ()
+    requirement: str
 
     @property
-    def requirement(self) -> str:
-        """Name of the requirement."""
-        return self.manifest.requirement.name
+    def is_ad_hoc(self) -> bool:
+        """Whether the requirement is a formula to which nobody gave a name."""
+        source = self.manifest.request.source
+        return source is not None and source.stl is not None and source.stl_name == STL_NAME
 
     @property
     def counterexample_file(self) -> Path:
         """Path of the counterexample, for ``falsifier replay``, which creates the file if it is missing."""
-        return self.directory / file_of(self.requirement if self.shared else "")
+        return self.directory / file_of(self.manifest.requirement.name if self.shared else "")
 
     @property
     def seed(self) -> int:
@@ -105,11 +109,13 @@ def load(directory: Path) -> list[Run]:
         JournalError: if the directory is none of these, or a file in it is invalid.
     """
     described = ((path, manifests.read(path)) for path in run_directories(directory))
-    return [
-        _run(path, manifest.of(name), shared=manifest.shared)
-        for path, manifest in described
-        for name in manifest.names
-    ]
+    return _told_apart(
+        [
+            _run(path, manifest.of(name), shared=manifest.shared)
+            for path, manifest in described
+            for name in manifest.names
+        ]
+    )
 
 
 def load_run(directory: Path, requirement: str | None = None) -> Run:
@@ -127,6 +133,20 @@ def load_run(directory: Path, requirement: str | None = None) -> Run:
         names = ", ".join(manifest.names)
         raise JournalError(f"{directory}: several requirements share this run; choose one of {names}")
     return _run(directory, manifest.of(requirement or manifest.names[0]), shared=manifest.shared)
+
+
+def _told_apart(runs: list[Run]) -> list[Run]:
+    """Number the names that stand for several formulas: runs of ``--stl`` all have the same name."""
+    formulas: dict[str, list[str]] = {}
+    for run in runs:
+        known = formulas.setdefault(run.requirement, [])
+        known += [run.manifest.requirement.formula] if run.manifest.requirement.formula not in known else []
+    return [
+        replace(run, requirement=f"{run.requirement}-{known.index(run.manifest.requirement.formula) + 1}")
+        if len(known := formulas[run.requirement]) > 1
+        else run
+        for run in runs
+    ]
 
 
 def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
@@ -147,6 +167,7 @@ def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
         trajectories=tally.trajectories,
         spent=tally.spent,
         findings=tally.findings,
+        requirement=manifest.requirement.name,
     )
 
 

@@ -1,7 +1,7 @@
 """What a search that found nothing cannot say: how probable a violation is, at most."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import counted
+from falsifier.core.words import counted, margin_words
 from falsifier.engines.box import UnitBox
 from falsifier.engines.uniform import Uniform
 from falsifier.errors import SimulationError, SpecError
@@ -19,6 +19,8 @@ from falsifier.search.assurance.bounds import interval, upper_bound
 from falsifier.search.assurance.distribution import distribution_text
 from falsifier.search.assurance.splitting import Splitting, least_budget, split
 from falsifier.search.assurance.tail import Tail, tail
+from falsifier.search.findings import Finding
+from falsifier.search.vacuity import Vacuity
 
 Progress = Callable[[int], None]
 
@@ -40,6 +42,7 @@ class Assurance:
         tail: estimate of the probability by extreme value theory; None if the draws do not allow one.
         splitting: estimate of the probability by splitting; None if it was not asked for.
         optimum: smallest robustness that a search found; None if none was given.
+        findings: what no simulation tested, as of a search; empty with violations.
         interrupted: whether the user stopped it; everything refers to what was drawn by then.
     """
 
@@ -55,6 +58,7 @@ class Assurance:
     tail: Tail | None
     splitting: Splitting | None
     optimum: float | None = None
+    findings: tuple[Finding, ...] = ()
     interrupted: bool = False
 
     @property
@@ -72,7 +76,11 @@ class Assurance:
             lines.append(
                 f"{counted(self.failures, 'simulation')} failed; the bound counts them as violations."
             )
-        lines.append(f"The smallest robustness of these was {self.smallest.robustness:+.6g}.")
+        if any(finding.untested for finding in self.findings):
+            lines.append("That is true, but says little: a part of the requirement was not tested.")
+        lines += [f"Note: {finding.text}" for finding in self.findings]
+        smallest = _robustness(self.smallest)
+        lines.append(f"The smallest robustness of these was {smallest:+.6g} ({margin_words(smallest)}).")
         if self.optimum is not None:
             lines.append(_optimum_text(self.optimum, _robustness(self.smallest)))
         if self.tail is not None:
@@ -157,6 +165,7 @@ def assess(
         tail=tail([_robustness(e) for e in judged], confidence=confidence, seed=seed),
         splitting=divided,
         optimum=optimum,
+        findings=() if violations else count.vacuity.findings(),
         interrupted=interrupted,
     )
 
@@ -174,17 +183,22 @@ def _drawn(count: "_Counted", engine: Uniform, wanted: int) -> tuple[list[Evalua
 
 @dataclass(slots=True)
 class _Counted:
-    """Evaluates candidates without keeping trajectories, and counts them."""
+    """Evaluates candidates without keeping trajectories, counts them, and notes what they do not test."""
 
     problem: Problem
     progress: Progress
     count: int = 0
+    vacuity: Vacuity = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.vacuity = Vacuity(self.problem)
 
     def __call__(self, candidate: Candidate) -> Evaluation:
-        evaluation = replace(evaluate(self.problem, candidate), trajectory=None)
+        evaluation = evaluate(self.problem, candidate)
+        self.vacuity.see(evaluation, self.count)
         self.count += 1
         self.progress(self.count)
-        return evaluation
+        return replace(evaluation, trajectory=None)
 
 
 def _for_splitting(budget: int, wanted: int | None) -> int:

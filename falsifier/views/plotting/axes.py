@@ -1,15 +1,19 @@
 """New axes, the figure that axes belong to, and text on it; without pyplot, which keeps global state."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from falsifier.core.literals import one_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # Maximum number of characters of a title or label.
 _LONGEST_CAPTION = 120
+# Maximum number of names beside an axis; of more, only numbers are shown.
+_MOST_TICKS = 12
 
 
 def caption(text: str) -> str:
@@ -17,6 +21,16 @@ def caption(text: str) -> str:
     line = one_line(text)
     shown = line if len(line) <= _LONGEST_CAPTION else f"{line[:_LONGEST_CAPTION]} ..."
     return shown.replace("$", r"\$")
+
+
+def whole_ticks(axis: "Axis", labels: Mapping[int, str]) -> None:
+    """Put ticks at whole numbers only, with their names if they have any."""
+    from matplotlib.ticker import MaxNLocator
+
+    if 0 < len(labels) <= _MOST_TICKS:
+        axis.set_ticks(sorted(labels), labels=[caption(labels[number]) for number in sorted(labels)])
+    else:
+        axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
 
 
 def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":

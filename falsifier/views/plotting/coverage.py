@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from falsifier.core.words import counted
 from falsifier.search.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
-from falsifier.views.plotting.axes import caption
+from falsifier.search.parts import labels_of
+from falsifier.views.plotting.axes import caption, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # What was never tried is red, as gaps must strike the eye; the more simulations, the darker the blue.
@@ -64,9 +66,12 @@ def _plot_input(ax: "Axes", r: RangeCoverage, stop_time: float) -> None:
     _heat(ax, np.linspace(0.0, stop_time, len(r.times) + 1), _ends(r), r.times.T)
     ax.set(xlabel="time [s]", ylabel=_label(r), title="simulations by value and time")
     ax.title.set_fontsize(9)
+    _whole(ax.yaxis, r)
 
 
 def _plot_parameter(ax: "Axes", r: RangeCoverage) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     ends = _ends(r)
     for low, high, count in zip(ends, ends[1:], r.parts, strict=False):
         if count:
@@ -74,6 +79,8 @@ def _plot_parameter(ax: "Axes", r: RangeCoverage) -> None:
         else:
             ax.axvspan(low, high, color=_NEVER, linewidth=0)
     ax.set(xlabel=_label(r), ylabel="simulations", xlim=(ends[0], ends[-1]))
+    _whole(ax.xaxis, r)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -> None:
@@ -81,6 +88,8 @@ def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -
     _heat(ax, _ends(first), _ends(second), p.tried.T.astype(np.intp))
     ax.set(xlabel=_label(first), ylabel=_label(second))
     ax.set_title(f"{p.count} of {p.tried.size} combinations", fontsize=9)
+    _whole(ax.xaxis, first)
+    _whole(ax.yaxis, second)
 
 
 def _plot_output(ax: "Axes", o: OutputCoverage) -> None:
@@ -108,6 +117,14 @@ def _ends(r: RangeCoverage) -> NDArray[np.float64]:
     if len(edges) == 1 or edges[0, 0] == edges[0, 1]:
         return np.array([*(edges[:, 0] - 0.5), edges[-1, 1] + 0.5])
     return np.array([*edges[:, 0], edges[-1, 1]])
+
+
+def _whole(axis: "Axis", r: RangeCoverage) -> None:
+    """Put the ticks of an integer, Boolean or enumeration at its numbers, with their names."""
+    if r.searched.kind != "real":
+        low, high = r.searched.low, r.searched.high
+        names = labels_of(r.searched.kind, r.searched.items)
+        whole_ticks(axis, {number: name for number, name in names.items() if low <= number <= high})
 
 
 def _label(r: RangeCoverage) -> str:

@@ -6,9 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
+from falsifier.campaigns.progress import total
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
+from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
+from falsifier.search.levels import outcomes
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse
 from falsifier.views.panels import Panel, panels
@@ -35,6 +39,7 @@ class Section:
 
     Attributes:
         name: name of the requirement.
+        heading: the name; of a formula without a name, the formula.
         formula: text of the formula.
         description: what it means.
         by_method: its runs by method.
@@ -42,6 +47,7 @@ class Section:
     """
 
     name: str
+    heading: str
     formula: str
     description: str
     by_method: dict[str, list[Run]]
@@ -88,6 +94,38 @@ def gather(directory: Path, published: Published | None = None) -> Content:
     )
 
 
+def outcome(section: Section) -> str:
+    """Return in words what came of a requirement, over all its runs."""
+    runs = section.runs
+    count = counted(total(run.spent for run in searches(runs)).simulations, "simulation")
+    found = [run for run in runs if run.falsified]
+    if found:
+        least = min(found, key=lambda run: run.simulations)
+        after = counted(least.simulations, "simulation")
+        of = "" if len(runs) == 1 else f" in {len(found)} of {len(runs)} runs, the quickest"
+        return f"falsified{of} after {after}{_where(least)}"
+    failed = [run for run in runs if run.status == "failed"]
+    if len(failed) == len(runs):
+        return f"failed: {failed[0].reason}"
+    if not any(run.finished for run in runs):
+        return "not finished"
+    tested = ""
+    if any(finding.untested for run in runs for finding in run.findings):
+        tested = ", and a part of it was not tested"
+    return f"not falsified in {count}{tested}{''.join(map(_where, _best(runs)))}"
+
+
+def _where(run: Run) -> str:
+    """Say how near a run came, and when, with the values of what decided."""
+    if run.verdict is None:
+        return ""
+    signals = parse(run.verdict.predicate).signals
+    values = "".join(f", {name} = {v:.6g}" for name, v in run.verdict.values.items() if name in signals)
+    robustness, time = abs(run.verdict.robustness), run.verdict.critical_time
+    what = f"by {robustness:.4g}" if run.falsified else f"{robustness:.4g} away from a violation"
+    return f": {what} at t = {time:.6g} s ({run.verdict.predicate}{values})"
+
+
 def findings_lines(section: Section) -> list[str]:
     """Return what the searches of a requirement could not show, one line each."""
     return [
@@ -95,6 +133,15 @@ def findings_lines(section: Section) -> list[str]:
         for run in section.runs
         for finding in run.findings
     ]
+
+
+def level_facts(run: Run) -> list[tuple[str, str]]:
+    """Return what came of each level of a run that refined its inputs, and what the level searched."""
+    levels = run.manifest.levels
+    if not levels:
+        return []
+    found = outcomes([level.first for level in levels], list(run.robustness), falsified=run.falsified)
+    return [(each.name, f"{each.text}: {level.searched}") for level, each in zip(levels, found, strict=True)]
 
 
 def replay_command(run: Run) -> str:
@@ -129,7 +176,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--stl", problem.stl),
         ("--profile", problem.profile),
         ("--parameterization", None if problem.parameterization == "free" else problem.parameterization),
-        *options_from(problem.changes),
+        *options_from(without_limits(problem.changes) if request.levels else problem.changes),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
@@ -138,6 +185,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
         ("--all", True if shared else None),
+        ("--refine", True if request.levels else None),
     ]
     words = ["falsifier", "run", target]
     for name, value in options:
@@ -163,8 +211,12 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
     found = [run for run in runs if run.falsified] or _best(runs)
+    heading = requirement.formula if runs[0].is_ad_hoc else name
+    if heading != name and name != requirement.name:
+        heading = f"{name}: {heading}"
     return Section(
         name,
+        heading,
         requirement.formula,
         requirement.description,
         by_method,

@@ -30,13 +30,13 @@ def markdown_report(directory: Path) -> str:
 def _unshown(section: Section) -> str:
     """What the searches of a requirement could not show."""
     items = [f"- {markdown_text(one_line(line))}" for line in findings_lines(section)]
-    return "\n".join([f"## {markdown_text(section.name)}: what this does not show", "", *items])
+    return "\n".join([f"## {markdown_text(section.heading)}: what this does not show", "", *items])
 
 
 def _section(section: Section) -> str:
     """A falsified requirement, with the counterexample found in the fewest simulations."""
     run = min((run for run in section.runs if run.falsified), key=lambda run: run.simulations)
-    lines = [f"## {markdown_text(section.name)}: falsified", markdown_code(section.formula)]
+    lines = [f"## {markdown_text(section.heading)}: falsified", markdown_code(section.formula)]
     if run.verdict is not None:
         lines.append(
             f"Robustness {run.verdict.robustness:+.6g} at t = {run.verdict.critical_time:.6g} s, "

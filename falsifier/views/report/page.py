@@ -21,6 +21,8 @@ from falsifier.views.report.content import (
     Shown,
     findings_lines,
     gather,
+    level_facts,
+    outcome,
     replay_command,
     run_command,
     searches,
@@ -36,6 +38,10 @@ _HINT = (
 # some 20 kB, and a page that is sent around should stay below a few MB.
 _MOST_TALKS = 3
 _MOST_QUESTIONS = 30
+
+# Columns of the table that name a row, and those that are folded away so that the others fit on a screen.
+_KEYS = ("requirement", "method")
+_FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
 def html_report(directory: Path) -> str:
@@ -66,11 +72,12 @@ def page(content: Content) -> str:
     )
     body = el(
         "body",
-        el("a", "Skip to the results", href="#summary", class_="skip"),
+        el("a", "Skip to the results", href="#requirements", class_="skip"),
         el("header", el("h1", title), el("p", _overview(content))),
         _navigation(content),
         el(
             "main",
+            _requirements(content),
             _summary(content),
             *(_section(section, fineness, most) for section in content.sections),
             _environment(content),
@@ -105,31 +112,48 @@ def _overview(content: Content) -> str:
 
 
 def _navigation(content: Content) -> Html:
-    names = [("summary", "Summary"), *((_anchor(s), s.name) for s in content.sections)]
-    links = [el("li", el("a", name, href=f"#{anchor}")) for anchor, name in names]
-    links.append(el("li", el("a", "Environment", href="#environment")))
+    names = {"requirements": "Requirements", "summary": "Numbers"}
+    names |= {_anchor(section): section.name for section in content.sections} | {"environment": "Environment"}
+    links = [el("li", el("a", name, href=f"#{anchor}")) for anchor, name in names.items()]
     return el("nav", el("ul", *links), aria_label="Sections")
 
 
+def _requirements(content: Content) -> Html:
+    """One line per requirement: what came of it, and what it means."""
+    rows = tuple((s.name, outcome(s), s.description or s.formula) for s in content.sections)
+    table = Table("Requirements", ("requirement", "result", "meaning"), rows)
+    return el(
+        "section", el("h2", "Requirements"), _table(table, _anchors(content), "words"), id="requirements"
+    )
+
+
 def _summary(content: Content) -> Html:
-    anchors = {section.name: _anchor(section) for section in content.sections}
+    anchors, table = _anchors(content), content.table
+    main = table.only(*(name for name in table.header if name not in _FOLDED))
+    folded = table.only(*(name for name in table.header if name in (*_KEYS, *_FOLDED)))
     return el(
         "section",
-        el("h2", "Summary"),
-        _table(content.table, anchors),
+        el("h2", "Numbers"),
+        _table(main, anchors),
+        el("details", el("summary", "Spread, times, tokens and cost"), _table(folded, anchors)),
         *(el("p", note, class_="note") for note in content.table.notes),
         el("p", _HINT, class_="note hint"),
         id="summary",
     )
 
 
-def _table(table: Table, anchors: dict[str, str]) -> Html:
+def _anchors(content: Content) -> dict[str, str]:
+    return {section.name: _anchor(section) for section in content.sections}
+
+
+def _table(table: Table, anchors: dict[str, str], kind: str = "") -> Html:
     header = el("tr", *(el("th", name, scope="col") for name in table.header))
     rows = []
     for row in table.rows:
         first = el("a", row[0], href=f"#{anchors[row[0]]}") if row[0] in anchors else row[0]
         rows.append(el("tr", el("th", first, scope="row"), *(el("td", cell) for cell in row[1:])))
-    return _scrolling(el("table", el("thead", header), el("tbody", *rows)), table.title)
+    body = el("table", el("thead", header), el("tbody", *rows), class_=kind or None)
+    return _scrolling(body, table.title)
 
 
 def _scrolling(content: Html, label: str) -> Html:
@@ -165,9 +189,11 @@ def _section(section: Section, fineness: int, most: int) -> Html:
     title = "Counterexamples" if found else "Closest to a violation"
     return el(
         "section",
-        el("h2", section.name),
+        el("h2", section.heading),
         el("p", section.description) if section.description else Html(""),
-        el("p", el("code", section.formula), class_="formula"),
+        el("p", el("code", section.formula), class_="formula")
+        if section.heading == section.name
+        else Html(""),
         *drawn,
         el("h3", title),
         *(_shown(shown, fineness, opened=i == 0) for i, shown in enumerate(section.shown)),
@@ -193,6 +219,7 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
     if run.simulations:
         facts.append(("time per iteration", _time(run)))
+    facts += level_facts(run)
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
         commands.insert(0, ("replay the counterexample", replay_command(run)))

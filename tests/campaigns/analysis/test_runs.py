@@ -21,6 +21,7 @@ from falsifier.search.records import (
     parse_line,
 )
 from falsifier.search.request import RunRequest
+from tests.campaigns.support import record_ad_hoc
 from tests.problems import easy
 
 
@@ -48,6 +49,14 @@ def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:
     assert len(long["best"]) == sum(run.simulations for run in runs)
     assert long["simulation"][: runs[0].simulations] == list(range(1, runs[0].simulations + 1))
     assert frame(runs).groupby("requirement").falsified.mean().to_dict() == {"HARD": 1.0, "NEVER": 0.0}
+
+
+def test_runs_of_formulas_without_a_name_are_told_apart(tmp_path: Path) -> None:
+    record_ad_hoc(tmp_path, {"a": "G (y <= 5)", "b": "G (y <= 6)", "c": "G (y <= 5)"})
+    runs = load(tmp_path)
+    assert [run.requirement for run in runs] == ["stl-1", "stl-2", "stl-1"]
+    assert all(run.is_ad_hoc for run in runs)
+    assert [run.requirement for run in load(tmp_path / "b")] == ["stl"]
 
 
 def test_a_folder_that_is_neither_is_named(tmp_path: Path) -> None:

@@ -53,6 +53,32 @@ def test_splitting_takes_its_part_of_the_budget_and_is_marked_as_an_estimate() -
     assert "Estimate, not a bound" in found.text
 
 
+def test_a_condition_that_never_held_makes_the_bound_say_little() -> None:
+    problem = lag_problem(
+        "G[0,10] (x >= 5 -> x <= 0)", inputs=0, parameters=[BIAS], response=direct, name="VACUOUS"
+    )
+    found = assess(problem, budget=30, seed=1)
+    run = falsify(problem, "uniform", budget=30, seed=1)
+    assert found.findings == run.findings
+    assert [finding.kind for finding in found.findings] == ["condition"]
+    for part in (
+        "the probability of a violation is at most 0.095",
+        "a part of the requirement was not tested",
+        "The condition x >= 5 never held in 30 simulations",
+        "x reached 0.9",
+    ):
+        assert part in found.text
+
+
+def test_a_requirement_that_nothing_moves_is_told() -> None:
+    still = lag_problem(
+        inputs=0, parameters=[BIAS], response=lambda times, *_: {"x": np.zeros_like(times)}, name="STILL"
+    )
+    found = assess(still, budget=30)
+    assert "Nothing that was searched has an effect on x" in found.text
+    assert not assess(system(0.8), budget=30).findings
+
+
 def test_failed_simulations_are_never_to_the_system_s_credit() -> None:
     found = assess(lag_problem("G[0,10] (x <= 3)", response=mostly_broken), budget=50, seed=1)
     assert found.violations == 0 and found.failures > 25

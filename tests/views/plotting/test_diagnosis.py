@@ -12,7 +12,7 @@ def test_each_operator_has_its_window_and_inner_ones_are_where_they_decided() ->
     evaluation = evaluate(problem, problem.space.decode([1.0, 1.0, 1.0, -1.0]))
     ax = Figure().subplots()
     plot_diagnosis(problem, evaluation, ax)
-    assert [text.get_text() for text in ax.texts] == ["G over [0, 7] s", "F over [0, 3] s"]
+    assert [text.get_text() for text in ax.texts] == ["x >= 0.5", "G over [0, 7] s", "F over [0, 3] s"]
     spans = [c.get_paths()[0].get_extents() for c in ax.collections if c.get_alpha() == 0.8]
     assert [(round(s.x0, 6), round(s.x1, 6)) for s in spans] == [(0.0, 7.0), (0.0, 3.0)]
     low, _ = ax.get_ylim()
@@ -22,4 +22,4 @@ def test_each_operator_has_its_window_and_inner_ones_are_where_they_decided() ->
 def test_without_axes_it_makes_a_figure() -> None:
     problem = lag_problem()
     figure = plot_diagnosis(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-    assert [text.get_text() for text in figure.axes[0].texts] == ["G over [0, 10] s"]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["x <= 0.9", "G over [0, 10] s"]

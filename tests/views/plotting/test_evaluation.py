@@ -1,14 +1,18 @@
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import FunctionModel
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.search.result import Result
 from falsifier.testing import START, lag_problem
-from falsifier.views.plotting import plot, plot_evaluation, plot_requirement, png, save_figure
+from falsifier.views.panels import Panel
+from falsifier.views.plotting import plot, plot_evaluation, plot_panel, plot_requirement, png, save_figure
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import hard, unusable
 from tests.views.plotting.support import simulated, xs, ys
@@ -50,8 +54,60 @@ def test_an_evaluation_has_a_panel_for_what_is_compared_and_for_each_input() -> 
     assert ys(points[0]).tolist() == [1.0, 1.0, 0.5, 1.0]
     low, high = input_.get_ylim()
     assert low < -1.0 and high > 1.0, "the whole range of the input is seen"
-    assert figure.get_suptitle().startswith("LAG: robustness ")
-    assert figure.get_suptitle().endswith("x0 = 0.25")
+    first, formula = figure.get_suptitle().splitlines()
+    assert first.startswith("LAG: violated, robustness -")
+    assert first.endswith("x0 = 0.25")
+    assert formula == "G[0,10] (x <= 0.9)"
+    assert [text.get_text() for text in output.texts] == ["x <= 0.9"]
+
+
+def test_a_nearest_miss_is_not_drawn_as_a_violation() -> None:
+    problem = lag_problem()
+    figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([0.0] * 4)))
+    assert figure.get_suptitle().startswith("LAG: not violated, robustness +0.9")
+    dots = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o"]
+    assert [dot.get_color() for dot in dots] == ["#b35900"]
+
+
+def test_a_margin_that_the_scale_hides_is_enlarged() -> None:
+    hidden = lag_problem("G[0,10] (x <= 0.99998)")
+    figure = plot_evaluation(hidden, evaluate(hidden, hidden.space.decode([1.0] * 4)))
+    (inside,) = figure.axes[0].child_axes
+    low, high = inside.get_ylim()
+    assert high - low < 0.2
+    seen = lag_problem("G[0,10] (x <= 0.5)")
+    figure = plot_evaluation(seen, evaluate(seen, seen.space.decode([1.0] * 4)))
+    assert not figure.axes[0].child_axes
+
+
+def test_whole_numbers_have_whole_ticks_and_the_names_of_their_items() -> None:
+    labels = {"state": {1: "Idle", 2: "Limp"}, "count": {}}
+    times = np.linspace(0.0, 10.0, 101)
+    for name, expected in (("state", ["Idle", "Limp"]), ("count", ["1", "2"])):
+        panel = Panel(name, times, np.where(times > 5, 2.0, 1.0), labels=labels[name])
+        figure = Figure()
+        ax = figure.subplots()
+        plot_panel(ax, panel)
+        figure.draw_without_rendering()
+        low, high = ax.get_ylim()
+        shown = [t for t in ax.yaxis.get_major_ticks() if low <= t.get_loc() <= high]
+        assert [tick.label1.get_text() for tick in shown] == expected
+
+
+def test_signals_that_are_not_real_are_drawn_in_steps_with_their_names() -> None:
+    problem = lag_problem()
+    assert problem.info.variables
+    variables = tuple(
+        replace(v, kind="enumeration", literals={"Off": 0, "On": 1}) if v.name == "x" else v
+        for v in problem.info.variables
+    )
+    model = FunctionModel(
+        lambda times, *_: {"x": np.ones_like(times)}, replace(problem.info, variables=variables)
+    )
+    modes = replace(problem, model=model)
+    figure = plot_evaluation(modes, evaluate(modes, modes.space.decode([1.0] * 4)))
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["Off", "On"]
+    assert figure.axes[0].get_lines()[0].get_drawstyle() == "steps-post"
 
 
 def test_bounds_are_drawn_in_their_window_only() -> None:
@@ -66,7 +122,7 @@ def test_plot_takes_results_counterexamples_and_trajectories() -> None:
     assert result.counterexample is not None
     titles = [plot(shown).get_suptitle() for shown in (result, result.counterexample)]
     assert titles[0] == titles[1]
-    assert f"HARD: robustness {result.counterexample.evaluation.robustness:+.5g}" in titles[0]
+    assert f"HARD: violated, robustness {result.counterexample.evaluation.robustness:+.5g}" in titles[0]
     trajectory = result.counterexample.evaluation.trajectory
     assert trajectory is not None
     assert len(plot(trajectory).axes) == 2

@@ -11,12 +11,16 @@ import re
 import shutil
 import subprocess
 from base64 import b64encode
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
+from falsifier.campaigns.analysis import Table
 from falsifier.views.report import html_report
+from falsifier.views.report.content import gather
+from falsifier.views.report.page import page as page_of
 from tests.patience import HANG
 
 CHROMIUM = os.environ.get("CHROMIUM") or next(
@@ -45,7 +49,9 @@ document.documentElement.setAttribute('data-probe', JSON.stringify({
   focusable: focusable.length, reached: reached.length, charts: charts.length, drawn: drawn.length,
   sideways: document.documentElement.scrollWidth - document.documentElement.clientWidth, ink, page,
   resources: performance.getEntriesByType('resource').length,
-  rows: document.querySelectorAll('#summary tbody tr').length,
+  wide: [...document.querySelectorAll('.scroll')]
+    .filter(e => e.checkVisibility() && e.scrollWidth > e.clientWidth).map(e => e.ariaLabel),
+  rows: document.querySelectorAll('#summary > .scroll tbody tr').length,
   numbers: [...document.querySelectorAll('details.numbers')].filter(e => e.open).length,
 }));
 };
@@ -99,7 +105,24 @@ def test_everything_is_drawn_and_reached_by_keyboard(page: Path, tmp_path: Path)
     assert seen["reached"] == seen["focusable"]
     assert seen["resources"] == 0
     assert seen["sideways"] == 0
+    assert seen["wide"] == []
     assert seen["ink"] == "rgb(27, 31, 36)"
+
+
+def test_a_table_with_published_columns_fits_on_a_screen(campaign: Path, tmp_path: Path) -> None:
+    """On a narrow one it scrolls within its own box, and the page does not."""
+    content = gather(campaign)
+    header = (*content.table.header, "rank", "best ARCH-COMP tool", "LLM-Falsifier", "uniform random")
+    method = "openai/gpt-5-mini-2025-08-07 MP4, high, free, anonymous"
+    cells = ("12 (tie)", "FReaK 10 / 4.8", "10 / 1000.0", "10 / 1000.0")
+    rows = tuple((row[0], method, *row[2:], *cells) for row in content.table.rows)
+    file = tmp_path / "wide.html"
+    table = Table("Falsification", header, rows)
+    file.write_text(page_of(replace(content, table=table, sections=[])), encoding="utf-8")
+    wide = probe(file, tmp_path, "--window-size=1300,5000")
+    assert (wide["sideways"], wide["wide"]) == (0, [])
+    narrow = probe(file, tmp_path, "--window-size=700,5000")
+    assert (narrow["sideways"], narrow["wide"]) == (0, ["Falsification"])
 
 
 def test_a_foreign_script_does_not_run(page: Path, tmp_path: Path) -> None:

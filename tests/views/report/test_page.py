@@ -149,9 +149,14 @@ def test_links_lead_somewhere_and_ids_are_unique(page: Element) -> None:
 
 def test_every_run_is_counted_and_every_counterexample_is_drawn(page: Element) -> None:
     assert "2 requirements, 8 runs, 4 falsified" in page.all("header")[0].content
-    rows = page.all("tbody")[0].all("tr")
+    falsified, not_falsified = (row.content for row in page.all("tbody")[0].all("tr"))
+    assert re.match(
+        r"HARDfalsified in 4 of 4 runs, the quickest after \d+ simulations?: by 0\.\d+", falsified
+    )
+    assert re.match(r"NEVERnot falsified in 80 simulations: 1\S* away from a violation", not_falsified)
+    rows = page.all("tbody")[1].all("tr")
     assert [row.content[:4] for row in rows] == ["HARD", "HARD", "NEVE", "NEVE"]
-    hard, never = page.all("section")[1:3]
+    hard, never = page.all("section")[2:4]
     counterexamples = [d for d in hard.all("details") if d.attributes.get("class") != "numbers"]
     assert len(counterexamples) == 4
     for details in counterexamples:
@@ -172,7 +177,7 @@ def test_every_run_is_counted_and_every_counterexample_is_drawn(page: Element) -
 
 
 def test_histories_show_every_simulation_and_the_best_so_far(page: Element) -> None:
-    hard, never = page.all("section")[1:3]
+    hard, never = page.all("section")[2:4]
     by_label = dict(
         zip([e.attributes["aria-label"] for e in hard.all("div", "history")], plots_of(hard), strict=False)
     )

@@ -1,0 +1,77 @@
+"""The steps of the loop that touch the world: asking engines, simulating, confirming."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines.protocol import Engine
+from falsifier.evaluation.confirm import Confirmation, confirm
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.workers import evaluate_all
+from falsifier.llm.messages import Chat
+from falsifier.problem.problem import Problem
+from falsifier.search.proposals import proposals
+
+
+class Steps(Protocol):
+    """The steps that the loop delegates: carried out live, or taken from a record."""
+
+    @property
+    def replayed(self) -> int:
+        """Number of evaluations taken from a record."""
+        ...
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock seconds of the recorded part of the run."""
+        ...
+
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
+        ...
+
+    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
+        """Yield the candidates' evaluations in order."""
+        ...
+
+    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
+        """Check a violation, given the index of its evaluation."""
+        ...
+
+    def chat(self, inner: Chat) -> Chat:
+        """Return the chat that an engine should ask instead of its own."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Carries out every step.
+
+    Attributes:
+        executor: runs the simulations; None: this process.
+    """
+
+    executor: Executor | None = None
+    replayed: int = 0
+    seconds: float = 0.0
+
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Ask the engine, and measure the time."""
+        started = perf_counter()
+        candidates = proposals(engine, problem.space, wanted)
+        return candidates, wanted, perf_counter() - started
+
+    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
+        """Simulate and judge on the executor."""
+        return evaluate_all(problem, candidates, self.executor)
+
+    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
+        """Simulate again with a fresh instance; the index is for replay only."""
+        return confirm(problem, evaluation)
+
+    def chat(self, inner: Chat) -> Chat:
+        """Return the engine's own chat."""
+        return inner
