@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
     from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for, simulate
-    from falsifier.fmu import FmuModel, read_info
+    from falsifier.fmu import Component, Connection, Coupling, FmuModel, System, read_info
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
@@ -91,8 +91,11 @@ _EXPORTS = {
     "CampaignRequest": "falsifier.campaigns",
     "Candidate": "falsifier.core.candidate",
     "Chat": "falsifier.llm.messages",
+    "Component": "falsifier.fmu",
     "Confirmation": "falsifier.evaluation.confirm",
+    "Connection": "falsifier.fmu",
     "DEFAULT_ENGINE": "falsifier.engines",
+    "Coupling": "falsifier.fmu",
     "Coverage": "falsifier.search.coverage",
     "Diagnosis": "falsifier.stl",
     "ENGINES": "falsifier.engines",
@@ -130,6 +133,7 @@ _EXPORTS = {
     "Spent": "falsifier.search.budget",
     "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
+    "System": "falsifier.fmu",
     "Tail": "falsifier.search.assurance",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
@@ -180,7 +184,10 @@ __all__ = [
     "CampaignRequest",
     "Candidate",
     "Chat",
+    "Component",
     "Confirmation",
+    "Connection",
+    "Coupling",
     "Coverage",
     "Diagnosis",
     "Engine",
@@ -217,6 +224,7 @@ __all__ = [
     "Spent",
     "Splitting",
     "StoredCounterexample",
+    "System",
     "Tail",
     "Trajectory",
     "Variable",
