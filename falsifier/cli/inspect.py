@@ -16,6 +16,7 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import parameterization_text
 from falsifier.errors import SpecError
+from falsifier.fmu import is_package, read_package
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems
@@ -74,24 +75,42 @@ def build(*, fmu: Path, out: Path | None) -> None:
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
-@out_option("Spec file to write; default: NAME.toml in the FMU's directory.")
+@click.argument("fmus", metavar="FMU...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
-def init(*, fmu: Path, out: Path | None, force: bool) -> None:
-    """Write a starter spec for an FMU: valid as written; fill in ranges and requirements."""
-    from falsifier.fmu import FmuModel, read_info
+def init(*, fmus: tuple[Path, ...], out: Path | None, force: bool) -> None:
+    """Write a starter spec: valid as written; fill in ranges and requirements.
 
-    source = _one_fmu(fmu)
-    path = out or fmu.with_suffix(".toml")
+    FMU is an FMU or an SSP package. Several FMUs become the components of a system, to be connected in the
+    spec.
+    """
+    path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
     if path.exists() and not force:
         raise SpecError(f"{path} already exists: choose another --out, or add --force to replace it")
-    found = read_info(source)
-    # Raises an error if the FMU cannot be simulated, before a useless spec is written.
-    FmuModel(source, interface=default_interface(found) or "co-simulation")
-    path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
+    path.write_text(_starter(fmus, path), encoding="utf-8")
     load_problems(str(path))
     command = f"falsifier run {shlex.quote(str(path))}"
     say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
+
+
+def _starter(fmus: tuple[Path, ...], path: Path) -> str:
+    from falsifier.fmu import FmuModel, System, read_info
+
+    if len(fmus) > 1:
+        parts: dict[str, Path] = {}
+        for source in map(_one_fmu, fmus):
+            name = source.stem if source.stem not in parts else f"{source.stem}{len(parts) + 1}"
+            parts[name] = source
+        info = System(dict(parts), name=path.stem).info
+        return starter_spec({name: _relative(source, path) for name, source in parts.items()}, info)
+    given = fmus[0]
+    if is_package(given):
+        return starter_spec(_relative(given, path), read_package(given).info)
+    source = _one_fmu(given)
+    found = read_info(source)
+    # Raises an error if the FMU cannot be simulated, before a useless spec is written.
+    FmuModel(source, interface=default_interface(found) or "co-simulation")
+    return starter_spec(_relative(source, path), found)
 
 
 @click.command()
@@ -172,6 +191,8 @@ def _named(given: Path) -> "Path | System":
     """Return the FMU that is given, or the FMU or system of the spec or bundled name that is given."""
     if given.suffix == ".toml":
         return _of_spec(given)
+    if is_package(given):
+        return read_package(given)
     if given.parent == Path() and not given.suffix and not (given.is_file() or _bundled_fmu(given).is_file()):
         return _of_spec(find_spec(str(given))[0])  # the name of a bundled requirement
     return _existing_fmu(given)
@@ -179,7 +200,10 @@ def _named(given: Path) -> "Path | System":
 
 def _of_spec(path: Path) -> "Path | System":
     spec = read_spec(path)
-    return make_system(spec, path) if spec.model.fmu is None else _existing_fmu(path.parent / spec.model.fmu)
+    if spec.model.fmu is None:
+        return make_system(spec, path)
+    fmu = path.parent / spec.model.fmu
+    return read_package(fmu) if is_package(fmu) else _existing_fmu(fmu)
 
 
 def _one_fmu(given: Path) -> Path:

@@ -80,7 +80,7 @@ def _fed(feed, count, start, middle):  # type: ignore[no-untyped-def]
         while start_of(pieces, 0, p + 1) <= start + rounding(start):
             p += 1
         store_i8(feed + 8 * PIECE, p)
-        return value_at(pieces, 0, p, start)
+        return load_f8(feed + 8 * FACTOR) * value_at(pieces, 0, p, start) + load_f8(feed + 8 * OFFSET)
     time = load_f8(source + 8 * TIME)
     if time < 0.0:
         return load_f8(feed + 8 * START)

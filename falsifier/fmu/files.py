@@ -19,6 +19,11 @@ def fmu_files(model: Model) -> dict[Path, str]:
     return {}
 
 
+def is_packaged(model: Model) -> bool:
+    """Whether a model comes from an SSP package, whose file stands for those of its FMUs."""
+    return isinstance(model, System) and model.package is not None
+
+
 def fmus_sha256(digests: Iterable[str]) -> str | None:
     """Return one hash for the FMUs with these hashes: that of a single FMU is its own; None without FMUs."""
     distinct = sorted(set(digests))

@@ -1,10 +1,11 @@
 """A system of FMUs as its workers get it: components, connections between scalars, order of stepping."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from falsifier.core.model import Variable
 from falsifier.fmu.description import Description
 
 Method = Literal["gauss-seidel", "jacobi"]
@@ -34,6 +35,29 @@ class Coupling:
     max_rounds: int = 100
 
 
+# Position of the system itself in a Place: an input of the whole, which feeds inputs of components.
+SYSTEM = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What a system has as a whole, beyond its components; SSP packages have it.
+
+    Attributes:
+        inputs: inputs of the system, which connections may name as sources.
+        outputs: other names of the components' outputs, with the names that they stand for.
+        values: values of parameters, start values and inputs, set unless a simulation sets others.
+        stop_time: stop time of the default experiment in s; None: the components'.
+        notes: what the user should know, one sentence each.
+    """
+
+    inputs: tuple[Variable, ...] = ()
+    outputs: tuple[tuple[str, str], ...] = ()
+    values: tuple[tuple[str, float | str], ...] = ()
+    stop_time: float | None = None
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Member:
     """One component.
@@ -57,7 +81,7 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a variable of a system is: position of the component, and its name there."""
+    """Where a variable of a system is: position of the component, or SYSTEM, and its name there."""
 
     member: int
     name: str
@@ -68,7 +92,7 @@ class Link:
     """A connection between two scalars: ``target = factor * source + offset``.
 
     Attributes:
-        source: an output.
+        source: an output, or an input of the system.
         target: an input.
         factor: factor of the conversion.
         offset: offset of the conversion.
@@ -112,4 +136,9 @@ class Network:
 
     def title(self, place: Place) -> str:
         """Return the name of a variable in the system."""
-        return f"{self.members[place.member].name}.{place.name}"
+        return title(self.members, place)
+
+
+def title(members: Sequence[Member], place: Place) -> str:
+    """Return the name of a variable in a system of these components."""
+    return place.name if place.member == SYSTEM else f"{members[place.member].name}.{place.name}"

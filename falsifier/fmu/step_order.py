@@ -8,7 +8,7 @@ are late by one communication step.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 
-from falsifier.fmu.network import Link, Member, Place
+from falsifier.fmu.network import SYSTEM, Link, Member, Place
 from falsifier.fmu.structure import Structure
 
 
@@ -85,7 +85,8 @@ def step_order(members: int, links: Iterable[Link], dependencies: Dependencies) 
 def late_links(links: Iterable[Link], order: Sequence[int]) -> Iterator[Link]:
     """Yield the connections whose target steps before their source."""
     position = {member: k for k, member in enumerate(order)}
-    return (n for n in links if position[n.target.member] <= position[n.source.member])
+    inner = (n for n in links if n.source.member != SYSTEM)
+    return (n for n in inner if position[n.target.member] <= position[n.source.member])
 
 
 def _predecessors(

@@ -1,7 +1,7 @@
 """Systems of FMUs as models: components, connections between them, and how they exchange values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -14,7 +14,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.fmu import archive, in_process
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
-from falsifier.fmu.network import Coupling, Extrapolation, Loops, Method, Network
+from falsifier.fmu.network import Coupling, Extrapolation, Frame, Loops, Method, Network
 from falsifier.fmu.plan import make_plan
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
 from falsifier.fmu.wiring import Connection, make_network
@@ -54,7 +54,9 @@ class System:
         components: the FMUs by name: a path, or a Component if it has a step of its own.
         connections: by input, where its values come from: the name of an output, or a Connection.
         coupling: how the components exchange values.
+        frame: inputs, names, values and stop time that the system has as a whole.
         name: name of the system.
+        package: the SSP package that it was read from, if it was.
         isolate: whether to simulate in a worker process; if not, a crash of an FMU crashes this process.
         logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
 
@@ -71,7 +73,9 @@ class System:
     components: Mapping[str, Component | str | Path]
     connections: Mapping[str, Connection | str] = field(default_factory=dict)
     coupling: Coupling = field(default=Coupling(), kw_only=True)
+    frame: Frame = field(default=Frame(), kw_only=True)
     name: str = field(default="system", kw_only=True)
+    package: Path | None = field(default=None, kw_only=True, compare=False)
     isolate: bool = field(default=True, kw_only=True)
     logging: bool = field(default=False, kw_only=True)
 
@@ -105,7 +109,13 @@ class System:
     def key(self) -> str:
         """Hash of everything that determines the trajectories: FMUs, steps, connections, coupling."""
         components = [(name, each.sha256, each.step) for name, each in self.parts.items()]
-        content = (self.name, components, sorted(self.connections.items(), key=str), self.coupling)
+        content = (
+            self.name,
+            components,
+            sorted(self.connections.items(), key=str),
+            self.coupling,
+            self.frame,
+        )
         return sha256(repr(content).encode()).hexdigest()
 
     @property
@@ -130,6 +140,11 @@ class System:
             SpecError: if a component's own step is not an integer multiple of the communication step.
         """
         tables = [signal.pieces(experiment.stop_time) for signal in signals.values()]
+        values = dict(self.frame.values)
+        numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
+        texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
+        experiment = replace(experiment, strings=(*texts, *experiment.strings))
+        parameters = numbers | dict(parameters)
         task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
         return run_task(self._runner(), task, tables, parameters, self.info.name)
 
@@ -190,7 +205,7 @@ class System:
 def _network(system: System) -> Network:
     components = {name: (each.fmu, each.sha256, each.step) for name, each in system.parts.items()}
     connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
-    return make_network(system.name, components, connections, system.coupling)
+    return make_network(system.name, components, connections, system.coupling, system.frame)
 
 
 @lru_cache(maxsize=64)

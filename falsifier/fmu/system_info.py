@@ -6,10 +6,11 @@ from fractions import Fraction
 from functools import reduce
 from math import gcd
 
-from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.model import ModelInfo
 from falsifier.errors import SpecError
 from falsifier.fmu.description import Description
-from falsifier.fmu.network import Link, Member, Place
+from falsifier.fmu.network import SYSTEM, Frame, Link, Member, Place
+from falsifier.fmu.network import title as full_name
 from falsifier.fmu.slot import Slot
 
 # Maximum number of connections in the description that people and language models read.
@@ -19,7 +20,7 @@ _MAX_DENOMINATOR = 1_000_000
 
 
 def merged(
-    name: str, members: Sequence[Member], links: Sequence[Link], notes: Iterable[str]
+    name: str, members: Sequence[Member], links: Sequence[Link], frame: Frame, notes: Iterable[str]
 ) -> tuple[Description, dict[str, Place]]:
     """Return the description of a system, and where each of its variables is.
 
@@ -30,9 +31,10 @@ def merged(
         SpecError: if two variables would have the same name.
     """
     fed = {_location(members, link.target): link for link in links}
-    variables: list[Variable] = []
-    slots: dict[str, Slot] = {}
-    places: dict[str, Place] = {}
+    values = dict(frame.values)
+    variables = [replace(v, start=values.get(v.name, v.start)) for v in frame.inputs]
+    slots = {v.name: Slot(0, v.type or "Real") for v in frame.inputs}
+    places = {v.name: Place(SYSTEM, v.name) for v in frame.inputs}
     for k, member in enumerate(members):
         for variable in member.description.info.variables:
             place = Place(k, variable.name)
@@ -44,13 +46,18 @@ def merged(
             slot = member.description.slots[variable.name]
             link = fed.get(_location(members, place)) if variable.causality == "input" else None
             alias = variable.alias_of and f"{member.name}.{variable.alias_of}"
-            shown = replace(variable, name=title, alias_of=alias)
+            shown = replace(variable, name=title, alias_of=alias, start=values.get(title, variable.start))
             if link is not None:
-                source = f"{members[link.source.member].name}.{link.source.name}"
+                source = full_name(members, link.source)
                 shown = replace(shown, causality="local", settable=False)
                 slot = replace(slot, refusal=f"it is connected to {source}")
             variables.append(shown)
             slots[title], places[title] = slot, place
+    for other, meant in frame.outputs:
+        if other not in places:
+            variable = next(v for v in variables if v.name == meant)
+            variables.append(replace(variable, name=other, causality="local", settable=False, alias_of=meant))
+            slots[other], places[other] = slots[meant], places[meant]
     infos = [m.description.info for m in members]
     info = ModelInfo(
         name=name,
@@ -59,13 +66,17 @@ def merged(
         interfaces=("co-simulation",),
         platforms=tuple(p for p in infos[0].platforms if all(p in i.platforms for i in infos)),
         tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
-        stop_time=_only([i.stop_time for i in infos]),
+        stop_time=frame.stop_time or _only([i.stop_time for i in infos]),
         step_size=_step([m.step for m in members], [i.step_size for i in infos]),
         tolerance=min((i.tolerance for i in infos if i.tolerance is not None), default=None),
         variables=tuple(variables),
         components=tuple(m.name for m in members),
         connections=_titles(members, links),
-        notes=(*notes, *(f"{m.name}: {note}" for m in members for note in m.description.info.notes)),
+        notes=(
+            *frame.notes,
+            *notes,
+            *(f"{m.name}: {note}" for m in members for note in m.description.info.notes),
+        ),
     )
     return Description(info, "", {}, slots), places
 
@@ -86,10 +97,7 @@ def _description(members: Sequence[Member], links: Sequence[Link]) -> str:
 
 
 def _titles(members: Sequence[Member], links: Iterable[Link]) -> tuple[tuple[str, str], ...]:
-    def title(place: Place) -> str:
-        return f"{members[place.member].name}.{place.name}"
-
-    return tuple((title(link.source), title(link.target)) for link in links)
+    return tuple((full_name(members, link.source), full_name(members, link.target)) for link in links)
 
 
 def _only(times: Iterable[float | None]) -> float | None:

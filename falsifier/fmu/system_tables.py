@@ -9,7 +9,7 @@ from falsifier.core.model import Variable
 from falsifier.fmu import coupled_stepping as loops
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
-from falsifier.fmu.network import Link, Member, Network, Place
+from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.stepper import check_range
@@ -41,22 +41,27 @@ class SystemTables:
         self._memory: list[object] = []
         self._checked: list[tuple[str, list[str], Ports, list[int]]] = []
         sources = sorted(
-            {(network.order.index(n.source.member), n.source.member, n.source.name) for n in network.links}
+            {
+                (network.order.index(n.source.member), n.source.member, n.source.name)
+                for n in network.links
+                if n.source.member != SYSTEM
+            }
         )
         self._signal_of = {Place(member, name): k for k, (_, member, name) in enumerate(sources)}
         self.titles = [network.title(place) for place in self._signal_of]
         self.signals = np.zeros((len(sources), loops.SIGNAL_WIDTH))
         self._links = {n.target: n for n in network.links}
         self._inputs = {network.places[name]: row for row, name in enumerate(plan.inputs)}
+        self._constants = _Constants(network, plan, room)
         targets = [*self._links, *self._inputs]
         self._feeds = np.zeros((len(targets), loops.FEED_WIDTH), dtype=np.int64)
         self._fed = 0
         self.components = np.zeros((len(parts), loops.COMPONENT_WIDTH), dtype=np.int64)
-        recorded = {network.places[name]: row for row, name in enumerate(plan.outputs)}
+        recorded = [(network.places[name], row) for row, name in enumerate(plan.outputs)]
         self.copies = np.array(
             [
                 (self._address_of_signal(self._signal_of[place]), self._address_of_row(row))
-                for place, row in recorded.items()
+                for place, row in recorded
                 if place in self._signal_of
             ],
             dtype=np.int64,
@@ -77,6 +82,7 @@ class SystemTables:
             row[loops.FUNCTIONS] = self._parts[member].library.component
             row[loops.CHANGED] = 0
         self._feeds[:] = self._first_feeds
+        self._constants.fill()
         self.signals[:, loops.TIME] = self.signals[:, loops.OLD_TIME] = -1.0
         for name, names, ports, rows in self._checked:
             pieces = self._room.inputs[rows].reshape(len(rows), self._plan.pieces, 5)
@@ -84,7 +90,7 @@ class SystemTables:
             values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
             check_range(name, names, ports, values)
 
-    def _fill(self, row: NDArray[np.int64], member: int, recorded: dict[Place, int]) -> None:
+    def _fill(self, row: NDArray[np.int64], member: int, recorded: Sequence[tuple[Place, int]]) -> None:
         part, one = self._parts[member], self._network.members[member]
         library = part.library
         has_events = one.description.major == 3 and one.description.event_mode
@@ -103,9 +109,9 @@ class SystemTables:
         signals = {place: k for place, k in self._signal_of.items() if place.member == member}
         self._ports_to(row, loops.SOURCES, one, signals, library.getters())
         row[loops.SIGNALS] = self._address_of_signal(min(signals.values(), default=0))
-        others = {p: k for p, k in recorded.items() if p.member == member and p not in signals}
-        self._ports_to(row, loops.RECORDED, one, others, library.getters())
-        rows = np.array([self._address_of_row(k) for k in others.values()], dtype=np.int64)
+        others = [(p, k) for p, k in recorded if p.member == member and p not in signals]
+        self._ports_to(row, loops.RECORDED, one, [p for p, _ in others], library.getters())
+        rows = np.array([self._address_of_row(k) for _, k in others], dtype=np.int64)
         self._memory.append(rows)
         row[loops.ROWS] = rows.ctypes.data
         step = self._plan.stop_time / self._plan.steps
@@ -125,23 +131,31 @@ class SystemTables:
         for place in places:
             self._feed(self._feeds[self._fed], place)
             self._fed += 1
-        searched = [k for k, place in enumerate(places) if place in self._inputs]
-        if ports.is_limited and searched:
-            names = [places[k].name for k in searched]
+        driven = {p: self._inputs.get(self._links[p].source if p in self._links else p) for p in places}
+        rows = {place: k for place, k in driven.items() if k is not None}
+        if ports.is_limited and rows:
+            names = [place.name for place in rows]
             part = make_ports(member.description, names, setters)
-            self._checked.append((member.name, names, part, [self._inputs[places[k]] for k in searched]))
+            self._checked.append((member.name, names, part, list(rows.values())))
 
     def _feed(self, feed: NDArray[np.int64], place: Place) -> None:
         numbers = feed.view(np.float64)
         numbers[loops.WRITTEN] = np.nan
         link: Link | None = self._links.get(place)
-        if link is None:
+        numbers[loops.FACTOR] = 1.0 if link is None else link.factor
+        numbers[loops.OFFSET] = 0.0 if link is None else link.offset
+        source = place if link is None else link.source
+        if source in self._inputs:
             inputs = self._room.inputs
-            feed[loops.SOURCE] = inputs.ctypes.data + self._inputs[place] * inputs.strides[0]
+            feed[loops.SOURCE] = inputs.ctypes.data + self._inputs[source] * inputs.strides[0]
+        if link is None:
+            return
+        if link.source.member == SYSTEM:
+            if source not in self._inputs:
+                feed[loops.SOURCE] = self._constants.address(source.name)
             return
         feed[loops.SOURCE] = self._address_of_signal(self._signal_of[link.source])
         feed[loops.IS_SIGNAL], feed[loops.LINEAR] = 1, int(link.is_linear)
-        numbers[loops.FACTOR], numbers[loops.OFFSET] = link.factor, link.offset
         numbers[loops.START] = link.start
 
     def _ports_to(
@@ -162,6 +176,26 @@ class SystemTables:
 
     def _address_of_row(self, row: int) -> int:
         return int(self._room.outputs.ctypes.data) + row * self._room.outputs.strides[0]
+
+
+class _Constants:
+    """Inputs of the system that no signal drives: one piece each, the value of a parameter or the start."""
+
+    def __init__(self, network: Network, plan: Plan, room: Room) -> None:
+        self._names = [name for name, place in network.places.items() if place.member == SYSTEM]
+        starts = {v.name: v.start for v in network.description.info.variables}
+        self._starts = [float(starts[name] or 0.0) for name in self._names]
+        self._rows = [plan.parameters.index(n) if n in plan.parameters else None for n in self._names]
+        self._room = room
+        self._pieces = np.zeros((len(self._names), plan.pieces, 5))
+        self._pieces[:, 1:, 0] = np.inf
+
+    def address(self, name: str) -> int:
+        return int(self._pieces.ctypes.data) + self._names.index(name) * self._pieces.strides[0]
+
+    def fill(self) -> None:
+        for k, row in enumerate(self._rows):
+            self._pieces[k, 0, 1] = self._starts[k] if row is None else self._room.parameters[row]
 
 
 def _is_discrete(variable: Variable) -> bool:

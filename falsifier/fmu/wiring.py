@@ -8,7 +8,7 @@ from falsifier.core.arguments import finite, one_of
 from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description import describe
-from falsifier.fmu.network import Coupling, Extrapolation, Link, Member, Network, Place
+from falsifier.fmu.network import SYSTEM, Coupling, Extrapolation, Frame, Link, Member, Network, Place
 from falsifier.fmu.step_order import Dependencies, direct_loop, late_links, step_order
 from falsifier.fmu.structure import Structure, read_structure
 from falsifier.fmu.system_info import merged
@@ -40,6 +40,7 @@ def make_network(
     components: Mapping[str, tuple[Path, str, float | None]],
     connections: Mapping[str, Connection],
     coupling: Coupling,
+    frame: Frame,
 ) -> Network:
     """Check a system and return it with all names resolved.
 
@@ -48,6 +49,7 @@ def make_network(
         components: path and hash of the FMU, and a step of its own in s, by component.
         connections: where the values of inputs come from, by input, as ``component.variable``.
         coupling: how the components exchange values.
+        frame: what the system has as a whole.
 
     Raises:
         ModelError: if an FMU cannot be read.
@@ -55,7 +57,7 @@ def make_network(
     """
     members = tuple(_member(k, each, *components[each]) for k, each in enumerate(components))
     structures = [read_structure(m.path, m.sha256) for m in members]
-    joiner = _Joiner(members, structures, coupling)
+    joiner = _Joiner(members, structures, coupling, frame)
     for target, connection in connections.items():
         joiner.connect(target, connection)
     links = tuple(joiner.links)
@@ -65,7 +67,9 @@ def make_network(
         raise SpecError(_loop_text(loop, members), key="connections")
     order = step_order(len(members), links, dependencies)
     late = links if coupling.method == "jacobi" else tuple(late_links(links, order))
-    description, places = merged(name, members, links, [*_order_notes(members, order, late), *joiner.notes])
+    description, places = merged(
+        name, members, links, frame, [*_order_notes(members, order, late), *joiner.notes]
+    )
     return Network(name, members, links, order, coupling, description, places)
 
 
@@ -91,7 +95,14 @@ def _member(position: int, name: str, path: Path, sha256: str, step: float | Non
 class _Joiner:
     """Resolves connections one by one and collects their links."""
 
-    def __init__(self, members: tuple[Member, ...], structures: list[Structure], coupling: Coupling) -> None:
+    def __init__(
+        self,
+        members: tuple[Member, ...],
+        structures: list[Structure],
+        coupling: Coupling,
+        frame: Frame,
+    ) -> None:
+        self._inputs = {v.name: v for v in frame.inputs}
         self._members, self._structures, self._coupling = members, structures, coupling
         self._sources: dict[tuple[int, int, int], str] = {}
         self.links: list[Link] = []
@@ -113,6 +124,8 @@ class _Joiner:
 
     def _scalars(self, name: str, role: str, title: str) -> list[Place]:
         """Return the variable of this name; of an array, its elements."""
+        if role == "output" and name in self._inputs:
+            return [Place(SYSTEM, name)]
         member, local = self._owner(name, title)
         description = self._members[member].description
         if local in description.slots:
@@ -150,6 +163,8 @@ class _Joiner:
         return longest, name[len(self._members[longest].name) + 1 :]
 
     def _variable(self, place: Place) -> Variable:
+        if place.member == SYSTEM:
+            return self._inputs[place.name]
         return self._members[place.member].description.info[place.name]
 
     def _link(self, source: Place, target: Place, connection: Connection, title: str) -> None:
@@ -179,8 +194,9 @@ class _Joiner:
             factor = 1.0 if connection.factor is None else finite(f"{title}: factor", connection.factor)
             return factor, finite(f"{title}: offset", connection.offset or 0.0)
         a, b = self._variable(source), self._variable(target)
-        units = (self._structures[source.member].units, self._structures[target.member].units)
-        found = conversion(a.unit, b.unit, units)
+        units = self._structures[target.member].units
+        known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
+        found = conversion(a.unit, b.unit, known)
         if found is None:
             raise _misfit(
                 title,

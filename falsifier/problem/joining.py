@@ -7,7 +7,7 @@ from pathlib import Path
 from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.fmu import System, read_info
+from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface
 from falsifier.problem.freedom import default_freedom
 from falsifier.problem.grid import Grid, choose_grid, formula_times
@@ -80,7 +80,7 @@ def join(
     strings = _strings(parameters, model.info, path.parent)
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
-    is_option = stl is not None or path.suffix == ".fmu"
+    is_option = stl is not None or path.suffix in (".fmu", ".ssp", ".ssd")
     key = "--stl" if is_option else f"requirements.{requirement}.formula"
     formula = parse_requirement(
         section.formula if stl is None else stl, model.info, experiment, file=file, key=key
@@ -112,6 +112,9 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME
     """
     if not fmu.is_file():
         raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
+    if is_package(fmu):
+        _refuse_interface(changes, fmu)
+        return join_system(read_package(fmu), stl, path=fmu, changes=changes, name=name)
     info = read_info(fmu)
     interface = changes.interface or default_interface(info)
     return _join_formula(
@@ -122,6 +125,11 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME
         changes=changes,
         name=name,
     )
+
+
+def _refuse_interface(changes: ModelChanges, path: Path) -> None:
+    if changes.interface == "model-exchange":
+        raise SpecError(f"{path}: the components of a system step by co-simulation; leave --interface out")
 
 
 def join_system(
@@ -340,7 +348,7 @@ def _space(
         elif parameter.value is not None:
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
     if not searched and not ranges:
-        if file.endswith(".fmu"):  # there is no spec file
+        if file.endswith((".fmu", ".ssp", ".ssd")):  # there is no spec file
             raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
         raise SpecError(
             "nothing to search; add [inputs.NAME] with range and control_points, "
@@ -383,7 +391,9 @@ def _as_input(name: str, section: ParameterSection, file: str) -> str:
     if section.range is not None:
         text = ":".join(f"{value:g}" for value in section.range)
     option = f"--input {name}={text}"
-    return f"write {option}" if file.endswith(".fmu") else f"write {option}, or [inputs.{name}] in the spec"
+    if file.endswith((".fmu", ".ssp", ".ssd")):
+        return f"write {option}"
+    return f"write {option}, or [inputs.{name}] in the spec"
 
 
 def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:

@@ -5,7 +5,16 @@ from pathlib import Path
 
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.errors import ModelError, SpecError
-from falsifier.fmu import Component, Connection, Coupling, FmuModel, System, read_info
+from falsifier.fmu import (
+    Component,
+    Connection,
+    Coupling,
+    FmuModel,
+    System,
+    is_package,
+    read_info,
+    read_package,
+)
 from falsifier.problem.spec import ModelChanges, Spec
 
 
@@ -28,6 +37,9 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
         return make_system(spec, path, logging=logging)
     assert spec.model.fmu is not None, "a spec without components has an FMU"
     fmu = _existing(path, spec.model.fmu, "model.fmu")
+    if is_package(fmu):
+        _check_interface(spec, layers, str(path))
+        return read_package(fmu)
     return FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), str(path)), logging=logging)
 
 

@@ -110,7 +110,7 @@ class ModelSection(_Strict):
 
     fmu: str | None = Field(
         None,
-        description="Path of the FMU, relative to the spec file. A system has [components.NAME] instead.",
+        description="Path of the FMU or SSP package, relative to the spec file; or see [components.NAME]",
     )
     interface: Interface | None = Field(None, description="Required if the FMU offers both.")
     stop_time: Seconds | None = Field(None, description="End of each simulation in s.")

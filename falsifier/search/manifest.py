@@ -15,7 +15,7 @@ from falsifier import __version__
 from falsifier.core.model import Variable
 from falsifier.core.space import InputRange, ParameterRange, ValueKind
 from falsifier.errors import JournalError, rejected
-from falsifier.fmu import fmu_files, fmus_sha256
+from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
@@ -173,8 +173,9 @@ def environment() -> dict[str, Any]:
 def file_hashes(problem: Problem) -> dict[str, str]:
     """SHA-256, by path, of the files that determine what is simulated: the FMUs and the spec."""
     spec = None if problem.source is None else spec_file(problem.source)
-    paths = [*fmu_files(problem.model), *([spec] if spec else [])]
-    return {str(p): sha256(p.read_bytes()).hexdigest() for p in paths}
+    # What is in a package was extracted to a folder of this process; the package's own hash covers it.
+    fmus = [] if is_packaged(problem.model) else fmu_files(problem.model)
+    return {str(p): sha256(p.read_bytes()).hexdigest() for p in (*fmus, *([spec] if spec else []))}
 
 
 def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:

@@ -7,6 +7,7 @@ from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import Coupling, System
+from falsifier.fmu.isolation import REGISTRY
 from tests.fmu.fixtures import path
 from tests.fmu.systems import LOOP, component, loop, run, sampled_loop, system
 
@@ -67,6 +68,11 @@ def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named
     for _ in range(3):
         found = run(model, "plant.x")["plant.x"]
         assert found == pytest.approx(sampled_loop(0), abs=1e-9)
+    nursery = REGISTRY._nursery
+    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.key]
+    assert nursery is not None and fmu._worker is not None
+    status = Path(f"/proc/{fmu._worker.pid}/status").read_text()
+    assert f"PPid:\t{nursery._process.pid}\n" in status, "its environment, without keys, is the nursery's"
     model.load()
     with pytest.raises(Exception, match=r"process crashed in component bad: signal SIGSEGV") as crash:
         run(model, "plant.x", parameters={"bad.misdeed": 1})

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from falsifier import Problem, confirm, evaluate, falsify, resume
+from falsifier import Problem, confirm, evaluate, falsify, load_problem, resume
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.store import load, problem_of, replay
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, SpecError
 from falsifier.fmu import fmu_files
 from tests.command import falsifier
 from tests.fmu.fixtures import path
+from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, write
 from tests.fmu.systems import loop
 
 SPEC = """
@@ -43,11 +44,12 @@ def spec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return file
 
 
-def test_from_the_command_line_to_the_counterexample_and_back(spec: Path, tmp_path: Path) -> None:
-    done = falsifier("run", "loop.toml", "--out", "run", "--engine", "corners", "--budget", "5", cwd=tmp_path)
-    assert done.code == 1, done.err
-    assert "plant.u uses the values of the previous communication point" in done.err
-    assert "half the communication step (0.05 s)" in done.out
+def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) -> None:
+    problem = load_problem("loop.toml")
+    assert "plant.u uses the values of the previous communication point" in problem.notes[0]
+    found = falsify(problem, engine="corners", budget=5, directory=tmp_path / "run")
+    assert found.falsified
+    assert "half the communication step (0.05 s)" in load(tmp_path / "run").reason
     hashes = json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]
     assert sorted(Path(p).name for p in hashes) == ["Gain_2.fmu", "Plant_2.fmu", "loop.toml"]
     (again,) = resume(tmp_path / "run")
@@ -56,16 +58,13 @@ def test_from_the_command_line_to_the_counterexample_and_back(spec: Path, tmp_pa
     stored = load(tmp_path / "run")
     replayed = replay(stored, problem_of(stored))
     assert replayed.status == "violates" and replayed.text.startswith("R: still violated")
+    spec.write_text(SPEC.replace('"pi.measured" = "plant.y"\n', ""))
+    with pytest.raises(JournalError, match="has changed since the start"):
+        resume(tmp_path / "run")
+    spec.write_text(SPEC)
     (tmp_path / "Gain_2.fmu").write_bytes(path("Gain_3").read_bytes())
     assert "an FMU of the system has changed" in replay(stored, problem_of(stored)).text
     with pytest.raises(JournalError, match=r"Gain_2\.fmu has changed since the start"):
-        resume(tmp_path / "run")
-
-
-def test_other_connections_are_another_problem(spec: Path, tmp_path: Path) -> None:
-    falsifier("run", "loop.toml", "--out", "run", "--engine", "corners", "--budget", "1", cwd=tmp_path)
-    spec.write_text(SPEC.replace('"pi.measured" = "plant.y"\n', ""))
-    with pytest.raises(JournalError, match="has changed since the start"):
         resume(tmp_path / "run")
 
 
@@ -128,17 +127,47 @@ def test_workers_get_the_files_that_they_miss(tmp_path: Path, monkeypatch: pytes
     assert evaluate(replace(local), candidate).robustness is not None
 
 
-def test_no_key_reaches_a_component(monkeypatch: pytest.MonkeyPatch) -> None:
-    from falsifier.fmu.isolation import REGISTRY
-    from tests.fmu.systems import LOOP, run, system
+def test_a_package_is_a_model_wherever_an_fmu_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    ssd = structure(system(PLANT + PI, FEEDBACK), after='<ssd:DefaultExperiment stopTime="2"/>')
+    write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2")
+    shown = falsifier("info", "loop.ssp", cwd=tmp_path)
+    assert shown.code == 0 and "default experiment: stop time 2 s" in shown.out
+    (tmp_path / "loop.toml").write_text(
+        SPEC[SPEC.index("[model]") :].replace("[model]", '[model]\nfmu = "loop.ssp"').replace("10]", "2]")
+    )
+    assert load_problem("loop.toml").experiment.stop_time == 2.0
+    problem = load_problem("loop.ssp", stl="G[0,2] (plant.y <= 1.0)", inputs={"pi.r": (0.0, 2.0, 3)})
+    result = falsify(problem, engine="corners", budget=2, directory=tmp_path / "run")
+    assert result.falsified
+    assert list(json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]) == ["loop.ssp"]
+    stored = load(tmp_path / "run")
+    assert replay(stored, problem_of(stored)).status == "violates"
+    write(tmp_path / "loop.ssp", ssd.replace('"root"', '"other"'), "Plant_2", "Gain_2")
+    with pytest.raises(JournalError, match=r"loop\.ssp has changed since the start"):
+        resume(tmp_path / "run")
 
-    REGISTRY.close()  # so that the next worker would see the variable
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-only-in-this-test")
-    model = system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP, isolate=True)
-    run(model, "plant.y")
-    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.key]
-    assert fmu._worker is not None
-    environment = Path(f"/proc/{fmu._worker.pid}/environ").read_bytes()
-    assert b"PATH" in environment
-    assert b"sk-only-in-this-test" not in environment
-    model.close()
+
+def test_a_starter_names_what_could_be_connected(spec: Path, tmp_path: Path) -> None:
+    done = falsifier("init", "Plant_2.fmu", "Gain_2.fmu", cwd=tmp_path)
+    assert done.code == 0 and done.out.startswith("system.toml written")
+    text = (tmp_path / "system.toml").read_text()
+    assert '# "Plant_2.u" = "Gain_2.y"\n' in text and '# "Gain_2.measured" = "Plant_2.y"\n' in text
+    connected = text.replace('# "Gain_2.measured"', '"Gain_2.measured"')
+    (tmp_path / "system.toml").write_text(connected)
+    with pytest.raises(SpecError, match=r"inputs\.Gain_2\.measured: this input is connected to Plant_2\.y"):
+        load_problem("system.toml")
+    write(tmp_path / "loop.ssp", structure(system(PLANT + PI, FEEDBACK)), "Plant_2", "Gain_2")
+    assert falsifier("init", "loop.ssp", "--out", "ssp.toml", cwd=tmp_path).code == 0
+    assert load_problem("ssp.toml").space.names == ("pi.r",)
+
+
+def test_a_wrong_package_is_wrong_usage(tmp_path: Path) -> None:
+    write(tmp_path / "wrong.ssp", structure(system(PLANT)))
+    for command in (["info"], ["run", "--stl", "G[0,2] (plant.y <= 1)"]):
+        done = falsifier(command[0], "wrong.ssp", *command[1:], cwd=tmp_path)
+        assert done.code == 2
+        assert done.err == (
+            "falsifier: wrong.ssp: the resource 'resources/Plant_2.fmu' is missing; export the package "
+            "again\n"
+        )
