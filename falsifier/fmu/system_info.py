@@ -87,10 +87,10 @@ def _location(members: Sequence[Member], place: Place) -> tuple[int, int, int]:
 
 
 def _description(members: Sequence[Member], links: Sequence[Link]) -> str:
-    parts = (
-        f"{m.name} ({m.description.info.description})" if m.description.info.description else m.name
-        for m in members
-    )
+    said: dict[str, list[str]] = {}
+    for m in members:
+        said.setdefault(m.description.info.description or m.name, []).append(m.name)
+    parts = (", ".join(names) + (f" ({text})" if text not in names else "") for text, names in said.items())
     fed = [f"{source} -> {target}" for source, target in _titles(members, links)]
     shown = ", ".join(fed[:_SHOWN_LINKS]) + (", ..." if len(fed) > _SHOWN_LINKS else "")
     return f"System of {', '.join(parts)}" + (f". Connections: {shown}" if fed else "")
