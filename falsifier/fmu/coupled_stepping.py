@@ -115,29 +115,28 @@ def _gather(component, count, start, middle):  # type: ignore[no-untyped-def]
         store_i8(component + 8 * CHANGED, 1 if changed else 0)
 
 
-@compiled
+@inlined
 def _step(component, start, end, scratch):  # type: ignore[no-untyped-def]
     """Give a component its inputs and do its step; return status, where it stopped, whether it ends all."""
-    functions = _functions(component)
-    instance, version = functions[0], functions[5]
+    instance, version = load_i8(component), load_i8(component + 40)
     status = exchange_values(instance, version, _table(component, PLAIN))
     if status > 1:
         return status, SETTING, False
     if load_i8(component + 8 * CHANGED):
         store_i8(component + 8 * CHANGED, 0)
-        status, where = event_3(functions, _table(component, HELD), scratch)
+        status, where = event_3(_functions(component), _table(component, HELD), scratch)
         if where != DONE:
             return status, where, False
     if version == 3:
-        return advance_3(functions, start, end, scratch)
+        return advance_3(_functions(component), start, end, scratch)
     if version == 2:
-        status = do_step_2(functions[1], instance, start, end - start, np.int32(1))
+        status = do_step_2(load_i8(component + 8), instance, start, end - start, np.int32(1))
     else:
-        status = do_step_1(functions[1], instance, start, end - start, np.uint8(1))
+        status = do_step_1(load_i8(component + 8), instance, start, end - start, np.uint8(1))
     return status, STEPPING if status > 1 else DONE, False
 
 
-@compiled
+@inlined
 def read_signals(component, time):  # type: ignore[no-untyped-def]
     """Read a component's connected outputs; return the status."""
     ports = _table(component, SOURCES)
@@ -235,7 +234,7 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
         for c in range(number):
             component = components + c * _COMPONENT_BYTES
             own = load_i8(component + 8 * EVERY)
-            if (k + 1) % own:
+            if own != 1 and (k + 1) % own:
                 continue
             start = (k + 1 - own) * step
             if not jacobi:

@@ -59,6 +59,7 @@ class System:
         package: the SSP package that it was read from, if it was.
         isolate: whether to simulate in a worker process; if not, a crash of an FMU crashes this process.
         logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
+        key: hash of everything that determines the trajectories: FMUs, steps, connections, coupling, frame.
 
     Raises:
         ModelError: if a file is not an FMU.
@@ -76,6 +77,7 @@ class System:
     frame: Frame = field(default=Frame(), kw_only=True)
     name: str = field(default="system", kw_only=True)
     package: Path | None = field(default=None, kw_only=True, compare=False)
+    key: str = field(default="", init=False, repr=False, compare=False)
     isolate: bool = field(default=True, kw_only=True)
     logging: bool = field(default=False, kw_only=True)
 
@@ -95,6 +97,7 @@ class System:
         object.__setattr__(self, "components", components)
         object.__setattr__(self, "connections", connections)
         _check_coupling(self.coupling)
+        object.__setattr__(self, "key", _key(self))
         _network(self)
 
     def __hash__(self) -> int:
@@ -104,19 +107,6 @@ class System:
     def parts(self) -> dict[str, Component]:
         """The components by name."""
         return {name: each for name, each in self.components.items() if isinstance(each, Component)}
-
-    @property
-    def key(self) -> str:
-        """Hash of everything that determines the trajectories: FMUs, steps, connections, coupling."""
-        components = [(name, each.sha256, each.step) for name, each in self.parts.items()]
-        content = (
-            self.name,
-            components,
-            sorted(self.connections.items(), key=str),
-            self.coupling,
-            self.frame,
-        )
-        return sha256(repr(content).encode()).hexdigest()
 
     @property
     def info(self) -> ModelInfo:
@@ -140,11 +130,12 @@ class System:
             SpecError: if a component's own step is not an integer multiple of the communication step.
         """
         tables = [signal.pieces(experiment.stop_time) for signal in signals.values()]
-        values = dict(self.frame.values)
-        numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
-        texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
-        experiment = replace(experiment, strings=(*texts, *experiment.strings))
-        parameters = numbers | dict(parameters)
+        if self.frame.values:
+            values = dict(self.frame.values)
+            numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
+            texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
+            experiment = replace(experiment, strings=(*texts, *experiment.strings))
+            parameters = numbers | dict(parameters)
         task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
         return run_task(self._runner(), task, tables, parameters, self.info.name)
 
@@ -173,7 +164,7 @@ class System:
         Raises:
             ModelError: if that fails.
         """
-        fmu = IsolatedFmu(REGISTRY.nursery, self._order(logging=True))
+        fmu = IsolatedFmu(REGISTRY.nursery, _order(self, logging=True))
         try:
             fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
         finally:
@@ -185,20 +176,29 @@ class System:
         drop(self.key, "co-simulation", logging=self.logging)
 
     def _runner(self) -> "IsolatedFmu | in_process.LocalFmu":
-        order = self._order(logging=self.logging)
+        order = _order(self, logging=self.logging)
         return REGISTRY.fmu(order) if self.isolate else in_process.fmu(order)
 
-    def _order(self, *, logging: bool) -> Order:
-        network = self.network
-        return Order(
-            Path(self.name),
-            self.key,
-            network.description,
-            "co-simulation",
-            None,
-            logging=logging,
-            network=network,
-        )
+
+def _key(system: System) -> str:
+    components = [(name, each.sha256, each.step) for name, each in system.parts.items()]
+    connections = sorted(system.connections.items(), key=str)
+    content = (system.name, components, connections, system.coupling, system.frame)
+    return sha256(repr(content).encode()).hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _order(system: System, *, logging: bool) -> Order:
+    network = system.network
+    return Order(
+        Path(system.name),
+        system.key,
+        network.description,
+        "co-simulation",
+        None,
+        logging=logging,
+        network=network,
+    )
 
 
 @lru_cache(maxsize=32)

@@ -9,6 +9,7 @@ from falsifier.core.model import Experiment
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.opening import open_session, unpack
 from falsifier.fmu.plan import make_plan
+from falsifier.fmu.system import _order
 from falsifier.fmu.worker_order import Reuse
 from tests.fmu.systems import system
 
@@ -27,7 +28,7 @@ def test_the_cheapest_way_that_suits_all_components_is_found(
     components: dict[str, str], reuse: Reuse, tmp_path: Path
 ) -> None:
     model = system(components, {})
-    order = model._order(logging=False)
+    order = _order(model, logging=False)
     unpack(order, tmp_path)
     session = open_session(order, tmp_path, lambda _: None)
     plan = make_plan(order.description, Experiment(0.2, 0.1, ("a.y", "b.y")), [], [])
