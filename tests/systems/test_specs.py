@@ -22,7 +22,10 @@ SYSTEMS = {
     "HeaterLimpHome": ("HeaterLimpHome", 20, None),
 }
 # Systems of several FMUs.
-COUPLED = {"SharedFeeder": ("SharedFeeder", 14, None)}
+COUPLED = {
+    "SharedFeeder": ("SharedFeeder", 14, None),
+    "CCcars": ("CCcars1 CCcars2 CCcars3 CCcars4 CCcars5 CCcarsx", 20, None),
+}
 PUBLISHED = ("AT", "CC", "NN", "F16", "SC")
 
 
