@@ -9,6 +9,7 @@ import pytest
 from falsifier import Problem, confirm, evaluate, falsify, load_problem, resume
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
+from falsifier.counterexamples.export import export_counterexample
 from falsifier.counterexamples.store import load, problem_of, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.fmu import fmu_files
@@ -58,6 +59,12 @@ def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) 
     stored = load(tmp_path / "run")
     replayed = replay(stored, problem_of(stored))
     assert replayed.status == "violates" and replayed.text.startswith("R: still violated")
+    evaluation = replayed.evaluation
+    assert evaluation is not None
+    files = export_counterexample(problem, stored, evaluation, tmp_path / "exported")
+    assert "loop.ssp" in [file.name for file in files]
+    exported = load_problem(str(tmp_path / "exported" / "loop.ssp"), stl=stored.formula, output_interval=0.1)
+    assert evaluate(exported, evaluation.candidate).robustness == stored.robustness
     spec.write_text(SPEC.replace('"pi.measured" = "plant.y"\n', ""))
     with pytest.raises(JournalError, match="has changed since the start"):
         resume(tmp_path / "run")
