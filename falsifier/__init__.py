@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
     from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for, simulate
-    from falsifier.fmu import FmuModel, read_info
+    from falsifier.fmu import Component, Connection, Coupling, FmuModel, System, read_info
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
@@ -92,8 +92,11 @@ _EXPORTS = {
     "CampaignRequest": "falsifier.campaigns",
     "Candidate": "falsifier.core.candidate",
     "Chat": "falsifier.llm.messages",
+    "Component": "falsifier.fmu",
     "Confirmation": "falsifier.evaluation.confirm",
+    "Connection": "falsifier.fmu",
     "DEFAULT_ENGINE": "falsifier.engines",
+    "Coupling": "falsifier.fmu",
     "Coverage": "falsifier.search.coverage",
     "Diagnosis": "falsifier.stl",
     "ENGINES": "falsifier.engines",
@@ -131,6 +134,7 @@ _EXPORTS = {
     "Spent": "falsifier.search.budget",
     "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
+    "System": "falsifier.fmu",
     "Tail": "falsifier.search.assurance",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
@@ -181,7 +185,10 @@ __all__ = [
     "CampaignRequest",
     "Candidate",
     "Chat",
+    "Component",
     "Confirmation",
+    "Connection",
+    "Coupling",
     "Coverage",
     "Diagnosis",
     "Engine",
@@ -218,6 +225,7 @@ __all__ = [
     "Spent",
     "Splitting",
     "StoredCounterexample",
+    "System",
     "Tail",
     "Trajectory",
     "Variable",

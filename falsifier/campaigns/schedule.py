@@ -121,8 +121,7 @@ class Schedule:
             report(task, Done("failed", f"{type(error).__name__}: {error}"))
         else:
             if isinstance(outcome, Missing):
-                path = fmu_file(task.problem)
-                assert path is not None
+                path = fmu_file(task.problem, outcome.digest)
                 self._start(task, {outcome.digest: path.read_bytes()})
             else:
                 report(task, outcome)

@@ -1,8 +1,8 @@
 """One run as it is sent to a worker, and what the worker does with it.
 
-A worker is a process on this machine or another one. The problem is sent as a value; its FMU is identified by
-its hash, and its content is sent only if the worker does not have it. A worker that sees the campaign's
-directory writes there; otherwise it uses a local folder and sends the finished run back.
+A worker is a process on this machine or another one. The problem is sent as a value; its FMUs are identified
+by their hashes, and their content is sent only if the worker does not have it. A worker that sees the
+campaign's directory writes there; otherwise it uses a local folder and sends the finished run back.
 """
 
 import os
@@ -16,10 +16,10 @@ from shutil import rmtree
 from tempfile import gettempdir
 from threading import Lock
 from time import monotonic, time
-from typing import Any
 from zipfile import ZipFile
 
 from falsifier.campaigns.directory import STOP, campaign_mark, run_directory
+from falsifier.fmu import fmu_files, with_local_files
 from falsifier.problem.problem import Problem
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.manifest import Manifest
@@ -89,7 +89,7 @@ def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
         files: contents, by SHA-256, of files that this worker reported missing.
     """
     with _ONE_AT_A_TIME:
-        problem = _with_local_fmu(task.problem, files)
+        problem = _with_local_fmus(task.problem, files)
         if isinstance(problem, Missing):
             return problem
         in_place = campaign_mark(task.campaign) == task.mark
@@ -111,10 +111,9 @@ def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
         return Done(result.status, result.reason, pack(directory))
 
 
-def fmu_file(problem: Problem) -> Path | None:
-    """Path of the problem's FMU; None if the model is not an FMU."""
-    path: Path | None = getattr(problem.model, "path", None)
-    return path
+def fmu_file(problem: Problem, digest: str) -> Path:
+    """Path of the FMU of the problem's model that has this SHA-256."""
+    return next(path for path, found in fmu_files(problem.model).items() if found == digest)
 
 
 def pack(directory: Path) -> bytes:
@@ -160,20 +159,19 @@ class _StopWatch:
                 raise KeyboardInterrupt
 
 
-def _with_local_fmu(problem: Problem, files: Mapping[str, bytes]) -> Problem | Missing:
-    """Return the problem with the path of this worker's copy of the FMU."""
-    path = fmu_file(problem)
-    if path is None:
-        return problem
-    model: Any = problem.model
-    if path.is_file() and _digest(path, path.stat().st_mtime_ns) == model.sha256:
-        return problem
-    stored = _store() / "files" / model.sha256 / path.name
-    if model.sha256 in files:
-        _put(stored, files[model.sha256])
-    if not stored.is_file():
-        return Missing(model.sha256)
-    return replace(problem, model=replace(model, path=stored))
+def _with_local_fmus(problem: Problem, files: Mapping[str, bytes]) -> Problem | Missing:
+    """Return the problem with the paths of this worker's copies of the FMUs."""
+    local: dict[str, Path] = {}
+    for path, digest in fmu_files(problem.model).items():
+        if path.is_file() and _digest(path, path.stat().st_mtime_ns) == digest:
+            continue
+        stored = _store() / "files" / digest / path.name
+        if digest in files:
+            _put(stored, files[digest])
+        if not stored.is_file():
+            return Missing(digest)
+        local[digest] = stored
+    return replace(problem, model=with_local_files(problem.model, local)) if local else problem
 
 
 @lru_cache(maxsize=256)

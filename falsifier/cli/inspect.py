@@ -16,9 +16,11 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import parameterization_text
 from falsifier.errors import SpecError
+from falsifier.fmu import is_package, read_package
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems
+from falsifier.problem.models import make_system
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
@@ -26,6 +28,8 @@ from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
+
+    from falsifier.fmu import System
 
 # Maximum number of variables that are compared if the FMU declares no outputs.
 _CHECKED_VARIABLES = 50
@@ -42,15 +46,15 @@ _CHECKED_VARIABLES = 50
 )
 @json_option
 def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
-    """Show an FMU's interfaces, variables, units and ranges.
+    """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
     FMU is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
-    two stand for their FMU.
+    two stand for their FMU or system.
     """
     from falsifier.fmu import read_info
 
-    source = _existing_fmu(fmu.parent / read_spec(fmu).model.fmu if fmu.suffix == ".toml" else fmu)
-    found = read_info(source)
+    source = _named(fmu)
+    found = read_info(source) if isinstance(source, Path) else source.info
     if as_json:
         say(info_json(found))
         return
@@ -66,29 +70,47 @@ def build(*, fmu: Path, out: Path | None) -> None:
     """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
     from falsifier.fmu.build import build as compile_sources
 
-    written = compile_sources(_existing_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
+    written = compile_sources(_one_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
     say(f"{written} written")
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
-@out_option("Spec file to write; default: NAME.toml in the FMU's directory.")
+@click.argument("fmus", metavar="FMU...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
-def init(*, fmu: Path, out: Path | None, force: bool) -> None:
-    """Write a starter spec for an FMU: valid as written; fill in ranges and requirements."""
-    from falsifier.fmu import FmuModel, read_info
+def init(*, fmus: tuple[Path, ...], out: Path | None, force: bool) -> None:
+    """Write a starter spec: valid as written; fill in ranges and requirements.
 
-    source = _existing_fmu(fmu)
-    path = out or fmu.with_suffix(".toml")
+    FMU is an FMU or an SSP package. Several FMUs become the components of a system, to be connected in the
+    spec.
+    """
+    path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
     if path.exists() and not force:
         raise SpecError(f"{path} already exists: choose another --out, or add --force to replace it")
-    found = read_info(source)
-    # Raises an error if the FMU cannot be simulated, before a useless spec is written.
-    FmuModel(source, interface=default_interface(found) or "co-simulation")
-    path.write_text(starter_spec(_relative(source, path), found), encoding="utf-8")
+    path.write_text(_starter(fmus, path), encoding="utf-8")
     load_problems(str(path))
     command = f"falsifier run {shlex.quote(str(path))}"
     say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
+
+
+def _starter(fmus: tuple[Path, ...], path: Path) -> str:
+    from falsifier.fmu import FmuModel, System, read_info
+
+    if len(fmus) > 1:
+        parts: dict[str, Path] = {}
+        for source in map(_one_fmu, fmus):
+            name = source.stem if source.stem not in parts else f"{source.stem}{len(parts) + 1}"
+            parts[name] = source
+        info = System(dict(parts), name=path.stem).info
+        return starter_spec({name: _relative(source, path) for name, source in parts.items()}, info)
+    given = fmus[0]
+    if is_package(given):
+        return starter_spec(_relative(given, path), read_package(given).info)
+    source = _one_fmu(given)
+    found = read_info(source)
+    # Raises an error if the FMU cannot be simulated, before a useless spec is written.
+    FmuModel(source, interface=default_interface(found) or "co-simulation")
+    return starter_spec(_relative(source, path), found)
 
 
 @click.command()
@@ -127,18 +149,18 @@ def _schema(what: str) -> dict[str, Any]:
     return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
 
 
-def _print_convergence(fmu: Path, found: ModelInfo) -> None:
+def _print_convergence(source: "Path | System", found: ModelInfo) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.fmu import FmuModel
     from falsifier.fmu.step_effect import step_convergence
 
     interface = default_interface(found)
     if interface is None:
-        raise SpecError(f"{fmu}: {NO_INTERFACE}; export the model for co-simulation or model exchange")
+        raise SpecError(f"{source}: {NO_INTERFACE}; export the model for co-simulation or model exchange")
     stop_time = found.stop_time or DEFAULT_STOP_TIME
     outputs = tuple(v.name for v in found.observables if v.kind != "string")[:_CHECKED_VARIABLES]
     if not outputs:
-        raise SpecError(f"{fmu}: the FMU has no output, state or other computed variable to compare")
+        raise SpecError(f"{found.name}: no output, state or other computed variable to compare")
     grid = choose_grid(stop_time, fmu_step=found.step_size)
     experiment = Experiment(stop_time, grid.interval, outputs)
     signals = {
@@ -146,7 +168,7 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         for v in found.inputs
         if v.kind == "real" and v.low is not None and v.high is not None
     }
-    model = FmuModel(fmu, interface=interface)
+    model = FmuModel(source, interface=interface) if isinstance(source, Path) else source
     try:
         movements = step_convergence(model, experiment, signals)
     finally:
@@ -156,7 +178,7 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         f"({grid.reason}):"
     )
     if not found.outputs:
-        say("  the FMU declares no outputs; these are its states or other computed variables")
+        say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         unit = f" {found[name].unit}" if found[name].unit else ""
         say(
@@ -165,16 +187,47 @@ def _print_convergence(fmu: Path, found: ModelInfo) -> None:
         )
 
 
+def _named(given: Path) -> "Path | System":
+    """Return the FMU that is given, or the FMU or system of the spec or bundled name that is given."""
+    if given.suffix == ".toml":
+        return _of_spec(given)
+    if is_package(given):
+        return read_package(given)
+    if given.parent == Path() and not given.suffix and not (given.is_file() or _bundled_fmu(given).is_file()):
+        return _of_spec(find_spec(str(given))[0])  # the name of a bundled requirement
+    return _existing_fmu(given)
+
+
+def _of_spec(path: Path) -> "Path | System":
+    spec = read_spec(path)
+    if spec.model.fmu is None:
+        return make_system(spec, path)
+    fmu = path.parent / spec.model.fmu
+    return read_package(fmu) if is_package(fmu) else _existing_fmu(fmu)
+
+
+def _one_fmu(given: Path) -> Path:
+    """Return the FMU that is given, by path or name.
+
+    Raises:
+        SpecError: if there is none, or it is a system of several.
+    """
+    found = _named(given)
+    if isinstance(found, Path):
+        return found
+    raise SpecError(f"{given} is a system of FMUs; give one of them: {', '.join(found.parts)}")
+
+
 def _existing_fmu(fmu: Path) -> Path:
     if fmu.is_file():
         return fmu
-    inside = bundled("fmus") / f"{fmu.name.removesuffix('.fmu')}.fmu"
-    if fmu.parent == Path() and inside.is_file():
-        return inside
-    if fmu.parent == Path() and not fmu.suffix:
-        spec = find_spec(str(fmu))[0]  # the name of a bundled requirement
-        return spec.parent / read_spec(spec).model.fmu
+    if fmu.parent == Path() and _bundled_fmu(fmu).is_file():
+        return _bundled_fmu(fmu)
     raise SpecError(f"{fmu}: no such file; expected the path of an FMU, or the name of a bundled one")
+
+
+def _bundled_fmu(name: Path) -> Path:
+    return bundled("fmus") / f"{name.name.removesuffix('.fmu')}.fmu"
 
 
 def _relative(fmu: Path, spec: Path) -> Path:

@@ -112,6 +112,8 @@ class ModelInfo:
         tolerance: relative tolerance of its default experiment, if given.
         variables: all scalar variables.
         notes: what the user should know: what is ignored, unusual or needed, one sentence each.
+        components: names of the components of a system; empty for a single model.
+        connections: outputs and inputs that are connected in a system, as pairs of names.
     """
 
     name: str
@@ -126,6 +128,13 @@ class ModelInfo:
     tolerance: float | None = None
     variables: tuple[Variable, ...] = ()
     notes: tuple[str, ...] = ()
+    components: tuple[str, ...] = ()
+    connections: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def noun(self) -> str:
+        """What this model is called in messages about files: system or FMU."""
+        return "system" if self.components else "FMU"
 
     def __getitem__(self, name: str) -> Variable:
         for variable in self.variables:

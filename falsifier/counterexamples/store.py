@@ -25,6 +25,7 @@ from falsifier.core.sealing import check_seal, seal
 from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.fmu import fmu_files, fmus_sha256
 from falsifier.problem.loading import load_source, reloadable, spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource, Target
@@ -106,7 +107,7 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
         evaluation.verdict,
         outcome=confirmation.outcome,
         reason=confirmation.reason,
-        fmu_sha256=getattr(problem.model, "sha256", None),
+        fmu_sha256=fmus_sha256(fmu_files(problem.model).values()),
     )
 
 
@@ -316,9 +317,10 @@ class Database:
 
 
 def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
-    digest = getattr(problem.model, "sha256", None)
+    digest = fmus_sha256(fmu_files(problem.model).values())
     if stored.fmu_sha256 is not None and digest != stored.fmu_sha256:
-        yield "the FMU has changed since it was stored"
+        several = len(fmu_files(problem.model)) > 1
+        yield f"{'an FMU of the system' if several else 'the FMU'} has changed since it was stored"
     formula = str(problem.requirement.formula)
     if formula != stored.formula:
         yield f"the requirement has changed from {stored.formula} to {formula}"

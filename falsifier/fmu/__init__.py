@@ -1,6 +1,24 @@
 """FMUs: reading their description, stepping them, and isolating them in processes of their own."""
 
 from falsifier.fmu.description import read_info
+from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
+from falsifier.fmu.network import Coupling
 from falsifier.fmu.simulator import FmuModel
+from falsifier.fmu.ssp import is_package, read_package
+from falsifier.fmu.system import Component, System
+from falsifier.fmu.wiring import Connection
 
-__all__ = ["FmuModel", "read_info"]
+__all__ = [
+    "Component",
+    "Connection",
+    "Coupling",
+    "FmuModel",
+    "System",
+    "fmu_files",
+    "fmus_sha256",
+    "is_package",
+    "is_packaged",
+    "read_info",
+    "read_package",
+    "with_local_files",
+]

@@ -69,7 +69,8 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     except FileNotFoundError:
         raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
     except (zipfile.BadZipFile, OSError) as error:
-        raise ModelError(f"{path}: not a readable FMU, which is a zip archive ({error})") from error
+        what = "SSP package" if path.suffix == ".ssp" else "FMU"
+        raise ModelError(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
     with archive:
         _check(path, archive.infolist())
         yield archive

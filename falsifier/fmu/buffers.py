@@ -17,17 +17,20 @@ class Room:
         inputs: each input as a piecewise cubic (``Signal.pieces``), shape (inputs, 5 * pieces); unused pieces
             start at inf.
         outputs: recorded values by output and sample, shape (outputs, samples).
+        component: position of the component of a system whose code runs, shape (1,); after a crash it tells
+            which one crashed. 0 for a single FMU.
     """
 
     parameters: NDArray[np.float64]
     inputs: NDArray[np.float64]
     outputs: NDArray[np.float64]
+    component: NDArray[np.float64]
 
     @staticmethod
     def size(plan: Plan) -> int:
         """Return the number of float64 values that a plan needs."""
         rows = len(plan.inputs) * 5 * plan.pieces + len(plan.outputs) * plan.samples
-        return len(plan.parameters) + rows
+        return len(plan.parameters) + rows + 1
 
     @classmethod
     def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
@@ -39,4 +42,5 @@ class Room:
             memory[:a],
             memory[a:b].reshape(len(plan.inputs), 5 * plan.pieces),
             memory[b:c].reshape(len(plan.outputs), plan.samples),
+            memory[c : c + 1],
         )

@@ -12,9 +12,9 @@ from falsifier.fmu.plan import Plan
 from falsifier.fmu.stepper import Stepper
 
 # Communication steps before the time limit is first checked. If a chunk of steps took less than
-# _QUICK_SECONDS, the next one is larger, so that checking the clock never costs a noticeable share of the
+# QUICK_SECONDS, the next one is larger, so that checking the clock never costs a noticeable share of the
 # time.
-_FIRST_CHUNK, _CHUNK_GROWTH, _QUICK_SECONDS = 1000, 16, 0.01
+FIRST_CHUNK, CHUNK_GROWTH, QUICK_SECONDS = 1000, 16, 0.01
 
 
 class CoSimulation(Stepper):
@@ -53,7 +53,7 @@ class CoSimulation(Stepper):
             memory.ctypes.data,
             memory.ctypes.data + 8 * len(plan.inputs),
         )
-        first, chunk = 0, _FIRST_CHUNK
+        first, chunk = 0, FIRST_CHUNK
         while first < steps:
             started = time.perf_counter()
             last = min(first + chunk, steps)
@@ -66,8 +66,8 @@ class CoSimulation(Stepper):
             self._check(status, where, done * step)
             self._watch_clock(deadline, done * step)
             first = last
-            if time.perf_counter() - started < _QUICK_SECONDS:
-                chunk *= _CHUNK_GROWTH
+            if time.perf_counter() - started < QUICK_SECONDS:
+                chunk *= CHUNK_GROWTH
 
     def _is_held(self, variable: Variable) -> bool:
         return self._in_event_mode and variable.variability != "continuous"

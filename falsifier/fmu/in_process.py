@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from falsifier.core.printable import printable
 from falsifier.errors import SimulationError
-from falsifier.fmu import archive
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.folders import WorkFolder
+from falsifier.fmu.opening import open_session, unpack
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.session import Session
 from falsifier.fmu.worker_order import Order, Reuse
 
 
@@ -26,10 +25,8 @@ class LocalFmu:
         self._folder = WorkFolder()
         folder = self._folder.path
         try:
-            archive.extract(order.path, folder)
-            self._session = Session(
-                order.description, folder, order.interface, self._say, logging=order.logging
-            )
+            unpack(order, folder)
+            self._session = open_session(order, folder, self._say)
         except BaseException:
             self._folder.remove()
             raise

@@ -110,13 +110,15 @@ class IsolatedFmu:
             worker = self._started(worker, plan, fill)
             reply = worker.wait(plan.time_limit + GRACE_SECONDS)
         except TimeoutError:
+            during = self._during(worker)
             raise self._end(
-                f"did not finish within the time limit of {plan.time_limit:g} s and was stopped; "
+                f"did not finish within the time limit of {plan.time_limit:g} s and was stopped{during}; "
                 "slow models need a larger time_limit",
                 "timeout",
             ) from None
         except Garbled:
-            raise self._end("the FMU disturbed the replies of its process", "crashed") from None
+            disturbed = f"the FMU disturbed the replies of its process{self._during(worker)}"
+            raise self._end(disturbed, "crashed") from None
         except Closed:
             raise self._end("", "crashed") from None
         except BaseException:
@@ -205,13 +207,12 @@ class IsolatedFmu:
 
     def _not_loaded(self, worker: WorkerProcess, error: Exception, time_limit: float) -> Exception:
         """Error of an FMU that crashed or hung while it was loaded: unusable if it has never been loaded."""
-        log = worker.take_log()
+        log, during = worker.take_log(), self._during(worker)
         code = self._drop()
         hangs = isinstance(error, TimeoutError)
         how = f"hung for {time_limit:g} s (time_limit)" if hangs else "crashed"
-        text = (
-            f"{self._order.path}: the FMU {how} while it was loaded ({how_it_ended(code)}){last_lines(log)}"
-        )
+        end = f"({how_it_ended(code)}){last_lines(log)}"
+        text = f"{self._order.path}: the FMU {how} while it was loaded{during} {end}"
         if not self._has_loaded:
             return ModelError(text)
         return SimulationError(text, status="timeout" if hangs else "crashed", log=log)
@@ -240,11 +241,19 @@ class IsolatedFmu:
     def _end(self, reason: str, status: FailureStatus) -> SimulationError:
         worker = self._worker
         assert worker is not None, "_end is called during a simulation"
-        log = worker.take_log()
+        log, during = worker.take_log(), self._during(worker)
         code = self._drop()
         name = self._order.description.info.name
-        reason = reason or f"the FMU's process crashed: {how_it_ended(code)}"
+        reason = reason or f"the FMU's process crashed{during}: {how_it_ended(code)}"
         return SimulationError(f"{name}: {reason}" + last_lines(log), status=status, log=log)
+
+    def _during(self, worker: WorkerProcess) -> str:
+        """Say which component of a system was running; nothing for a single FMU."""
+        network = self._order.network
+        # The worker may have written anything there.
+        position = worker.room.component[0]
+        name = network.stepped(position) if network is not None and np.isfinite(position) else ""
+        return f" in component {name}" if name else ""
 
     def _drop(self) -> int:
         worker, self._worker = self._worker, None

@@ -59,6 +59,32 @@ class Lifecycle(ABC):
         return self._call.try_reset("Reset")
 
 
+class ModalLifecycle(Lifecycle):
+    """The calls of FMI 2 and 3, whose initialisation mode lets inputs be set and outputs read repeatedly."""
+
+    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+        """See Lifecycle."""
+        self.enter(plan, set_parameters)
+        set_inputs()
+        self.leave()
+
+    @abstractmethod
+    def enter(self, plan: Plan, set_parameters: Step) -> None:
+        """Set the parameters and enter initialisation mode.
+
+        Raises:
+            SimulationError: if the FMU reports an error.
+        """
+
+    def leave(self) -> None:
+        """Leave initialisation mode.
+
+        Raises:
+            SimulationError: if the FMU reports an error.
+        """
+        self._call("ExitInitializationMode")
+
+
 def make_lifecycle(library: Library) -> Lifecycle:
     """Return the life cycle for the library's FMI version and interface."""
     if library.description.major == 3:
@@ -94,8 +120,8 @@ class _Calls:
         return bool(self._library.address(name)) and self.status(name) <= 1
 
 
-class _Lifecycle2(Lifecycle):
-    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+class _Lifecycle2(ModalLifecycle):
+    def enter(self, plan: Plan, set_parameters: Step) -> None:
         set_parameters()
         self._call(
             "SetupExperiment",
@@ -107,12 +133,10 @@ class _Lifecycle2(Lifecycle):
             plan.stop_time,
         )
         self._call("EnterInitializationMode")
-        set_inputs()
-        self._call("ExitInitializationMode")
 
 
-class _Lifecycle3(Lifecycle):
-    def initialise(self, plan: Plan, set_parameters: Step, set_inputs: Step) -> None:
+class _Lifecycle3(ModalLifecycle):
+    def enter(self, plan: Plan, set_parameters: Step) -> None:
         set_parameters()
         self._call(
             "EnterInitializationMode",
@@ -123,8 +147,6 @@ class _Lifecycle3(Lifecycle):
             1,
             plan.stop_time,
         )
-        set_inputs()
-        self._call("ExitInitializationMode")
 
 
 class _Slave1(Lifecycle):

@@ -15,10 +15,11 @@ import traceback
 from pathlib import Path
 from typing import NoReturn
 
-from falsifier.errors import FalsifierError, ModelError
-from falsifier.fmu import archive, posix, worker
+from falsifier.errors import FalsifierError
+from falsifier.fmu import posix, worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
 from falsifier.fmu.folders import remove_tree, remove_work_folder
+from falsifier.fmu.opening import unpack
 from falsifier.fmu.stepper import warm_up
 from falsifier.fmu.worker_order import Order
 
@@ -26,6 +27,7 @@ START, REAP = 1, 2
 
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
+_COMPILING_MASTER = "compiling the loop that steps systems of FMUs, once per installation"
 _COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
 
 
@@ -48,7 +50,7 @@ class _Nursery:
     def __init__(self, sock: socket.socket, root: Path) -> None:
         self._sock, self._root = sock, root
         self._scratch: dict[int, Path] = {}
-        self._has_solver = False
+        self._has_solver = self._has_master = False
 
     def serve(self) -> None:
         while True:
@@ -77,6 +79,8 @@ class _Nursery:
             folder = self._extracted(order)
             if order.interface == "model-exchange":
                 self._load_solver()
+            if order.network is not None:
+                self._load_master()
             scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
             me = os.getpid()
             pid = os.fork()
@@ -102,6 +106,17 @@ class _Nursery:
             model_exchange.warm_up()
         self._has_solver = True
 
+    def _load_master(self) -> None:
+        """Compile the loops of systems before the first fork that needs them."""
+        if self._has_master:
+            return
+        from falsifier.fmu import master
+        from falsifier.fmu.compiling import on_long_compilation
+
+        with on_long_compilation(lambda: send_reply(self._sock, Reply(text=_COMPILING_MASTER, more=True))):
+            master.warm_up()
+        self._has_master = True
+
     def _reap(self, pid: int) -> Reply:
         posix.end_group(pid)
         _, status = os.waitpid(pid, 0)
@@ -113,12 +128,8 @@ class _Nursery:
     def _extracted(self, order: Order) -> Path:
         folder = self._root / order.sha256[:16]
         if not folder.is_dir():
-            if archive.file_hash(order.path) != order.sha256:
-                raise ModelError(
-                    f"{order.path}: the file has changed since the model was loaded; load the model again"
-                )
             partial = folder.with_suffix(".partial")
-            archive.extract(order.path, partial)
+            unpack(order, partial)
             partial.rename(folder)
         return folder
 

@@ -136,7 +136,7 @@ class WorkerProcess:
             self.pid = owner.start_worker(order, theirs.fileno(), self._output.fileno())
         self._life = posix.open_life(self.pid)
         self.plan: Plan | None = None
-        self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
+        self.room = Room(np.empty(0), np.empty((0, 0)), np.empty((0, 0)), np.zeros(1))
         self.awaits_test = False
         self.is_quick = False
         self.logging = order.logging

@@ -1,68 +1,42 @@
-"""An FMU that is simulated repeatedly: when to reset, restore or replace its instance."""
+"""What is simulated repeatedly, an FMU or a system: when to reset, restore or replace its instance."""
 
 import time
 from collections.abc import Callable, Collection
-from functools import partial
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from falsifier.core.model import Interface
 from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
-from falsifier.fmu.co_simulation import CoSimulation
-from falsifier.fmu.description import Description
-from falsifier.fmu.library import Library, LogSink
-from falsifier.fmu.lifecycle import make_lifecycle
+from falsifier.fmu.instance import Instance
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.saved_state import SavedState
-from falsifier.fmu.stepper import Stepper
 from falsifier.fmu.worker_order import REUSES, Reuse
 
 
 class Session:
-    """A loaded FMU that simulates according to a plan.
+    """A loaded FMU or system that simulates according to a plan.
 
     Args:
-        description: description of the FMU.
-        folder: folder to which it was extracted.
-        interface: interface to simulate with.
-        log: called with each of the FMU's messages.
-        logging: whether to ask the FMU for messages.
+        load: loads the libraries and makes the instance.
 
     Raises:
-        ModelError: if the FMU cannot be loaded.
+        ModelError: if that fails.
     """
 
-    def __init__(
-        self,
-        description: Description,
-        folder: Path,
-        interface: Interface,
-        log: LogSink,
-        *,
-        logging: bool = False,
-    ) -> None:
-        self._description = description
-        self._make_library = partial(Library, description, folder, interface, log, logging=logging)
-        self._load()
-        self.reuse: Reuse = "instance"
-
-    def _load(self) -> None:
-        self._library = self._make_library()
-        self._lifecycle = make_lifecycle(self._library)
-        self._saved = SavedState(self._library)
+    def __init__(self, load: Callable[[], Instance]) -> None:
+        self._load = load
+        self._instance = load()
         self._state: Literal["new", "broken", "finished"] = "new"
+        self.reuse: Reuse = "instance"
 
     def prepare(self, plan: Plan, room: Room) -> None:
         """Prepare for the simulations of a plan.
 
         Raises:
-            ModelError: if the library lacks functions for the plan's variables.
+            ModelError: if a library lacks functions for the plan's variables.
         """
         self._plan, self._room = plan, room
-        self._stepper = self._make_stepper(plan, room)
+        self._instance.prepare(plan, room)
 
     def run(self) -> None:
         """Simulate once, from the room's parameters and inputs to its outputs.
@@ -73,13 +47,11 @@ class Session:
         deadline = time.perf_counter() + self._plan.time_limit
         if self._state != "new" and not self._is_brought_back():
             self._renew()
-        if self._state == "new" and self.reuse == "state" and not self._saved.take():
+        if self._state == "new" and self.reuse == "state" and not self._instance.take():
             self.reuse = "instance"
         # Stays so if anything below raises an exception: such an instance cannot be reset reliably.
         self._state = "broken"
-        self._lifecycle.initialise(self._plan, self._stepper.set_parameters, self._stepper.set_first_inputs)
-        self._stepper.advance(deadline)
-        self._lifecycle.terminate()
+        self._instance.simulate(deadline)
         self._state = "finished"
 
     def find_reuse(
@@ -96,7 +68,9 @@ class Session:
         """
         plan, room = self._plan, self._room
         expected = room.outputs.copy()
-        trial = Room(room.parameters.copy(), room.inputs.copy(), np.zeros_like(room.outputs))
+        trial = Room(
+            room.parameters.copy(), room.inputs.copy(), np.zeros_like(room.outputs), room.component.copy()
+        )
         self.prepare(plan, trial)
         found: Reuse = "process"
         for reuse in self._possible():
@@ -122,22 +96,22 @@ class Session:
 
     def close(self) -> None:
         """Free the instance and unload the library."""
-        self._saved.forget()
-        self._library.close()
+        self._instance.forget()
+        self._instance.close()
 
     def _renew(self) -> None:
         """Replace the instance; load the library again if its static data must not survive.
 
         That this fails says nothing about simulations with other inputs.
         """
-        self._saved.forget()
+        self._instance.forget()
         try:
             if self.reuse == "library":
-                self._library.close()
-                self._load()
-                self._stepper = self._make_stepper(self._plan, self._room)
+                self._instance.close()
+                self._instance = self._load()
+                self._instance.prepare(self._plan, self._room)
             else:
-                self._library.renew()
+                self._instance.renew()
         except ModelError as error:
             raise SimulationError(str(error)) from error
         self._state = "new"
@@ -146,23 +120,15 @@ class Session:
         """Reset the instance after a finished simulation or restore its state; return whether that worked."""
         if self._state != "finished":
             return False
-        if self.reuse == "reset" and self._lifecycle.reset():
+        if self.reuse == "reset" and self._instance.reset():
             return True
-        if self.reuse == "state" and self._saved.restore():
+        if self.reuse == "state" and self._instance.restore():
             return True
-        if self.reuse == "reset" or (self.reuse == "state" and self._saved.is_taken):
+        if self.reuse == "reset" or (self.reuse == "state" and self._instance.is_taken):
             self.reuse = "instance"
         return False
 
     def _possible(self) -> tuple[Reuse, ...]:
-        """Return the ways to start again that the FMU declares, the cheapest first."""
-        saves = self._library.interface in self._description.saves_state
+        """Return the ways to start again that are declared, the cheapest first."""
+        saves = self._instance.saves_state
         return tuple(reuse for reuse in REUSES[:-1] if saves or reuse != "state")
-
-    def _make_stepper(self, plan: Plan, room: Room) -> Stepper:
-        if self._library.interface == "co-simulation":
-            return CoSimulation(self._description, self._library, plan, room)
-        # The solver takes seconds to compile and is not needed for co-simulation.
-        from falsifier.fmu.model_exchange import ModelExchange
-
-        return ModelExchange(self._description, self._library, plan, room, self._lifecycle)

@@ -9,16 +9,16 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, Interface, ModelInfo, check_finite
+from falsifier.core.model import Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import archive, in_process
-from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description, describe
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
-from falsifier.fmu.plan import Plan, make_plan
+from falsifier.fmu.plan import make_plan
 from falsifier.fmu.remarks import needed_tool_text
+from falsifier.fmu.tasks import Task, make_task, room_for, run_task
 from falsifier.fmu.worker_order import Order
 
 
@@ -63,26 +63,11 @@ class FmuModel:
         rounded.
         """
         tables = self._pieces(signals, experiment)
-        pieces = max(map(len, tables), default=1)
-        # Rounded up to a power of two, so that a few plans suffice for candidates with any number of control
-        # points.
-        task = _task(self, experiment, tuple(signals), tuple(parameters), 1 << (pieces - 1).bit_length())
-
-        def fill(room: Room) -> None:
-            if parameters:
-                room.parameters[:] = list(parameters.values())
-            for row, table in zip(room.inputs, tables, strict=True):
-                row[: table.size] = table.ravel()
-                row[table.size :] = np.inf
-
+        task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
         try:
-            outputs, log = _runner(self).simulate(task.plan, fill)
+            return run_task(_runner(self), task, tables, parameters, self.info.name)
         except (ModelError, SimulationError) as error:
             raise self._with_hint(error) from None
-        columns = dict(zip(task.plan.outputs, outputs, strict=True))
-        if not np.isfinite(outputs).all():
-            check_finite(self.info.name, task.times, columns)
-        return Trajectory(task.times, columns, task.units, log)
 
     def place(self, name: str) -> tuple[str, int]:
         """Return where a scalar stands: the name that the FMU declares, and the position in that array."""
@@ -145,15 +130,6 @@ class FmuModel:
         return describe(self.path, self.sha256)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Task:
-    """What the simulations of one search share in the process that requests them."""
-
-    plan: Plan
-    times: NDArray[np.float64]
-    units: Mapping[str, str]
-
-
 @lru_cache(maxsize=64)
 def _task(
     model: FmuModel,
@@ -161,13 +137,10 @@ def _task(
     inputs: tuple[str, ...],
     parameters: tuple[str, ...],
     pieces: int,
-) -> _Task:
+) -> Task:
     description = describe(model.path, model.sha256)
     plan = make_plan(description, experiment, inputs, parameters, pieces=pieces)
-    times = experiment.times
-    times.flags.writeable = False
-    units = {v.name: v.unit for v in description.info.variables if v.unit and v.name in plan.outputs}
-    return _Task(plan, times, units)
+    return make_task(plan, experiment, description.info)
 
 
 def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:

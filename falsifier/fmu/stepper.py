@@ -105,21 +105,7 @@ class Stepper(ABC):
         loops = self._loops
         if where == loops.DONE:
             return
-        if where == loops.TERMINATED:
-            what = "the FMU terminated the simulation"
-        elif where == loops.STUCK:
-            what = "the FMU makes no progress: its events never end"
-        elif where == loops.TOO_SMALL:
-            what = (
-                "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast"
-            )
-        else:
-            doing = {
-                loops.SETTING: "setting the inputs",
-                loops.STEPPING: "the step",
-                loops.GETTING: "reading the outputs",
-            }.get(where, "the event iteration")
-            what = f"{doing} returned {status_name(status)}"
+        what = what_stopped(loops, status, where)
         raise SimulationError(
             f"{self._name}: {what} at t = {reached:g} s, before the stop time {self._plan.stop_time:g} s",
             time=reached,
@@ -134,6 +120,22 @@ class Stepper(ABC):
                 status="timeout",
                 time=reached,
             )
+
+
+def what_stopped(loops: Any, status: int, where: int) -> str:
+    """Say why a compiled loop stopped before its end, from its report."""
+    if where == loops.TERMINATED:
+        return "the FMU terminated the simulation"
+    if where == loops.STUCK:
+        return "the FMU makes no progress: its events never end"
+    if where == loops.TOO_SMALL:
+        return "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast"
+    doing = {
+        loops.SETTING: "setting the inputs",
+        loops.STEPPING: "the step",
+        loops.GETTING: "reading the outputs",
+    }.get(where, "the event iteration")
+    return f"{doing} returned {status_name(status)}"
 
 
 def check_range(model: str, names: Sequence[str], ports: Ports, rows: NDArray[np.float64]) -> None:

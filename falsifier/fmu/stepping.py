@@ -84,12 +84,14 @@ def _values_3(_typing, f, instance, references, count, values, size):  # type: i
 
 
 @intrinsic
-def _do_step_1(_typing, f, instance, time, step, new_step):  # type: ignore[no-untyped-def]
+def do_step_1(_typing, f, instance, time, step, new_step):  # type: ignore[no-untyped-def]
+    """Call fmiDoStep of FMI 1."""
     return call_signature("pddb")
 
 
 @intrinsic
-def _do_step_2(_typing, f, instance, time, step, no_return):  # type: ignore[no-untyped-def]
+def do_step_2(_typing, f, instance, time, step, no_return):  # type: ignore[no-untyped-def]
+    """Call fmi2DoStep."""
     return call_signature("pddi")
 
 
@@ -121,34 +123,34 @@ def _typed(kind: Any, stored: ir.Type) -> tuple[Any, Any]:
     return load, store
 
 
-_load_f8, _store_f8 = _typed(types.float64, ir.DoubleType())
+load_f8, store_f8 = _typed(types.float64, ir.DoubleType())
 _load_f4, _store_f4 = _typed(types.float32, ir.FloatType())
 _load_i1, _store_i1 = _typed(types.int8, ir.IntType(8))
-_load_u1, _store_u1 = _typed(types.uint8, ir.IntType(8))
+load_u1, store_u1 = _typed(types.uint8, ir.IntType(8))
 _load_i2, _store_i2 = _typed(types.int16, ir.IntType(16))
 _load_u2, _store_u2 = _typed(types.uint16, ir.IntType(16))
 _load_i4, _store_i4 = _typed(types.int32, ir.IntType(32))
 _load_u4, _store_u4 = _typed(types.uint32, ir.IntType(32))
-_load_i8, _store_i8 = _typed(types.int64, ir.IntType(64))
+load_i8, store_i8 = _typed(types.int64, ir.IntType(64))
 _load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
 
 compiled: Any = keep_compiled
 # For functions called in every step: without inlining, each address would be passed as a separate argument.
-_inlined: Any = partial(keep_compiled, forceinline=True)
+inlined: Any = partial(keep_compiled, forceinline=True)
 
 
-@_inlined
+@inlined
 def fetch(place):  # type: ignore[no-untyped-def]
     """Return a variable's value as a number, read from its location in a row of Ports.places."""
-    kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
+    kind, address, sign = load_i8(place), load_i8(place + 8), load_i8(place + 16)
     if kind == 0:
-        return _load_f8(address) * sign
+        return load_f8(address) * sign
     if kind == 1:
         value = np.float64(_load_f4(address))
     elif kind == 2:
         value = np.float64(_load_i1(address))
     elif kind == 3:
-        value = np.float64(_load_u1(address))
+        value = np.float64(load_u1(address))
     elif kind == 4:
         value = np.float64(_load_i2(address))
     elif kind == 5:
@@ -158,31 +160,31 @@ def fetch(place):  # type: ignore[no-untyped-def]
     elif kind == 7:
         value = np.float64(_load_u4(address))
     elif kind == 8:
-        value = np.float64(_load_i8(address))
+        value = np.float64(load_i8(address))
     else:
         value = np.float64(_load_u8(address))
-    if _load_i8(place + 24):
+    if load_i8(place + 24):
         # Any non-zero value is true; the negated alias of a Boolean is its complement.
         return 1.0 if (value != 0.0) == (sign > 0) else 0.0
     return value * sign
 
 
-@_inlined
+@inlined
 def put(place, number):  # type: ignore[no-untyped-def]
     """Write a number to a variable's location in a row of Ports.places; integers and Booleans are rounded."""
-    kind, address, sign = _load_i8(place), _load_i8(place + 8), _load_i8(place + 16)
+    kind, address, sign = load_i8(place), load_i8(place + 8), load_i8(place + 16)
     value = number * sign
     if kind == 0:
-        _store_f8(address, value)
+        store_f8(address, value)
         return
-    if _load_i8(place + 24):
+    if load_i8(place + 24):
         value = 1.0 if (number >= 0.5) == (sign > 0) else 0.0
     if kind == 1:
         _store_f4(address, np.float32(value))
     elif kind == 2:
         _store_i1(address, np.int8(np.rint(value)))
     elif kind == 3:
-        _store_u1(address, np.uint8(np.rint(value)))
+        store_u1(address, np.uint8(np.rint(value)))
     elif kind == 4:
         _store_i2(address, np.int16(np.rint(value)))
     elif kind == 5:
@@ -192,21 +194,21 @@ def put(place, number):  # type: ignore[no-untyped-def]
     elif kind == 7:
         _store_u4(address, np.uint32(np.rint(value)))
     elif kind == 8:
-        _store_i8(address, np.int64(np.rint(value)))
+        store_i8(address, np.int64(np.rint(value)))
     else:
         _store_u8(address, np.uint64(np.rint(value)))
 
 
-@_inlined
+@inlined
 def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
     """Make the get or set calls of a table (Ports.table); stop at the first status worse than a warning."""
     worst = 0
     for g in range(ports[1]):
         call = ports[0] + g * CALL_BYTES
-        function, references, count = _load_i8(call), _load_i8(call + 8), _load_i8(call + 16)
-        values = _load_i8(call + 24)
+        function, references, count = load_i8(call), load_i8(call + 8), load_i8(call + 16)
+        values = load_i8(call + 24)
         if version == 3:
-            status = _values_3(function, instance, references, count, values, _load_i8(call + 32))
+            status = _values_3(function, instance, references, count, values, load_i8(call + 32))
         else:
             status = _values_2(function, instance, references, count, values)
         worst = max(worst, status)
@@ -215,13 +217,13 @@ def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
     return worst
 
 
-@_inlined
+@inlined
 def read_row(instance, version, ports, rows, width, column):  # type: ignore[no-untyped-def]
     """Read all variables of a table into one column of the float64 rows of this width at this address."""
     status = exchange_values(instance, version, ports)
     if status <= 1:
         for j in range(ports[3]):
-            _store_f8(rows + 8 * (j * width + column), fetch(ports[2] + j * PLACE_BYTES))
+            store_f8(rows + 8 * (j * width + column), fetch(ports[2] + j * PLACE_BYTES))
     return status
 
 
@@ -229,31 +231,31 @@ def read_row(instance, version, ports, rows, width, column):  # type: ignore[no-
 def write_row(instance, version, ports, numbers):  # type: ignore[no-untyped-def]
     """Set all variables of a table to the float64 numbers at this address."""
     for j in range(ports[3]):
-        put(ports[2] + j * PLACE_BYTES, _load_f8(numbers + 8 * j))
+        put(ports[2] + j * PLACE_BYTES, load_f8(numbers + 8 * j))
     return exchange_values(instance, version, ports)
 
 
-@_inlined
+@inlined
 def rounding(time):  # type: ignore[no-untyped-def]
     """Return the difference in s below which two times are considered equal."""
     return 1e-11 * max(1.0, abs(time))
 
 
-@_inlined
+@inlined
 def start_of(pieces, j, p):  # type: ignore[no-untyped-def]
     """Return the start in s of piece p of input j; inf after the last one."""
-    return _load_f8(pieces[0] + PIECE_BYTES * (j * pieces[1] + p)) if p < pieces[1] else np.inf
+    return load_f8(pieces[0] + PIECE_BYTES * (j * pieces[1] + p)) if p < pieces[1] else np.inf
 
 
-@_inlined
+@inlined
 def value_at(pieces, j, p, time):  # type: ignore[no-untyped-def]
     """Return input j at a time within its piece p or at its end; ``pieces``: address and number per input."""
     at = pieces[0] + PIECE_BYTES * (j * pieces[1] + p)
-    dt = time - _load_f8(at)
-    return ((_load_f8(at + 32) * dt + _load_f8(at + 24)) * dt + _load_f8(at + 16)) * dt + _load_f8(at + 8)
+    dt = time - load_f8(at)
+    return ((load_f8(at + 32) * dt + load_f8(at + 24)) * dt + load_f8(at + 16)) * dt + load_f8(at + 8)
 
 
-@_inlined
+@inlined
 def _put_inputs(ports, pieces, current, values, time):  # type: ignore[no-untyped-def]
     """Write the values of all inputs of a table at a time to its buffers; return whether any has changed.
 
@@ -261,13 +263,13 @@ def _put_inputs(ports, pieces, current, values, time):  # type: ignore[no-untype
     """
     changed = False
     for j in range(ports[3]):
-        p = _load_i8(current + 8 * j)
+        p = load_i8(current + 8 * j)
         while start_of(pieces, j, p + 1) <= time + rounding(time):
             p += 1
-        _store_i8(current + 8 * j, p)
+        store_i8(current + 8 * j, p)
         value = value_at(pieces, j, p, time)
-        changed = changed or value != _load_f8(values + 8 * j)
-        _store_f8(values + 8 * j, value)
+        changed = changed or value != load_f8(values + 8 * j)
+        store_f8(values + 8 * j, value)
         put(ports[2] + j * PLACE_BYTES, value)
     return changed
 
@@ -286,15 +288,15 @@ def settle_3(functions, scratch):  # type: ignore[no-untyped-def]
         )  # fmt: skip
         if status > 1:
             return status, EVENT
-        if _load_u1(scratch + 1):
+        if load_u1(scratch + 1):
             return status, TERMINATED
-        if not _load_u1(scratch):
+        if not load_u1(scratch):
             return status, DONE
     return 0, STUCK
 
 
 @compiled
-def _event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
+def event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
     """Enter event mode, set the inputs of a table, update the discrete states, return to step mode."""
     instance = functions[INSTANCE]
     status = call_mode(functions[ENTER_EVENT_MODE], instance)
@@ -310,25 +312,25 @@ def _event_3(functions, ports, scratch):  # type: ignore[no-untyped-def]
     return status, EVENT if status > 1 else DONE
 
 
-@_inlined
-def _advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
+@inlined
+def advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
     """Do one communication step of FMI 3, in several calls if the FMU returns early.
 
     Returns status, where it stopped, and whether the FMU requested to terminate the simulation.
     """
     time, rounds = start, 0
     while True:
-        _store_f8(scratch + 8, end)
+        store_f8(scratch + 8, end)
         status = _do_step_3(
             functions[DO_STEP], functions[INSTANCE], time, end - time, np.uint8(1),
             scratch, scratch + 1, scratch + 2, scratch + 8,
         )  # fmt: skip
         if status > 1:
             return status, STEPPING, False
-        event, ends, early = _load_u1(scratch) != 0, _load_u1(scratch + 1) != 0, _load_u1(scratch + 2) != 0
-        before, time = time, (_load_f8(scratch + 8) if early else end)
+        event, ends, early = load_u1(scratch) != 0, load_u1(scratch + 1) != 0, load_u1(scratch + 2) != 0
+        before, time = time, (load_f8(scratch + 8) if early else end)
         if event and functions[EVENT_MODE] and not ends:
-            status, where = _event_3(functions, (0, 0, 0, 0), scratch)
+            status, where = event_3(functions, (0, 0, 0, 0), scratch)
             if where == TERMINATED:
                 return status, DONE if time >= end else TERMINATED, True
             if where != DONE:
@@ -384,11 +386,11 @@ def co_simulate(  # type: ignore[no-untyped-def]
             break
         ends = False
         if version == 3:
-            status, where, ends = _advance_3(functions, start, end, scratch)
+            status, where, ends = advance_3(functions, start, end, scratch)
         elif version == 2:
-            status = _do_step_2(functions[DO_STEP], instance, start, end - start, np.int32(1))
+            status = do_step_2(functions[DO_STEP], instance, start, end - start, np.int32(1))
         else:
-            status = _do_step_1(functions[DO_STEP], instance, start, end - start, np.uint8(1))
+            status = do_step_1(functions[DO_STEP], instance, start, end - start, np.uint8(1))
         if status > 1 and where == DONE:
             where = STEPPING
         if where != DONE:
@@ -405,7 +407,7 @@ def co_simulate(  # type: ignore[no-untyped-def]
     memory[0] = 0
 
 
-@_inlined
+@inlined
 def _set_inputs(  # type: ignore[no-untyped-def]
     functions, ports, pieces, held_ports, held_pieces, current, values, time, is_initialised, scratch
 ):  # fmt: skip
@@ -420,7 +422,7 @@ def _set_inputs(  # type: ignore[no-untyped-def]
         changed = _put_inputs(held_ports, held_pieces, current + offset, values + offset, time)
         # Initialisation has already set their values at time 0.
         if changed and is_initialised:
-            return _event_3(functions, held_ports, scratch)
+            return event_3(functions, held_ports, scratch)
     return 0, DONE
 
 

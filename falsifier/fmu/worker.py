@@ -27,6 +27,7 @@ from falsifier.fmu.channel import (
     send_reply,
     watch,
 )
+from falsifier.fmu.opening import open_session
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.session import Session
 from falsifier.fmu.worker_order import Order, Reuse
@@ -97,14 +98,14 @@ class _Worker:
 
     def _load(self) -> Session:
         """Load the library and make an instance, which may succeed at another time."""
-        order = self._order
         try:
-            self._session = Session(
-                order.description, self._folder, order.interface, _log, logging=order.logging
-            )
+            self._session = open_session(self._order, self._folder, _log, self._announce)
         except ModelError as error:
             raise SimulationError(str(error)) from error
         return self._session
+
+    def _announce(self, position: int) -> None:
+        self._room.component[0] = position
 
     def run(self) -> Reply:
         assert self._session is not None, "prepare must be called before run"

@@ -1,4 +1,4 @@
-"""What a new worker needs to know about the FMU that it will simulate."""
+"""What a new worker needs to know about the FMU or the system that it will simulate."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 from falsifier.core.model import Interface
 from falsifier.fmu.description import Description
+from falsifier.fmu.network import Network
 
 # How the next simulation starts, the cheapest first: with the same instance after a reset or from its saved
 # state, with a new instance, with the library loaded again, or in a new process.
@@ -15,16 +16,17 @@ REUSES: tuple[Reuse, ...] = get_args(Reuse)
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The FMU that a new worker simulates.
+    """The FMU or system that a new worker simulates.
 
     Attributes:
-        path: path of the FMU.
-        sha256: hash of the file when the model was loaded.
-        description: description of the FMU.
+        path: path of the FMU; the name of a system.
+        sha256: hash of the file when the model was loaded; of a system, its key.
+        description: description of the FMU, or of the system as a whole.
         interface: interface to simulate with.
         reuse: how the next simulation starts; None if not yet known.
         untrusted: ways to start that made the FMU crash or hang; they are not tried again.
         logging: whether to ask the FMU for messages.
+        network: components and connections of a system; None for a single FMU.
     """
 
     path: Path
@@ -34,3 +36,4 @@ class Order:
     reuse: Reuse | None
     untrusted: tuple[Reuse, ...] = ()
     logging: bool = False
+    network: Network | None = None

@@ -1,16 +1,17 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, Model, ModelInfo, Variable
+from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.errors import ModelError, SpecError, did_you_mean
-from falsifier.fmu import FmuModel, read_info
+from falsifier.errors import SpecError, did_you_mean
+from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface
 from falsifier.problem.freedom import default_freedom
 from falsifier.problem.grid import Grid, choose_grid, formula_times
+from falsifier.problem.models import check_own_steps, make_model
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.problem.sizes import check_sizes, check_steps
@@ -42,8 +43,9 @@ def join(
     stl: str | None = None,
     stl_name: str = STL_NAME,
     changes: ModelChanges | None = None,
+    model: Model | None = None,
 ) -> Joined:
-    """Join a validated spec with its FMU.
+    """Join a validated spec with its FMU or system.
 
     Args:
         spec: the spec.
@@ -53,6 +55,7 @@ def join(
         stl: a formula to use instead of the spec's.
         stl_name: name of the requirement that this formula makes.
         changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
+        model: the model; None: the one that the spec names.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -65,20 +68,11 @@ def join(
         )
     if profile is not None and profile not in spec.profiles:
         raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}", file=file)
-    fmu = path.parent / spec.model.fmu
-    if not fmu.is_file():
-        raise SpecError(
-            f"no such FMU: {fmu}; give its path relative to the spec file", file=file, key="model.fmu"
-        )
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-    logging = [layer.logging for layer in layers if layer.logging is not None]
-    model = FmuModel(
-        fmu,
-        interface=_interface(spec, layers, read_info(fmu), file),
-        logging=logging[-1] if logging else spec.model.logging,
-    )
+    model = model or make_model(spec, layers, path)
     formulas = [r.formula for r in spec.requirements.values()] if stl is None else [stl]
     experiment, grid = _experiment(spec, layers, model.info, formulas, file)
+    check_own_steps(model, experiment, file)
     inputs, parameters = _merged(spec, layers)
     inputs |= _with_points(inputs, changes, formulas, experiment)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
@@ -86,7 +80,7 @@ def join(
     strings = _strings(parameters, model.info, path.parent)
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
-    is_option = stl is not None or path.suffix == ".fmu"
+    is_option = stl is not None or path.suffix in (".fmu", ".ssp", ".ssd")
     key = "--stl" if is_option else f"requirements.{requirement}.formula"
     formula = parse_requirement(
         section.formula if stl is None else stl, model.info, experiment, file=file, key=key
@@ -118,55 +112,84 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME
     """
     if not fmu.is_file():
         raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
+    if is_package(fmu):
+        _refuse_interface(changes, fmu)
+        return join_system(read_package(fmu), stl, path=fmu, changes=changes, name=name)
     info = read_info(fmu)
+    interface = changes.interface or default_interface(info)
+    return _join_formula(
+        {"model": {"fmu": str(fmu.resolve()), "interface": interface}},
+        info,
+        stl,
+        path=fmu,
+        changes=changes,
+        name=name,
+    )
+
+
+def _refuse_interface(changes: ModelChanges, path: Path) -> None:
+    if changes.interface == "model-exchange":
+        raise SpecError(f"{path}: the components of a system step by co-simulation; leave --interface out")
+
+
+def join_system(
+    system: System, stl: str, *, path: Path, changes: ModelChanges, name: str = STL_NAME
+) -> Joined:
+    """Join a system and a formula, without a spec; otherwise like ``join_fmu``.
+
+    Args:
+        system: the system.
+        stl: the requirement.
+        path: where the system comes from, for error messages.
+        changes: overrides for experiment, inputs and parameters.
+        name: name of the requirement.
+
+    Raises:
+        SpecError: naming what is unknown and the option that specifies it.
+    """
+    components = {each: {"fmu": str(part.fmu)} for each, part in system.parts.items()}
+    return _join_formula(
+        {"components": components}, system.info, stl, path=path, changes=changes, name=name, model=system
+    )
+
+
+def _join_formula(
+    sections: Mapping[str, Mapping[str, object]],
+    info: ModelInfo,
+    stl: str,
+    *,
+    path: Path,
+    changes: ModelChanges,
+    name: str,
+    model: Model | None = None,
+) -> Joined:
     stop_time = changes.stop_time or info.stop_time
     if stop_time is None:
-        raise SpecError(f"{fmu}: the FMU has no default stop time; add --stop-time SECONDS")
+        raise SpecError(f"{path}: the {info.noun} has no default stop time; add --stop-time SECONDS")
     searched = any(s.value is None for s in changes.inputs.values()) or any(
         s.range is not None for s in changes.parameters.values()
     )
-    spec = parse_spec(
-        {
-            "model": {
-                "fmu": str(fmu.resolve()),
-                "interface": changes.interface or default_interface(info),
-                "stop_time": stop_time,
-            },
-            "requirements": {name: {"formula": stl}},
-        },
-        file=str(fmu),
-    )
+    data = {
+        **sections,
+        "model": {**sections.get("model", {}), "stop_time": stop_time},
+        "requirements": {name: {"formula": stl}},
+    }
+    spec = parse_spec(data, file=str(path))
     bounded = {} if searched else _bounded_inputs(info)
     if not searched and not bounded:
         inputs = [v.name for v in info.inputs]
         why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
-            f"{fmu}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
+            f"{path}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
             f"{did_you_mean('', inputs)}"
         )
     every = changes.model_copy(update={"inputs": bounded | changes.inputs})
-    joined = join(spec, name, path=fmu, changes=every)
+    joined = join(spec, name, path=path, changes=every, model=model)
     unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
     if searched or not unbounded:
         return joined
-    note = f"not searched, because the FMU specifies no min and max: {', '.join(unbounded)}"
+    note = f"not searched, because the {info.noun} specifies no min and max: {', '.join(unbounded)}"
     return replace(joined, notes=(*joined.notes, note))
-
-
-def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
-    stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
-    if not info.interfaces:
-        raise ModelError(
-            f"{info.name}: the FMU offers neither co-simulation nor model exchange, and scheduled execution "
-            "is not supported; export it for co-simulation"
-        )
-    if stated is None and len(info.interfaces) == 1:
-        return info.interfaces[0]
-    offered = " and ".join(info.interfaces)
-    if stated is None or stated not in info.interfaces:
-        advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
-        raise SpecError(f"the FMU offers {offered}{advice}", file=file, key="model.interface")
-    return stated
 
 
 def _experiment(
@@ -183,7 +206,9 @@ def _experiment(
 
     stop_time = stated("stop_time") or info.stop_time
     if stop_time is None:
-        raise SpecError("the FMU has no default stop time; add this key", file=file, key="model.stop_time")
+        raise SpecError(
+            f"the {info.noun} has no default stop time; add this key", file=file, key="model.stop_time"
+        )
     output_interval, step_size = stated("output_interval"), stated("step_size")
     grid = None
     if output_interval is None:
@@ -225,7 +250,7 @@ def _notes(grid: Grid | None, info: ModelInfo, known: Collection[str]) -> Iterat
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
     unset = [v.name for v in info.inputs if v.name not in known]
     if unset:
-        yield f"inputs without a start value, left to the FMU: {', '.join(unset)}"
+        yield f"inputs without a start value, left to the {info.noun}: {', '.join(unset)}"
 
 
 def _recording(
@@ -293,9 +318,10 @@ def _space(
         if name in info and info[name].alias_of:
             other = info[name].alias_of
             raise SpecError(
-                f"the FMU has one input with two names: use {other!r} instead", file=file, key=key
+                f"the {info.noun} has one input with two names: use {other!r} instead", file=file, key=key
             )
-        variable = _variable(name, info.inputs, "input", file, key)
+        _check_unconnected(name, info, file, key)
+        variable = _variable(name, info.inputs, f"the {info.noun} has no such input", file, key)
         if section.value is not None:
             fixed[name] = fixed_value(variable, section.value, file=file, key=f"{key}.value")
         else:
@@ -306,12 +332,15 @@ def _space(
         if name in info and info[name].causality == "input":
             raise SpecError(f"{name} is an input; {_as_input(name, parameter, file)}", file=file, key=key)
         settable = [v for v in info.variables if v.settable and v.causality != "input"]
+        _check_unconnected(name, info, file, key)
         if name in info and not info[name].settable:
             v = info[name]
-            reason = f"it is a {v.variability} {v.causality} of the FMU"
+            reason = f"it is a {v.variability} {v.causality} of the {info.noun}"
             reason = f"it is another name of {v.alias_of!r}; use that one" if v.alias_of else reason
             raise SpecError(f"cannot be set: {reason}", file=file, key=key)
-        variable = _variable(name, settable, "parameter or start value", file, key)
+        variable = _variable(
+            name, settable, f"the {info.noun} has no such parameter or start value", file, key
+        )
         if variable.kind == "string" and parameter.value is not None:
             continue
         if parameter.range is not None:
@@ -319,7 +348,7 @@ def _space(
         elif parameter.value is not None:
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
     if not searched and not ranges:
-        if file.endswith(".fmu"):  # there is no spec file
+        if file.endswith((".fmu", ".ssp", ".ssd")):  # there is no spec file
             raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
         raise SpecError(
             "nothing to search; add [inputs.NAME] with range and control_points, "
@@ -328,6 +357,14 @@ def _space(
             key="inputs",
         )
     return SearchSpace(tuple(searched), tuple(ranges), experiment.stop_time), fixed
+
+
+def _check_unconnected(name: str, info: ModelInfo, file: str, key: str) -> None:
+    source = next((source for source, target in info.connections if target == name), None)
+    if source is not None:
+        raise SpecError(
+            f"this input is connected to {source}; remove this section or the connection", file=file, key=key
+        )
 
 
 def _strings(
@@ -341,10 +378,10 @@ def _strings(
     )
 
 
-def _variable(name: str, variables: Iterable[Variable], kind: str, file: str, key: str) -> Variable:
+def _variable(name: str, variables: Iterable[Variable], otherwise: str, file: str, key: str) -> Variable:
     known = {v.name: v for v in variables}
     if name not in known:
-        raise SpecError(f"the FMU has no such {kind}; {did_you_mean(name, known)}", file=file, key=key)
+        raise SpecError(f"{otherwise}; {did_you_mean(name, known)}", file=file, key=key)
     return known[name]
 
 
@@ -354,7 +391,9 @@ def _as_input(name: str, section: ParameterSection, file: str) -> str:
     if section.range is not None:
         text = ":".join(f"{value:g}" for value in section.range)
     option = f"--input {name}={text}"
-    return f"write {option}" if file.endswith(".fmu") else f"write {option}, or [inputs.{name}] in the spec"
+    if file.endswith((".fmu", ".ssp", ".ssd")):
+        return f"write {option}"
+    return f"write {option}, or [inputs.{name}] in the spec"
 
 
 def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:

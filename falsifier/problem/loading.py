@@ -15,6 +15,7 @@ from falsifier.core.files import bundled
 from falsifier.core.model import Interface
 from falsifier.core.space import Freedom
 from falsifier.errors import SpecError, did_you_mean
+from falsifier.fmu import is_package
 from falsifier.problem.joining import Joined, join, join_fmu
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
@@ -128,7 +129,9 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
 
 
 def spec_file(source: ProblemSource) -> Path | None:
-    """Return the spec file of a source; None for an FMU or a problem made in Python."""
+    """Return the spec file or SSP package of a source; None for an FMU or a problem made in Python."""
+    if source.parts.kind == "fmu" and is_package(source.target):
+        return Path(source.target)
     if source.parts.kind in ("fmu", "python"):
         return None
     return find_spec(source.target)[0]

@@ -11,6 +11,7 @@ from falsifier.core.arguments import finite
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
+from falsifier.fmu import System
 from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
@@ -115,6 +116,65 @@ class Problem:
             joined.notes,
         )
 
+    @classmethod
+    def from_system(
+        cls,
+        system: System,
+        formula: str,
+        *,
+        name: str = STL_NAME,
+        inputs: Mapping[str, InputChoice] | None = None,
+        parameters: Mapping[str, ParameterChoice] | None = None,
+        stop_time: float | None = None,
+        output_interval: float | None = None,
+        step_size: float | None = None,
+        tolerance: float | None = None,
+        time_limit: float | None = None,
+    ) -> Self:
+        """Return the problem for a system of FMUs and a formula.
+
+        Args:
+            system: components and connections; its variables are ``component.variable``.
+            formula: the requirement, in Signal Temporal Logic.
+            name: the requirement's name, in results and records.
+            inputs: as for ``from_fmu``; inputs that are connected cannot be searched.
+            parameters: as for ``from_fmu``.
+            stop_time: end of each simulation in s; default: the components', if they agree.
+            output_interval: step of the monitored time grid in s; default: fits the components' steps, the
+                stop time and the formula's times.
+            step_size: communication step in s; default: the output interval.
+            tolerance: relative tolerance of the components' solvers.
+            time_limit: maximum wall-clock time of one simulation in s; default: 60.
+
+        Raises:
+            SpecError: naming what is wrong or unknown.
+            ModelError: if the system cannot be simulated.
+
+        >>> system = System({"plant": "plant.fmu", "pi": "pi.fmu"}, {"plant.u": "pi.y"})  # doctest: +SKIP
+        >>> Problem.from_system(system, "G[0,10] (plant.h >= 0)")  # doctest: +SKIP
+        """
+        from falsifier.problem.joining import join_system
+
+        changes = changes_from(
+            inputs=inputs or {},
+            parameters=parameters or {},
+            stop_time=stop_time,
+            output_interval=output_interval,
+            step_size=step_size,
+            tolerance=tolerance,
+            time_limit=time_limit,
+        )
+        joined = join_system(system, formula, path=Path(system.name), changes=changes, name=name)
+        return cls(
+            joined.model,
+            joined.requirement,
+            joined.space,
+            joined.experiment,
+            joined.parameters,
+            None,
+            joined.notes,
+        )
+
     @property
     def info(self) -> ModelInfo:
         """What is known about the model without simulating it."""
@@ -127,10 +187,11 @@ class Problem:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of requirement, search space and experiment; the model's code is not included."""
+        """SHA-256 of requirement, search space and experiment, and of a system's FMUs and connections."""
         content = (
             self.info.name,
             getattr(self.model, "interface", ""),
+            getattr(self.model, "key", ""),
             self.name,
             str(self.requirement.formula),
             self.space,

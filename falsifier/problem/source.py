@@ -19,7 +19,7 @@ class Target:
     """What a target means; requirement names may contain anything, colons and file endings too.
 
     Attributes:
-        kind: ``spec`` file, ``fmu``, ``python`` for a problem made in Python, or ``bundled``.
+        kind: ``spec`` file, ``fmu`` or SSP package, ``python`` for a problem made in Python, or ``bundled``.
         file: path of the spec file or the FMU; empty for the other kinds.
         requirement: name of the requirement, or of the problem made in Python; empty if there is none.
     """
@@ -40,7 +40,7 @@ class Target:
         path, colon, requirement = text.partition(".toml:")
         if colon or text.endswith(".toml"):
             return cls("spec", f"{path.removesuffix('.toml')}.toml", requirement)
-        if text.endswith(".fmu"):
+        if text.endswith((".fmu", ".ssp", ".ssd")):
             return cls("fmu", text)
         return cls("bundled", requirement=text.partition(":")[2])
 

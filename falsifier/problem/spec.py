@@ -17,6 +17,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
 from falsifier.errors import SpecError, did_you_mean, rejected
+from falsifier.fmu.network import Extrapolation, Loops, Method
 
 Section = TypeVar("Section", bound=BaseModel)
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
@@ -26,6 +27,8 @@ MAX_CONTROL_POINTS = 10_000
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
+# Sections of which there is one, without a name of its own.
+_SINGLE = ("model", "free", "coupling")
 
 
 class _Strict(BaseModel):
@@ -105,7 +108,10 @@ Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_value)]
 class ModelSection(_Strict):
     """What is simulated and how."""
 
-    fmu: str = Field(description="Path of the FMU, relative to the spec file.")
+    fmu: str | None = Field(
+        None,
+        description="Path of the FMU or SSP package, relative to the spec file; or see [components.NAME]",
+    )
     interface: Interface | None = Field(None, description="Required if the FMU offers both.")
     stop_time: Seconds | None = Field(None, description="End of each simulation in s.")
     output_interval: Seconds | None = Field(None, description="Step of the monitored time grid in s.")
@@ -116,6 +122,59 @@ class ModelSection(_Strict):
     )
     logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
+
+
+class ComponentSection(_Strict):
+    """One FMU of a system."""
+
+    fmu: str = Field(description="Path of the FMU, relative to the spec file.")
+    step: Seconds | None = Field(
+        None, description="Step of its own in s, an integer multiple of the communication step."
+    )
+
+
+class ConnectionSection(_Strict):
+    """Where the values of one input of a component come from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    source: str = Field(alias="from", description="Output, as COMPONENT.VARIABLE.")
+    factor: Number | None = Field(None, description="Factor of factor * value + offset, in place of units.")
+    offset: Number | None = Field(None, description="Offset of factor * value + offset, in place of units.")
+    extrapolation: Extrapolation | None = Field(
+        None, description="hold or linear; default: that of [coupling]."
+    )
+
+
+def _bare_source(section: object) -> object:
+    return {"from": section} if isinstance(section, str) else section
+
+
+class CouplingSection(_Strict):
+    """How the components of a system exchange values."""
+
+    method: Method = Field(
+        "gauss-seidel",
+        description="gauss-seidel: later components get the new values of earlier ones; jacobi: all step "
+        "from the values of the same communication point.",
+    )
+    loops: Loops = Field(
+        "refuse",
+        description="If outputs and inputs depend directly on each other: refuse the system, or delay the "
+        "connection that closes the loop by one communication step.",
+    )
+    extrapolation: Extrapolation = Field(
+        "hold", description="Inputs during a step: hold the last value, or follow the last two linearly."
+    )
+    tolerance: Seconds = Field(
+        1e-9,
+        description="Change of an output, relative above 1, below which the initialisation has converged.",
+    )
+    max_rounds: int = Field(100, ge=1, description="Maximum number of rounds of the initialisation.")
+
+
+Components = dict[str, ComponentSection]
+Connections = dict[str, Annotated[ConnectionSection, BeforeValidator(_bare_source)]]
 
 
 class ModelChanges(_Strict):
@@ -149,7 +208,10 @@ class ProfileSection(ModelChanges):
 class Spec(_Strict):
     """A whole spec file."""
 
-    model: ModelSection
+    model: ModelSection = Field(default_factory=ModelSection)
+    components: Components = Field(default_factory=dict)
+    connections: Connections = Field(default_factory=dict)
+    coupling: CouplingSection = Field(default_factory=CouplingSection)
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
     requirements: dict[str, RequirementSection] = Field(min_length=1)
@@ -205,9 +267,27 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
         SpecError: naming the file, the key and what was expected.
     """
     try:
-        return Spec.model_validate(data)
+        spec = Spec.model_validate(data)
     except ValidationError as error:
         raise _spec_error(error, file) from None
+    _check_model(spec, file)
+    return spec
+
+
+def _check_model(spec: Spec, file: str) -> None:
+    """Check that a spec has either an FMU or components."""
+    if spec.model.fmu is None and not spec.components:
+        about = ModelSection.model_fields["fmu"].description
+        raise SpecError(f"this key is missing ({about})", file=file, key="model.fmu")
+    if spec.components and spec.model.fmu is not None:
+        raise SpecError(
+            "a spec has either one FMU here or [components.NAME]; remove one of them",
+            file=file,
+            key="model.fmu",
+        )
+    if not spec.components and (spec.connections or spec.coupling != CouplingSection()):
+        key = "connections" if spec.connections else "coupling"
+        raise SpecError("only a system has this section: add [components.NAME]", file=file, key=key)
 
 
 def overlay(base: Section | None, changes: Section) -> Section:
@@ -232,6 +312,10 @@ def _spec_error(error: ValidationError, file: str) -> SpecError:
     location = [str(part) for part in first["loc"] if part not in ("tuple", "function-before")]
     key = ".".join(location)
     kind = first["type"]
+    if kind in ("extra_forbidden", "missing") and (quoted := _unquoted(error)):
+        return SpecError(
+            f"names with dots are written in quotes: {quoted}", file=file, key=".".join(location[:2])
+        )
     if kind == "extra_forbidden":
         return SpecError(
             f"unknown key; {did_you_mean(location[-1], _known_keys(location[:-1]))}", file=file, key=key
@@ -243,11 +327,29 @@ def _spec_error(error: ValidationError, file: str) -> SpecError:
     return SpecError(rejected(first["msg"], first["input"]), file=file, key=key)
 
 
+def _unquoted(error: ValidationError) -> str:
+    """Return how to write a dotted name that TOML has read as nested tables; empty if there is none."""
+    for each in error.errors():
+        location = [str(part) for part in each["loc"]]
+        if each["type"] != "extra_forbidden" or len(location) < 3:
+            continue
+        section, *names = location[-3:]
+        name = f'"{".".join(names)}"'
+        if section in ("inputs", "parameters") and isinstance(each["input"], dict):
+            return f"[{section}.{name}]"
+        if section in ("connections", "parameters"):
+            return f"{name} = ..."
+    return ""
+
+
 def _fields(location: list[str]) -> dict[str, Any]:
     """Return the fields of the section at this location in a spec, for hints in error messages."""
     fields = dict(Spec.model_fields)
     sections: dict[str, type[BaseModel]] = {
         "model": ModelSection,
+        "components": ComponentSection,
+        "connections": ConnectionSection,
+        "coupling": CouplingSection,
         "inputs": InputSection,
         "parameters": ParameterSection,
         "requirements": RequirementSection,
@@ -255,9 +357,9 @@ def _fields(location: list[str]) -> dict[str, Any]:
         "free": FreeSection,
     }
     for i, part in enumerate(location):
-        if part in ("model", "free"):
+        if part in _SINGLE:
             fields = dict(sections[part].model_fields)
-        elif i > 0 and location[i - 1] in sections and location[i - 1] not in ("model", "free"):
+        elif i > 0 and location[i - 1] in sections and location[i - 1] not in _SINGLE:
             nested = location[i - 1] == "requirements" and "profiles" in location[:i]
             fields = dict((ModelChanges if nested else sections[location[i - 1]]).model_fields)
     return fields

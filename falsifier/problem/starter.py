@@ -1,6 +1,6 @@
 """Starter specs: valid spec files for an FMU, with comments on what to fill in."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, floor
 from pathlib import Path
 from typing import Any
@@ -26,18 +26,29 @@ _SHOWN_PARAMETERS = 10
 _SHOWN_VARIABLES = 20
 
 
-def starter_spec(fmu: Path, info: ModelInfo) -> str:
-    """Return the text of a spec file for an FMU: it is valid as it is; comments say what to fill in."""
+def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
+    """Return the text of a spec file: it is valid as it is; comments say what to fill in.
+
+    Args:
+        fmu: path of an FMU or SSP package; or of the FMUs of a system without connections, by component.
+        info: what is known about the FMU or the system.
+
+    Raises:
+        SpecError: if there is nothing to search, or nothing to write a requirement about.
+    """
     inputs = [v for v in info.inputs if v.kind != "string"]
     tunable = _tunable(info)
     if not inputs and not tunable:
         raise SpecError(
-            f"{info.name}: nothing to search: the FMU has no input, parameter or start value to set"
+            f"{info.name}: nothing to search: the {info.noun} has no input, parameter or start value to set"
         )
     document = tomlkit.document()
     document.add(_comment(f"{info.name}: {info.description}" if info.description else info.name))
     document.add(tomlkit.nl())
-    document.add("model", _model_table(fmu, info))
+    if isinstance(fmu, Path):
+        document.add("model", _model_table(fmu, info))
+    else:
+        _add_components(document, fmu, info)
     if inputs:
         sections = tomlkit.table(is_super_table=True)
         free = _freedom(info)
@@ -59,11 +70,41 @@ def _tunable(info: ModelInfo) -> list[Variable]:
     return sorted(parameters or settable, key=lambda v: v.kind != "real")
 
 
+def _add_components(document: tomlkit.TOMLDocument, fmus: Mapping[str, Path], info: ModelInfo) -> None:
+    components = tomlkit.table(is_super_table=True)
+    for name, path in fmus.items():
+        section = tomlkit.table()
+        section.add("fmu", path.as_posix())
+        section.add(_comment("step = SECONDS  # of its own; default: the communication step"))
+        section.add(tomlkit.nl())
+        components.add(name, section)
+    document.add("components", components)
+    connections = tomlkit.table()
+    connections.add(_comment("INPUT = OUTPUT; an input that is connected needs no [inputs] section below:"))
+    for v in info.inputs:
+        component = v.name.removesuffix(_local(v.name))
+        others = [o.name for o in info.outputs if o.kind == v.kind and not o.name.startswith(component)]
+        near = [o for o in others if _local(o) == _local(v.name)]
+        shown = " or ".join(f'"{o}"' for o in near or others[:_SHOWN_VARIABLES])
+        connections.add(_comment(f'"{v.name}" = {shown or "OUTPUT"}'))
+    connections.add(tomlkit.nl())
+    document.add("connections", connections)
+    document.add("model", _experiment_table(tomlkit.table(), info))
+
+
+def _local(name: str) -> str:
+    return name.rpartition(".")[2]
+
+
 def _model_table(fmu: Path, info: ModelInfo) -> Table:
     table = tomlkit.table()
     table.add("fmu", fmu.as_posix())
     table.add("interface", default_interface(info) or "co-simulation")
-    doubt = "" if info.stop_time else "the FMU specifies none: check this"
+    return _experiment_table(table, info)
+
+
+def _experiment_table(table: Table, info: ModelInfo) -> Table:
+    doubt = "" if info.stop_time else f"the {info.noun} specifies none: check this"
     table.add("stop_time", _noted(info.stop_time or DEFAULT_STOP_TIME, doubt))
     table.add(
         _comment("output_interval = SECONDS  # default: fits the FMU's step, the formulas and the stop time")

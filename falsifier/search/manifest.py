@@ -15,6 +15,7 @@ from falsifier import __version__
 from falsifier.core.model import Variable
 from falsifier.core.space import InputRange, ParameterRange, ValueKind
 from falsifier.errors import JournalError, rejected
+from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
@@ -99,7 +100,7 @@ class Manifest(_Strict):
     parameters: tuple[InputRecord, ...]
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
     stop_time: float = Field(description="End of each simulation in s.")
-    hashes: dict[str, str] = Field(description="SHA-256 of the FMU and the spec, by path.")
+    hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec, by path.")
     sum: str = Field("", description="Checksum of the file up to here.")
 
     @property
@@ -119,8 +120,8 @@ class Manifest(_Strict):
 
     @property
     def fmu_sha256(self) -> str | None:
-        """SHA-256 of the FMU; None if the model is not an FMU."""
-        return next((digest for path, digest in self.hashes.items() if path.endswith(".fmu")), None)
+        """SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither."""
+        return fmus_sha256(digest for path, digest in self.hashes.items() if path.endswith(".fmu"))
 
     def of(self, name: str) -> "Manifest":
         """Return the manifest reduced to one requirement.
@@ -188,10 +189,11 @@ def environment() -> dict[str, Any]:
 
 
 def file_hashes(problem: Problem) -> dict[str, str]:
-    """SHA-256, by path, of the files that determine what is simulated: the FMU and the spec."""
+    """SHA-256, by path, of the files that determine what is simulated: the FMUs and the spec."""
     spec = None if problem.source is None else spec_file(problem.source)
-    paths: list[Path | None] = [getattr(problem.model, "path", None), spec]
-    return {str(p): sha256(p.read_bytes()).hexdigest() for p in paths if p is not None}
+    # What is in a package was extracted to a folder of this process; the package's own hash covers it.
+    fmus = [] if is_packaged(problem.model) else fmu_files(problem.model)
+    return {str(p): sha256(p.read_bytes()).hexdigest() for p in (*fmus, *([spec] if spec else []))}
 
 
 def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:

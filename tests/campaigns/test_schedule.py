@@ -91,7 +91,7 @@ def test_runs_with_a_language_model_have_a_limit_of_their_own(monkeypatch: pytes
 def test_a_missing_file_is_sent_once_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "a.fmu"
     file.write_bytes(b"content")
-    monkeypatch.setattr("falsifier.campaigns.schedule.fmu_file", lambda problem: file)
+    monkeypatch.setattr("falsifier.campaigns.schedule.fmu_file", lambda problem, digest: file)
     sent: list[dict[str, bytes]] = []
 
     def work(task: Task, files: dict[str, bytes]) -> Done | Missing:

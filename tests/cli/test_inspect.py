@@ -63,7 +63,10 @@ def test_check_names_all_requirements(tmp_path: Path) -> None:
 
 def test_schema_describes_spec_files(tmp_path: Path) -> None:
     schema = falsifier("schema", cwd=tmp_path).json
-    assert set(schema["properties"]) == {"model", "inputs", "parameters", "requirements", "profiles"}
+    systems = {"components", "connections", "coupling"}
+    assert set(schema["properties"]) == {
+        "model", "inputs", "parameters", "requirements", "profiles", *systems
+    }  # fmt: skip
 
 
 def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) -> None:

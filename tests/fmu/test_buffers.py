@@ -17,16 +17,16 @@ def plan(inputs: list[str], parameters: list[str], outputs: tuple[str, ...], pie
 @pytest.mark.parametrize(
     ("made", "size"),
     [
-        (plan(["u"], ["gain", "T"], ("x", "y")), 2 + 1 * 4 * 5 + 2 * 11),
-        (plan([], [], ("y",)), 11),
-        (plan(["u"], [], ()), 20),
+        (plan(["u"], ["gain", "T"], ("x", "y")), 2 + 1 * 4 * 5 + 2 * 11 + 1),
+        (plan([], [], ("y",)), 11 + 1),
+        (plan(["u"], [], ()), 20 + 1),
     ],
 )
 def test_the_arrays_fill_the_memory_without_gaps_or_overlaps(made: Plan, size: int) -> None:
     assert Room.size(made) == size
     memory = np.zeros(size)
     room = Room.over(made, memory)
-    for array in (room.parameters, room.inputs, room.outputs):
+    for array in (room.parameters, room.inputs, room.outputs, room.component):
         array += 1.0
     assert memory.tolist() == [1.0] * size
 

@@ -12,6 +12,7 @@ from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import archive
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import read_description
+from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import Library
 from falsifier.fmu.plan import make_plan
 from falsifier.fmu.session import Session
@@ -38,7 +39,7 @@ def prepared(name: str, folder: Path, parameters: tuple[str, ...] = ()) -> Itera
     path = fixtures.path(name)
     archive.extract(path, folder)
     description = read_description(path)
-    session = Session(description, folder, "co-simulation", lambda _: None)
+    session = Session(lambda: FmuInstance(description, folder, "co-simulation", lambda _: None))
     plan = make_plan(description, Experiment(1.0, 0.1, ("y",), time_limit=HANG), [], parameters)
     room = Room.over(plan, np.zeros(Room.size(plan)))
     session.prepare(plan, room)

@@ -21,6 +21,11 @@ SYSTEMS = {
     "ChargerHandshake": ("ChargerHandshake", 16, None),
     "HeaterLimpHome": ("HeaterLimpHome", 20, None),
 }
+# Systems of several FMUs.
+COUPLED = {
+    "SharedFeeder": ("SharedFeeder", 14, None),
+    "CCcars": ("CCcars1 CCcars2 CCcars3 CCcars4 CCcars5 CCcarsx", 20, None),
+}
 PUBLISHED = ("AT", "CC", "NN", "F16", "SC")
 
 
@@ -28,9 +33,9 @@ def published() -> dict[str, Any]:
     return tomllib.loads((ROOT / "specs" / "published.toml").read_text())
 
 
-@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("system", [*SYSTEMS, *COUPLED])
 def test_spec_loads(system: str) -> None:
-    names, coordinates, coordinates_of_instance_2 = SYSTEMS[system]
+    names, coordinates, coordinates_of_instance_2 = (SYSTEMS | COUPLED)[system]
     problems = load_problems(system)
     assert [p.name for p in problems] == names.split()
     for problem in problems:

@@ -6,6 +6,7 @@
     input.csv                   input signals, for FMPy, fmusim and OpenModelica
     start_values.json, .ssv     parameters and start values, for scripts and for SSP tools
     MODEL.fmu                   copy of the FMU
+    SYSTEM.ssp                  of a system of FMUs: its FMUs and connections, start values and inputs
     replay.py                   simulates both with FMPy only; writes outputs.csv, prints the critical time
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
@@ -15,7 +16,9 @@
 import shutil
 from pathlib import Path
 
+from falsifier.core.files import file_name
 from falsifier.counterexamples.export.inputs import input_table, start_values
+from falsifier.counterexamples.export.package import write_package
 from falsifier.counterexamples.export.scripts import (
     identifier,
     openmodelica_script,
@@ -25,7 +28,7 @@ from falsifier.counterexamples.export.scripts import (
 from falsifier.counterexamples.export.tables import file_columns, write_csv, write_json, write_mat, write_ssv
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.fmu import FmuModel
+from falsifier.fmu import FmuModel, System
 from falsifier.problem.problem import Problem
 
 __all__ = ["export_counterexample"]
@@ -57,6 +60,10 @@ def export_counterexample(
         files.append(write_csv(table, directory / "input.csv", problem.model))
     if isinstance(problem.model, FmuModel):
         files.append(copied_fmu(problem.model, directory))
+    if isinstance(problem.model, System):
+        inside = {file.name: file for file in files if file.name in ("input.csv", "start_values.ssv")}
+        target = directory / f"{file_name(problem.model.name)}.ssp"
+        files.append(write_package(problem.model, problem.experiment.stop_time, inside, target))
     scripts = {
         "replay.py": replay_script(problem, evaluation, file_columns(table, problem.model)),
         "replay.mos": openmodelica_script(problem, start),

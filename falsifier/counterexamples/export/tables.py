@@ -57,6 +57,14 @@ def write_json(start: Mapping[str, float | str], path: Path, model: Model | None
 
 def write_ssv(start: Mapping[str, float | str], name: str, path: Path) -> Path:
     """Write the start values as a parameter set of System Structure and Parameterization 1.0."""
+    root = parameter_set(start, name)
+    ElementTree.indent(root)
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    return path
+
+
+def parameter_set(start: Mapping[str, float | str], name: str) -> ElementTree.Element:
+    """Return the start values as an XML element of that standard."""
     ElementTree.register_namespace("ssv", _SSV)
     root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": plain(name)})
     parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
@@ -64,9 +72,7 @@ def write_ssv(start: Mapping[str, float | str], name: str, path: Path) -> Path:
         parameter = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", {"name": plain(key)})
         kind, text = ("String", plain(value)) if isinstance(value, str) else ("Real", repr(float(value)))
         ElementTree.SubElement(parameter, f"{{{_SSV}}}{kind}", {"value": text})
-    ElementTree.indent(root)
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
-    return path
+    return root
 
 
 def write_mat(table: InputTable, start: Mapping[str, float | str], path: Path) -> Path:

@@ -1,0 +1,269 @@
+"""Compiled loops over the C functions of several connected co-simulation FMUs.
+
+As in stepping.py, everything is passed as integer addresses, and a loop returns after a bounded number of
+steps. Functions of stepping.py are compiled into these, and numba's cache does not notice changes there:
+after changing stepping.py, delete ``__pycache__``.
+
+Three kinds of rows of eight-byte numbers describe a system. A *component* row has the component's functions
+and ports; components are in the order in which they step. A *feed* row says where the value of one input
+comes from. A *signal* row has the last two values of one connected output.
+"""
+
+import numpy as np
+
+from falsifier.fmu.stepping import (
+    DONE,
+    GETTING,
+    PLACE_BYTES,
+    SETTING,
+    STATUS,
+    STEP,
+    STEPPING,
+    TERMINATED,
+    WHERE,
+    advance_3,
+    compiled,
+    do_step_1,
+    do_step_2,
+    event_3,
+    exchange_values,
+    fetch,
+    inlined,
+    load_f8,
+    load_i8,
+    put,
+    rounding,
+    start_of,
+    store_f8,
+    store_i8,
+    value_at,
+)
+
+COMPONENT = 3  # in the report, after STATUS, WHERE and STEP
+
+# Columns of a component: the functions as for co_simulate, then four tables of ports (Ports.table).
+FUNCTIONS, PLAIN, HELD, SOURCES, RECORDED = 0, 7, 11, 15, 19
+# Address of the feeds of plain and of held inputs; communication steps per step of its own; address of the
+# first signal; address of the addresses of the rows to record to; whether a held input has changed.
+PLAIN_FEEDS, HELD_FEEDS, EVERY, SIGNALS, ROWS, CHANGED, COMPONENT_WIDTH = 23, 24, 25, 26, 27, 28, 29
+# Columns of a feed: address of pieces or of a signal, which of the two, current piece, value written last,
+# factor, offset, value before the signal is known, whether it follows a line.
+SOURCE, IS_SIGNAL, PIECE, WRITTEN, FACTOR, OFFSET, START, LINEAR, FEED_WIDTH = range(9)
+# Columns of a signal: value, time in s (negative: not known yet), and the same before.
+VALUE, TIME, OLD_VALUE, OLD_TIME, SIGNAL_WIDTH = range(5)
+
+_COMPONENT_BYTES, _FEED_BYTES, _SIGNAL_BYTES = 8 * COMPONENT_WIDTH, 8 * FEED_WIDTH, 8 * SIGNAL_WIDTH
+# Columns of a copy: address of a signal, address of the row to record it to.
+_COPY_BYTES = 16
+
+
+@inlined
+def _table(component, column):  # type: ignore[no-untyped-def]
+    at = component + 8 * column
+    return load_i8(at), load_i8(at + 8), load_i8(at + 16), load_i8(at + 24)
+
+
+@inlined
+def _functions(component):  # type: ignore[no-untyped-def]
+    return (
+        load_i8(component), load_i8(component + 8), load_i8(component + 16), load_i8(component + 24),
+        load_i8(component + 32), load_i8(component + 40), load_i8(component + 48),
+    )  # fmt: skip
+
+
+@inlined
+def _fed(feed, count, start, middle):  # type: ignore[no-untyped-def]
+    """Return the value of an input for a step: a piece at its start, or a signal, in a line to its middle."""
+    source = load_i8(feed + 8 * SOURCE)
+    if not load_i8(feed + 8 * IS_SIGNAL):
+        pieces, p = (source, count), load_i8(feed + 8 * PIECE)
+        while start_of(pieces, 0, p + 1) <= start + rounding(start):
+            p += 1
+        store_i8(feed + 8 * PIECE, p)
+        return load_f8(feed + 8 * FACTOR) * value_at(pieces, 0, p, start) + load_f8(feed + 8 * OFFSET)
+    time = load_f8(source + 8 * TIME)
+    if time < 0.0:
+        return load_f8(feed + 8 * START)
+    value, before = load_f8(source + 8 * VALUE), load_f8(source + 8 * OLD_TIME)
+    if load_i8(feed + 8 * LINEAR) and 0.0 <= before < time:
+        slope = (value - load_f8(source + 8 * OLD_VALUE)) / (time - before)
+        value += slope * (middle - time)
+    return load_f8(feed + 8 * FACTOR) * value + load_f8(feed + 8 * OFFSET)
+
+
+@inlined
+def _write(ports, feeds, count, start, middle):  # type: ignore[no-untyped-def]
+    """Write the values of all inputs of a table to its buffers; return whether any has changed."""
+    changed = False
+    for j in range(ports[3]):
+        feed = feeds + j * _FEED_BYTES
+        value = _fed(feed, count, start, middle)
+        changed = changed or value != load_f8(feed + 8 * WRITTEN)
+        store_f8(feed + 8 * WRITTEN, value)
+        put(ports[2] + j * PLACE_BYTES, value)
+    return changed
+
+
+@inlined
+def _gather(component, count, start, middle):  # type: ignore[no-untyped-def]
+    """Collect a component's inputs for a step; the FMU gets them when the step begins."""
+    _write(_table(component, PLAIN), load_i8(component + 8 * PLAIN_FEEDS), count, start, middle)
+    held = _table(component, HELD)
+    if held[3]:
+        feeds = load_i8(component + 8 * HELD_FEEDS)
+        changed = _write(held, feeds, count, start, middle)
+        store_i8(component + 8 * CHANGED, 1 if changed else 0)
+
+
+@inlined
+def _step(component, start, end, scratch):  # type: ignore[no-untyped-def]
+    """Give a component its inputs and do its step; return status, where it stopped, whether it ends all."""
+    instance, version = load_i8(component), load_i8(component + 40)
+    status = exchange_values(instance, version, _table(component, PLAIN))
+    if status > 1:
+        return status, SETTING, False
+    if load_i8(component + 8 * CHANGED):
+        store_i8(component + 8 * CHANGED, 0)
+        status, where = event_3(_functions(component), _table(component, HELD), scratch)
+        if where != DONE:
+            return status, where, False
+    if version == 3:
+        return advance_3(_functions(component), start, end, scratch)
+    if version == 2:
+        status = do_step_2(load_i8(component + 8), instance, start, end - start, np.int32(1))
+    else:
+        status = do_step_1(load_i8(component + 8), instance, start, end - start, np.uint8(1))
+    return status, STEPPING if status > 1 else DONE, False
+
+
+@inlined
+def read_signals(component, time):  # type: ignore[no-untyped-def]
+    """Read a component's connected outputs; return the status."""
+    ports = _table(component, SOURCES)
+    status = exchange_values(load_i8(component), load_i8(component + 40), ports)
+    if status <= 1:
+        for j in range(ports[3]):
+            signal = load_i8(component + 8 * SIGNALS) + j * _SIGNAL_BYTES
+            store_f8(signal + 8 * OLD_VALUE, load_f8(signal + 8 * VALUE))
+            store_f8(signal + 8 * OLD_TIME, load_f8(signal + 8 * TIME))
+            store_f8(signal + 8 * VALUE, fetch(ports[2] + j * PLACE_BYTES))
+            store_f8(signal + 8 * TIME, time)
+    return status
+
+
+@compiled
+def record(components, number, copies, copied, column, report):  # type: ignore[no-untyped-def]
+    """Record a sample: connected outputs as they were exchanged, other variables as the FMUs say."""
+    for j in range(copied):
+        copy = copies + j * _COPY_BYTES
+        store_f8(load_i8(copy + 8) + 8 * column, load_f8(load_i8(copy) + 8 * VALUE))
+    for c in range(number):
+        component = components + c * _COMPONENT_BYTES
+        ports = _table(component, RECORDED)
+        if ports[3]:
+            status = exchange_values(load_i8(component), load_i8(component + 40), ports)
+            if status > 1:
+                report[STATUS], report[WHERE], report[COMPONENT] = status, GETTING, c
+                return False
+            rows = load_i8(component + 8 * ROWS)
+            for j in range(ports[3]):
+                store_f8(load_i8(rows + 8 * j) + 8 * column, fetch(ports[2] + j * PLACE_BYTES))
+    return True
+
+
+@compiled
+def start_round(components, number, count, running, report):  # type: ignore[no-untyped-def]
+    """In initialisation: give each component its inputs at time 0 and read its outputs, in their order."""
+    for c in range(number):
+        store_f8(running, float(c))
+        component = components + c * _COMPONENT_BYTES
+        instance, version = load_i8(component), load_i8(component + 40)
+        _gather(component, count, 0.0, 0.0)
+        status = exchange_values(instance, version, _table(component, PLAIN))
+        if status <= 1:
+            status = exchange_values(instance, version, _table(component, HELD))
+        if status > 1:
+            report[STATUS], report[WHERE], report[COMPONENT] = status, SETTING, c
+            return
+        store_i8(component + 8 * CHANGED, 0)
+        status = read_signals(component, 0.0)
+        if status > 1:
+            report[STATUS], report[WHERE], report[COMPONENT] = status, GETTING, c
+            return
+    report[WHERE] = DONE
+
+
+@compiled
+def co_simulate_system(  # type: ignore[no-untyped-def]
+    components, number, jacobi, count, copies, copied, stop_time, steps, first, last, every, running, report,
+):  # fmt: skip
+    """Do the communication steps first..last-1 of all components.
+
+    A component whose own step is several communication steps does it at the end of these, so that nobody gets
+    a value from the future. With Jacobi, it uses the inputs of its start.
+
+    Args:
+        components: address of the component rows, in the order in which they step.
+        number: number of components.
+        jacobi: whether all step from the values of the same communication point.
+        count: number of pieces per input that is not connected.
+        copies: addresses of the signals to record, and of the rows to record them to.
+        copied: number of these.
+        stop_time: stop time in s.
+        steps: number of communication steps to the stop time.
+        first: first step to do.
+        last: step before which to stop.
+        every: steps per column of the outputs; the caller records column 0.
+        running: address at which to say which component's code runs (float64).
+        report: receives FMI status, where it stopped, number of completed steps, component, int64[4].
+    """
+    memory = np.zeros(16, dtype=np.uint8)
+    scratch = memory.ctypes.data
+    where, k, step = DONE, first, stop_time / steps
+    report[STATUS], report[COMPONENT] = 0, 0
+    while k < last and where == DONE:
+        end = stop_time if k + 1 == steps else min((k + 1) * step, stop_time)
+        if jacobi:
+            for c in range(number):
+                component = components + c * _COMPONENT_BYTES
+                own = load_i8(component + 8 * EVERY)
+                if k % own == 0:
+                    start = k * step
+                    _gather(component, count, start, start + 0.5 * own * step)
+        ends = False
+        for c in range(number):
+            component = components + c * _COMPONENT_BYTES
+            own = load_i8(component + 8 * EVERY)
+            if own != 1 and (k + 1) % own:
+                continue
+            start = (k + 1 - own) * step
+            if not jacobi:
+                _gather(component, count, start, 0.5 * (start + end))
+            store_f8(running, float(c))
+            status, where, ended = _step(component, start, end, scratch)
+            ends = ends or ended
+            if where == DONE and not jacobi:
+                status = read_signals(component, end)
+                where = GETTING if status > 1 else DONE
+            if where != DONE:
+                report[STATUS], report[COMPONENT] = status, c
+                break
+        if jacobi and where == DONE:
+            for c in range(number):
+                component = components + c * _COMPONENT_BYTES
+                if (k + 1) % load_i8(component + 8 * EVERY) == 0:
+                    status = read_signals(component, end)
+                    if status > 1:
+                        where = GETTING
+                        report[STATUS], report[COMPONENT] = status, c
+                        break
+        if where != DONE:
+            break
+        k += 1
+        if k % every == 0 and not record(components, number, copies, copied, k // every, report):
+            where = GETTING
+        if ends and where == DONE:
+            where = TERMINATED
+    report[WHERE], report[STEP] = where, k
+    # A use after the last call: otherwise numba may free the memory while an FMU writes to its address.
+    memory[0] = 0

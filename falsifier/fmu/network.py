@@ -1,0 +1,144 @@
+"""A system of FMUs as its workers get it: components, connections between scalars, order of stepping."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from falsifier.core.model import Variable
+from falsifier.fmu.description import Description
+
+Method = Literal["gauss-seidel", "jacobi"]
+Loops = Literal["refuse", "delay"]
+Extrapolation = Literal["hold", "linear"]
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """How the components of a system exchange values.
+
+    Attributes:
+        method: ``gauss-seidel``: components step one after the other, and later ones get the new values of
+            earlier ones; ``jacobi``: all step from the values of the same communication point.
+        loops: what to do if outputs and inputs depend on each other without a delay: ``refuse`` the system,
+            or ``delay`` the connection that closes the loop by one communication step.
+        extrapolation: value of an input during a step: ``hold`` the last value, or follow the ``linear``
+            course through the last two, for continuous real inputs.
+        tolerance: change, relative for values above 1, below which the initialisation has converged.
+        max_rounds: maximum number of rounds of the initialisation.
+    """
+
+    method: Method = "gauss-seidel"
+    loops: Loops = "refuse"
+    extrapolation: Extrapolation = "hold"
+    tolerance: float = 1e-9
+    max_rounds: int = 100
+
+
+# Position of the system itself in a Place: an input of the whole, which feeds inputs of components.
+SYSTEM = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What a system has as a whole, beyond its components; SSP packages have it.
+
+    Attributes:
+        inputs: inputs of the system, which connections may name as sources.
+        outputs: other names of the components' outputs, with the names that they stand for.
+        values: values of parameters, start values and inputs, set unless a simulation sets others.
+        stop_time: stop time of the default experiment in s; None: the components'.
+        notes: what the user should know, one sentence each.
+    """
+
+    inputs: tuple[Variable, ...] = ()
+    outputs: tuple[tuple[str, str], ...] = ()
+    values: tuple[tuple[str, float | str], ...] = ()
+    stop_time: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One component.
+
+    Attributes:
+        name: its name.
+        path: path of its FMU.
+        sha256: hash of the FMU.
+        description: description of the FMU, with the component's name in place of the model's.
+        step: step of its own in s; None for the communication step.
+        folder: name of the folder to which it is extracted.
+    """
+
+    name: str
+    path: Path
+    sha256: str
+    description: Description
+    step: float | None
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a variable of a system is: position of the component, or SYSTEM, and its name there."""
+
+    member: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A connection between two scalars: ``target = factor * source + offset``.
+
+    Attributes:
+        source: an output, or an input of the system.
+        target: an input.
+        factor: factor of the conversion.
+        offset: offset of the conversion.
+        start: value of the input before the source is known.
+        is_linear: whether the input follows the course of the last two values.
+    """
+
+    source: Place
+    target: Place
+    factor: float
+    offset: float
+    start: float
+    is_linear: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Network:
+    """A checked system.
+
+    Attributes:
+        name: its name.
+        members: the components.
+        links: the connections.
+        order: positions of the components in the order in which they step.
+        coupling: how they exchange values.
+        description: variables of all components, as ``component.variable``.
+        places: where each of these variables is.
+    """
+
+    name: str
+    members: tuple[Member, ...]
+    links: tuple[Link, ...]
+    order: tuple[int, ...]
+    coupling: Coupling
+    description: Description
+    places: Mapping[str, Place]
+
+    def stepped(self, position: float) -> str:
+        """Return the name of the component at a position of the order; empty if there is none."""
+        return self.members[self.order[int(position)]].name if 0 <= position < len(self.order) else ""
+
+    def title(self, place: Place) -> str:
+        """Return the name of a variable in the system."""
+        return title(self.members, place)
+
+
+def title(members: Sequence[Member], place: Place) -> str:
+    """Return the name of a variable in a system of these components."""
+    return place.name if place.member == SYSTEM else f"{members[place.member].name}.{place.name}"

@@ -1,0 +1,97 @@
+"""All components of a system, loaded into one process: they start, step and start again together."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from falsifier.fmu.buffers import Room
+from falsifier.fmu.instance import FmuInstance
+from falsifier.fmu.library import LogSink
+from falsifier.fmu.master import Master
+from falsifier.fmu.network import Network
+from falsifier.fmu.plan import Plan
+
+
+class SystemInstance:
+    """The components of a system, loaded and instantiated; see Instance.
+
+    Args:
+        network: the system.
+        folder: folder to which its FMUs were extracted, in subfolders.
+        log: called with each message of an FMU.
+        announce: called with the position in the order of stepping of each component before it is loaded.
+        logging: whether to ask the FMUs for messages.
+
+    Raises:
+        ModelError: if an FMU cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        folder: Path,
+        log: LogSink,
+        announce: Callable[[int], None],
+        *,
+        logging: bool = False,
+    ) -> None:
+        self._network = network
+        self._parts: list[FmuInstance] = []
+        try:
+            for k, member in enumerate(network.members):
+                announce(network.order.index(k))
+                self._parts.append(
+                    FmuInstance(
+                        member.description, folder / member.folder, "co-simulation", log, logging=logging
+                    )
+                )
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def saves_state(self) -> bool:
+        """Whether all components declare that their state can be saved."""
+        return all(part.saves_state for part in self._parts)
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether all components have a saved state to start from."""
+        return all(part.is_taken for part in self._parts)
+
+    def prepare(self, plan: Plan, room: Room) -> None:
+        """See Instance."""
+        self._master = Master(self._network, self._parts, plan, room)
+
+    def simulate(self, deadline: float) -> None:
+        """See Instance."""
+        self._master.simulate(deadline)
+
+    def reset(self) -> bool:
+        """Reset all components; return False if one cannot."""
+        return all([part.reset() for part in self._parts])
+
+    def take(self) -> bool:
+        """Save the states of all components; return False if one cannot."""
+        if all([part.take() for part in self._parts]):
+            return True
+        self.forget()
+        return False
+
+    def restore(self) -> bool:
+        """Restore the states of all components; return False if one cannot."""
+        return all([part.restore() for part in self._parts])
+
+    def forget(self) -> None:
+        """Free the saved states."""
+        for part in self._parts:
+            part.forget()
+
+    def renew(self) -> None:
+        """See Instance."""
+        for part in self._parts:
+            part.renew()
+
+    def close(self) -> None:
+        """See Instance."""
+        for part in reversed(self._parts):
+            part.close()

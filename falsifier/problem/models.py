@@ -1,0 +1,118 @@
+"""The model that a spec names: one FMU, or a system of several."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from falsifier.core.model import Experiment, Interface, Model, ModelInfo
+from falsifier.errors import ModelError, SpecError
+from falsifier.fmu import (
+    Component,
+    Connection,
+    Coupling,
+    FmuModel,
+    System,
+    is_package,
+    read_info,
+    read_package,
+)
+from falsifier.problem.spec import ModelChanges, Spec
+
+
+def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
+    """Return the model of a spec.
+
+    Args:
+        spec: the spec.
+        layers: sections that override the spec's; later ones override earlier ones.
+        path: path of the spec file, for relative paths and error messages.
+
+    Raises:
+        SpecError: naming the file, the key and the remedy.
+        ModelError: if an FMU cannot be read.
+    """
+    stated = [layer.logging for layer in layers if layer.logging is not None]
+    logging = stated[-1] if stated else spec.model.logging
+    if spec.components:
+        _check_interface(spec, layers, str(path))
+        return make_system(spec, path, logging=logging)
+    assert spec.model.fmu is not None, "a spec without components has an FMU"
+    fmu = _existing(path, spec.model.fmu, "model.fmu")
+    if is_package(fmu):
+        _check_interface(spec, layers, str(path))
+        return read_package(fmu)
+    return FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), str(path)), logging=logging)
+
+
+def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
+    """Return the system of a spec with components.
+
+    Raises:
+        SpecError: naming the file, both ends of a connection that does not fit, and the remedy.
+        ModelError: if an FMU cannot be read.
+    """
+    components = {
+        name: Component(_existing(path, section.fmu, f"components.{name}.fmu"), section.step)
+        for name, section in spec.components.items()
+    }
+    connections = {
+        target: Connection(each.source, each.factor, each.offset, each.extrapolation)
+        for target, each in spec.connections.items()
+    }
+    try:
+        return System(
+            components,
+            connections,
+            coupling=Coupling(**spec.coupling.model_dump()),
+            name=path.stem,
+            logging=logging,
+        )
+    except SpecError as error:
+        raise SpecError(str(error), file=str(path)) from None
+
+
+def check_own_steps(model: Model, experiment: Experiment, file: str) -> None:
+    """Check that the steps of a system's components fit the experiment.
+
+    Raises:
+        SpecError: naming the component and steps that fit.
+    """
+    if isinstance(model, System):
+        try:
+            model.check_steps(experiment)
+        except SpecError as error:
+            raise SpecError(str(error), file=file) from None
+
+
+def _existing(path: Path, fmu: str, key: str) -> Path:
+    found = path.parent / fmu
+    if not found.is_file():
+        raise SpecError(
+            f"no such FMU: {found}; give its path relative to the spec file", file=str(path), key=key
+        )
+    return found
+
+
+def _check_interface(spec: Spec, layers: Sequence[ModelChanges], file: str) -> None:
+    stated = [spec.model.interface, *(layer.interface for layer in layers)]
+    if "model-exchange" in stated:
+        raise SpecError(
+            "the components of a system step by co-simulation; remove this key",
+            file=file,
+            key="model.interface",
+        )
+
+
+def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
+    stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
+    if not info.interfaces:
+        raise ModelError(
+            f"{info.name}: the FMU offers neither co-simulation nor model exchange, and scheduled execution "
+            "is not supported; export it for co-simulation"
+        )
+    if stated is None and len(info.interfaces) == 1:
+        return info.interfaces[0]
+    offered = " and ".join(info.interfaces)
+    if stated is None or stated not in info.interfaces:
+        advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
+        raise SpecError(f"the FMU offers {offered}{advice}", file=file, key="model.interface")
+    return stated

@@ -1,0 +1,63 @@
+"""Systems of the test FMUs: a plant T x' = u - x and a controller y = k (r - measured) without states."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.model import Experiment
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
+from falsifier.fmu import Component, Connection, Coupling, System
+from tests.fmu.fixtures import path
+from tests.patience import HANG
+
+LOOP: dict[str, str | Connection] = {"plant.u": "pi.y", "pi.measured": "plant.y"}
+STEP = 0.1
+
+
+def system(
+    components: Mapping[str, str | Component],
+    connections: Mapping[str, str | Connection],
+    coupling: Coupling | None = None,
+    *,
+    isolate: bool = False,
+) -> System:
+    """A system of test FMUs in this process."""
+    found = {n: path(each) if isinstance(each, str) else each for n, each in components.items()}
+    return System(found, connections, coupling=coupling or Coupling(), isolate=isolate)
+
+
+def loop(coupling: Coupling | None = None, *, plant: str = "Plant_2", pi: str = "Gain_2") -> System:
+    """The controlled plant."""
+    return system({"plant": plant, "pi": pi}, LOOP, coupling)
+
+
+def run(
+    model: System,
+    *outputs: str,
+    stop: float = 1.0,
+    interval: float = STEP,
+    step_size: float | None = None,
+    signals: Mapping[str, Signal] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    time_limit: float = HANG,
+) -> Trajectory:
+    """Simulate once."""
+    experiment = Experiment(stop, interval, outputs, step_size, time_limit=time_limit)
+    return model.simulate(signals or {}, parameters or {}, experiment)
+
+
+def sampled_loop(late: int, *, steps: int = 10, step: float = STEP, gain: float = 2.0) -> NDArray[np.float64]:
+    """The plant's exact states at the communication points, if its input is some steps late; r = 1, T = 2."""
+    x, decay = [0.0], float(np.exp(-step / 2.0))
+    for k in range(steps):
+        u = gain * (1.0 - x[max(k - late, 0)])
+        x.append(u + (x[-1] - u) * decay)
+    return np.array(x)
+
+
+def component(name: str, step: float) -> Component:
+    """A component with a step of its own."""
+    return Component(Path(path(name)), step)

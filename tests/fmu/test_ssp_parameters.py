@@ -1,0 +1,94 @@
+"""Parameter bindings: inline and in files, prefixes, mappings, and which of two values wins."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.fmu import read_package
+from tests.fmu.packages import NAMESPACES, PI, PLANT, structure, system, values, write
+
+
+def bindings(*each: str) -> str:
+    return f"<ssd:ParameterBindings>{''.join(each)}</ssd:ParameterBindings>"
+
+
+def inline(*parameters: str, prefix: str = "", mapping: str = "") -> str:
+    return (
+        f'<ssd:ParameterBinding prefix="{prefix}"><ssd:ParameterValues>{values(*parameters)}'
+        f"</ssd:ParameterValues>{mapping}</ssd:ParameterBinding>"
+    )
+
+
+def starts(file: Path) -> dict[str, float | str]:
+    return dict(read_package(file).frame.values)
+
+
+def test_outer_values_win_and_among_those_of_one_level_the_last(tmp_path: Path) -> None:
+    own = PLANT.replace(
+        "<ssd:Connectors>", bindings(inline("T Real 1", "gain Real 7")) + "<ssd:Connectors>", 1
+    )
+    outer = bindings(inline("plant.T Real 2"), inline("T Real 3", prefix="plant."))
+    file = write(tmp_path / "p.ssp", structure(system(own, before=outer)), "Plant_2")
+    assert starts(file) == {"plant.T": 3.0, "plant.gain": 7.0}
+
+
+def test_sets_and_mappings_are_read_from_files(tmp_path: Path) -> None:
+    entries = """<ssm:MappingEntry source="a" target="plant.T">
+        <ssc:LinearTransformation factor="2" offset="1"/></ssm:MappingEntry>"""
+    mapping = f'<ssm:ParameterMapping {NAMESPACES} version="1.0">{entries}</ssm:ParameterMapping>'
+    bound = '<ssd:ParameterBinding source="resources/p.ssv"><ssd:ParameterMapping source="resources/m.ssm"/>'
+    ssd = structure(system(PLANT + PI, before=bindings(bound + "</ssd:ParameterBinding>")))
+    more: dict[str, str | bytes] = {
+        "resources/p.ssv": values("a Real 4", "pi.k Real 9"),
+        "resources/m.ssm": mapping,
+    }
+    file = write(tmp_path / "p.ssp", ssd, "Plant_2", "Gain_2", more=more)
+    assert starts(file) == {"plant.T": 9.0}, "with a mapping, only what it names"
+    wrong = more | {"resources/m.ssm": mapping.replace('"a"', '"b"')}
+    with pytest.raises(SpecError, match=r"p\.ssp: a mapping names the unknown parameter 'b'"):
+        read_package(write(tmp_path / "p.ssp", ssd, "Plant_2", "Gain_2", more=wrong))
+    with pytest.raises(SpecError, match=r"p\.ssp: resources/p\.ssv: 'x' is not|could not convert"):
+        read_package(
+            write(
+                tmp_path / "p.ssp",
+                ssd,
+                "Plant_2",
+                "Gain_2",
+                more=more | {"resources/p.ssv": values("a Real x")},
+            )
+        )
+
+
+def test_units_types_and_names_that_mean_nothing(tmp_path: Path) -> None:
+    def read(*parameters: str) -> dict[str, float | str]:
+        ssd = structure(system(PLANT, before=bindings(inline(*parameters))))
+        return starts(write(tmp_path / "p.ssp", ssd, "Plant_2"))
+
+    assert read("plant.x Real 500 mm") == {"plant.x": 0.5}
+    assert read("plant.T Integer 3") == {"plant.T": 3.0}
+    assert read("plant.x Float64 3") == {"plant.x": 3.0}
+    with pytest.raises(SpecError, match=r"the parameter plant\.x is in kg, 'x' in m"):
+        read("plant.x Real 5 kg")
+    with pytest.raises(SpecError, match=r"'abc' is a text, but 'T' is of type real"):
+        read("plant.T String abc")
+    ssd = structure(system(PLANT, before=bindings(inline("engine.T Real 1"))))
+    model = read_package(write(tmp_path / "p.ssp", ssd, "Plant_2"))
+    assert model.frame.values == ()
+    assert "the parameter engine.T of the package names nothing that can be set" in model.info.notes
+
+
+def test_texts_and_items_of_enumerations_are_set(tmp_path: Path) -> None:
+    table = '<ssd:Component name="t" source="resources/Table_2.fmu"/>'
+    echo = '<ssd:Component name="e" source="resources/Echo_2.fmu"/>'
+    bound = bindings(
+        inline(
+            "t.fileName String other.txt", "e.in_Enumeration Enumeration third", "e.in_Boolean Boolean true"
+        )
+    )
+    ssd = structure(system(table + echo, before=bound))
+    file = write(tmp_path / "p.ssp", ssd, "Table_2", "Echo_2")
+    assert starts(file) == {"t.fileName": "other.txt", "e.in_Enumeration": 3.0, "e.in_Boolean": 1.0}
+    model = replace(read_package(file), isolate=False)
+    assert model.info["e.in_Enumeration"].start == 3.0

@@ -1,0 +1,118 @@
+"""Specs with components: [components.NAME], [connections], [coupling]."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.fmu import Coupling, System
+from falsifier.problem.loading import load_problem
+from tests.fmu.fixtures import path
+
+COMPONENTS = f"""
+[components.plant]
+fmu = "{path("Plant_2")}"
+[components.pi]
+fmu = "{path("Gain_2")}"
+"""
+CONNECTIONS = """
+[connections]
+"plant.u" = "pi.y"
+"pi.measured" = "plant.y"
+"""
+REST = """
+[inputs."pi.r"]
+control_points = 3
+[parameters]
+"plant.T" = 1.0
+"pi.k".range = [1.0, 2.0]
+[requirements.R]
+formula = "G[0,10] (plant.y <= 0.8)"
+"""
+
+
+def write(folder: Path, text: str) -> str:
+    file = folder / "cruise.toml"
+    file.write_text(text)
+    return str(file)
+
+
+def test_a_spec_of_components_is_a_problem_like_any_other(tmp_path: Path) -> None:
+    problem = load_problem(write(tmp_path, COMPONENTS + CONNECTIONS + REST))
+    assert isinstance(problem.model, System) and problem.info.name == "cruise"
+    assert problem.space.names == ("pi.r", "pi.k")
+    assert (problem.space.inputs[0].low, problem.space.inputs[0].high) == (0.0, 2.0), "the FMU's own limits"
+    assert problem.parameters == {"plant.T": 1.0}
+    assert problem.experiment.outputs == ("plant.y", "pi.y")
+    assert problem.notes[0].startswith("components step in the order plant, pi")
+
+
+def test_coupling_and_conversions_reach_the_system(tmp_path: Path) -> None:
+    text = (
+        COMPONENTS.replace('Gain_2.fmu"', 'Gain_2kelvin.fmu"\nstep = 0.1')
+        + """
+[connections]
+"plant.u" = "pi.y"
+"pi.measured" = { from = "plant.y", factor = 2.0, offset = 1.0, extrapolation = "linear" }
+[coupling]
+method = "jacobi"
+loops = "delay"
+"""
+    )
+    model = load_problem(write(tmp_path, text + REST)).model
+    assert isinstance(model, System)
+    assert model.coupling == Coupling("jacobi", "delay")
+    link = model.network.links[1]
+    assert (link.factor, link.offset, link.is_linear) == (2.0, 1.0, True)
+    assert model.parts["pi"].step == 0.1
+
+
+WRONG = [
+    (COMPONENTS + '[model]\nfmu = "a.fmu"\n' + REST, "model.fmu: a spec has either one FMU here or"),
+    ('[model]\nfmu = "a.fmu"\n' + CONNECTIONS + REST, "connections: only a system has this section"),
+    (REST, "model.fmu: this key is missing (Path of the FMU"),
+    (COMPONENTS.replace("Gain_2", "Gone_2") + REST, "components.pi.fmu: no such FMU: "),
+    (
+        COMPONENTS + CONNECTIONS.replace("pi.y", "pi.z") + REST,
+        "connections: pi.z -> plant.u: pi has no output 'z'",
+    ),
+    (COMPONENTS + "[connections]\nplant.u = 'pi.y'\n" + REST, 'written in quotes: "plant.u" = ...'),
+    (COMPONENTS + REST.replace('"pi.r"', "pi.r"), 'written in quotes: [inputs."pi.r"]'),
+    (COMPONENTS + REST.replace('"plant.T"', "plant.T"), 'written in quotes: "plant.T" = ...'),
+    (
+        COMPONENTS + CONNECTIONS + REST.replace('"pi.r"', '"plant.u"'),
+        "inputs.plant.u: this input is connected to pi.y; remove this section or the connection",
+    ),
+    (
+        COMPONENTS + CONNECTIONS + REST.replace('"plant.T"', '"plant.u"'),
+        "parameters.plant.u: this input is connected to pi.y",
+    ),
+    (
+        COMPONENTS + REST.replace('"pi.r"', '"pi.x"'),
+        "inputs.pi.x: the system has no such input; did you mean 'pi.r'",
+    ),
+    (
+        COMPONENTS + '[model]\ninterface = "model-exchange"\n' + REST,
+        "components of a system step by co-simulation",
+    ),
+    (
+        COMPONENTS.replace('Gain_2.fmu"', 'Gain_2.fmu"\nstep = 0.03')
+        + "[model]\noutput_interval = 0.02\n"
+        + REST,
+        "components.pi.step: 0.03 s is not an integer multiple of the communication step 0.02 s; "
+        "set step_size = 0.015",
+    ),
+    (
+        COMPONENTS + '[coupling]\nmetod = "jacobi"\n' + REST,
+        "coupling.metod: unknown key; did you mean 'method'?",
+    ),
+    (COMPONENTS + "[connections]\n'plant.u' = { form = 'pi.y' }\n" + REST, "connections.plant.u"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG)
+def test_wrong_specs_name_the_file_the_key_and_the_cure(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=re.escape(message)) as wrong:
+        load_problem(write(tmp_path, text))
+    assert str(wrong.value).startswith(f"{tmp_path}/cruise.toml: ")
