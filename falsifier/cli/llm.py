@@ -131,9 +131,13 @@ def _check_same(directory: Path, problem: "Problem") -> None:
 
 def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
     """The last question that was asked before a sample of a run was simulated, and its reply."""
-    from falsifier.search.journal import read_journal
+    from falsifier.search.journal import holds_run, read_journal
     from falsifier.search.questions import exchange_before
 
+    if not holds_run(directory):
+        raise JournalError(
+            f"{directory}: not a run directory, which --at requires: falsifier prompt RUN --at {sample}"
+        )
     exchange = exchange_before(read_journal(directory), sample - 1)
     if exchange is None:
         raise JournalError(f"{directory}: no language model was asked before sample {sample}")
