@@ -131,10 +131,15 @@ def _check_same(directory: Path, problem: "Problem") -> None:
 
 def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
     """The last question that was asked before a sample of a run was simulated, and its reply."""
-    from falsifier.search.journal import read_journal
+    from falsifier.search.journal import holds_run, read_journal, recorded_candidates
     from falsifier.search.questions import exchange_before
 
-    exchange = exchange_before(read_journal(directory), sample - 1)
+    if not holds_run(directory):
+        raise JournalError(
+            f"{directory}: not a run directory, which --at requires: falsifier prompt RUN --at {sample}"
+        )
+    records = read_journal(directory)
+    exchange = exchange_before(records, sample - 1)
     if exchange is None:
         raise JournalError(f"{directory}: no language model was asked before sample {sample}")
     if as_json:
@@ -144,6 +149,9 @@ def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
     parts.append(f"--- reply of {exchange.llm} ---\n{answer}")
     if exchange.problem:
         parts.append(f"--- rejected ---\n{exchange.problem}")
+    # Not every sample is the answer to the question before it: engines and random changes fill in.
+    if rationale := recorded_candidates(records)[sample - 1].rationale:
+        parts.append(f"--- rationale of sample {sample} ---\n{rationale}")
     return "\n\n".join(parts)
 
 

@@ -85,7 +85,7 @@ def converse(
         request = following
     raise NoValidReplyError(
         f"{chat.llm} gave no valid reply in {counted(reasks + 1, 'attempt')}; rejected because: "
-        f"{' | '.join(problems)}"
+        f"{' | '.join(dict.fromkeys(problems))}"
     )
 
 

@@ -146,7 +146,7 @@ class _Loop:
         self.count = 0
         self.last_error = ""
         self.started = perf_counter() - steps.seconds
-        self.spent = Spent()
+        self.spent = steps.unrepeated
         self.unrecorded = ""
 
     def attach(self) -> None:

@@ -1,7 +1,8 @@
 """Resumes a run by replay: steps that the journal contains are taken from it, the rest is carried out.
 
 The engine is asked again and must suggest what was recorded; that restores its state. Evaluations,
-confirmations and replies of a language model come from the journal and cost nothing.
+confirmations and replies of a language model come from the journal and cost nothing. The question without a
+valid reply that ended a run is asked again; it stays paid for.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,12 +15,20 @@ from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.messages import Chat
+from falsifier.llm.messages import Chat, Exchange
 from falsifier.llm.replay import RecordedChat, Recording
 from falsifier.problem.problem import Problem
-from falsifier.search.journal import recorded_evaluations, recorded_exchanges
+from falsifier.search.budget import Spent
+from falsifier.search.journal import recorded_evaluations
 from falsifier.search.proposals import proposals
-from falsifier.search.records import AskedRecord, ConfirmedRecord, EndedRecord, Record
+from falsifier.search.records import (
+    AskedRecord,
+    ConfirmedRecord,
+    EndedRecord,
+    ExchangeRecord,
+    Record,
+    spent_of,
+)
 from falsifier.search.steps import Steps
 
 
@@ -34,6 +43,7 @@ class Replayed:
         confirmed: recorded confirmations by evaluation index and requirement.
         recording: recorded replies of a language model.
         seconds: wall-clock seconds of the recorded part.
+        unrepeated: what was spent on questions that are not played back.
     """
 
     live: Steps
@@ -42,6 +52,7 @@ class Replayed:
     confirmed: dict[tuple[int, str], ConfirmedRecord]
     recording: Recording
     seconds: float
+    unrepeated: Spent
     replayed: int = field(init=False)
     _next: int = 0
 
@@ -104,14 +115,49 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     for record in records:
         if isinstance(record, AskedRecord):
             asked.setdefault(record.first, []).append(record)
+    exchanges, unrepeated = _played_back(records)
     ended = [r.spent["seconds"] or 0.0 for r in records if isinstance(r, ConfirmedRecord | EndedRecord)]
     return Replayed(
         live,
         asked,
         recorded_evaluations(directory, records),
         {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
-        Recording(recorded_exchanges(records)),
+        Recording(exchanges),
         max(ended, default=0.0),
+        unrepeated,
+    )
+
+
+def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
+    """The exchanges that a resumed run plays back, and what the others had cost when the run ended.
+
+    The question that a run failed at is asked again: its recorded replies would only fail once more.
+    """
+    kept: list[Exchange] = []
+    unrepeated, answered = Spent(), 0
+    for record in records:
+        if isinstance(record, ExchangeRecord):
+            kept.append(Exchange.model_validate(record.exchange))
+        elif isinstance(record, AskedRecord):
+            answered = len(kept)
+        elif isinstance(record, EndedRecord):
+            if record.status == "failed":
+                del kept[answered:]
+            unrepeated = _difference(spent_of(record.spent), kept)
+    return kept, unrepeated
+
+
+def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
+    """What was spent on a language model beyond the exchanges that are played back."""
+    usages = [exchange.usage for exchange in played]
+    costs = [usage.cost for usage in usages if usage.cost is not None]
+    cost = None if spent.cost is None else max(0.0, round(spent.cost - sum(costs), 12))
+    return Spent(
+        calls=spent.calls - len(played),
+        prompt_tokens=spent.prompt_tokens - sum(usage.prompt_tokens for usage in usages),
+        completion_tokens=spent.completion_tokens - sum(usage.completion_tokens for usage in usages),
+        reasoning_tokens=spent.reasoning_tokens - sum(usage.reasoning_tokens for usage in usages),
+        cost=cost,
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
 
@@ -13,6 +13,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.workers import evaluate_all
 from falsifier.llm.messages import Chat
 from falsifier.problem.problem import Problem
+from falsifier.search.budget import Spent
 from falsifier.search.proposals import proposals
 
 
@@ -27,6 +28,11 @@ class Steps(Protocol):
     @property
     def seconds(self) -> float:
         """Wall-clock seconds of the recorded part of the run."""
+        ...
+
+    @property
+    def unrepeated(self) -> Spent:
+        """What the recorded part spent on questions to a language model that are not played back."""
         ...
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
@@ -57,6 +63,7 @@ class Live:
     executor: Executor | None = None
     replayed: int = 0
     seconds: float = 0.0
+    unrepeated: Spent = field(default_factory=Spent)
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Ask the engine, and measure the time."""

@@ -25,6 +25,9 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     assert json.loads(printed.out) == sent
     at = falsifier("prompt", "run", "--at", "2", cwd=tmp_path)
     assert sent[1]["content"] in at.out and "--- reply of openai/" in at.out
+    assert at.out.endswith("--- rationale of sample 2 ---\nbecause\n")
+    no_run = falsifier("prompt", "AT1", "--at", "1", cwd=tmp_path)
+    assert (no_run.code, "AT1: not a run directory" in no_run.err) == (2, True)
     none = falsifier("prompt", "run", "--at", "3", cwd=tmp_path)
     assert (none.code, "the run has no sample 3" in none.err) == (2, True)
     other = falsifier("prompt", "CC1", "--after", "run", cwd=tmp_path)

@@ -82,6 +82,20 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
     assert resumed.json["spent"]["calls"] == 2
 
 
+def test_a_resumed_run_asks_again_where_it_failed_and_has_paid_for_that(tmp_path: Path) -> None:
+    with serving(*[reply(BRAKE_LATE)] * 10) as server:
+        broken = falsifier(*at1(server.url, "--out", "run", "--no-cache"), cwd=tmp_path, env=ENV)
+    assert (broken.code, "to continue: falsifier resume run" in broken.out + broken.err) == (3, True)
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    with serving(reply(FULL)) as server:
+        manifest["request"]["llm"]["api_base"] = server.url
+        write_manifest(tmp_path / "run", manifest)
+        resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
+        assert len(server.received) == 1
+    assert resumed.code == 1, resumed.err
+    assert (resumed.json["spent"]["calls"], resumed.json["spent"]["prompt_tokens"]) == (11, 1100)
+
+
 def test_equal_questions_are_answered_from_disk(tmp_path: Path) -> None:
     with serving(reply(FULL)) as server:
         assert falsifier(*at1(server.url), cwd=tmp_path, env=ENV).code == 1

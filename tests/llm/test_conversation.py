@@ -50,6 +50,9 @@ def test_two_reasks_at_most() -> None:
     with pytest.raises(NoValidReplyError, match=r"no valid reply in 3 attempts.*'a'.*'b'.*'c'"):
         converse(chat, QUESTION, number, exchanges.append)
     assert len(chat.requests) == len(exchanges) == 3
+    with pytest.raises(NoValidReplyError) as found:
+        converse(ScriptedChat(["a", "a", "a"]), QUESTION, number, exchanges.append)
+    assert str(found.value).count("'a'") == 1
 
 
 @pytest.mark.parametrize(

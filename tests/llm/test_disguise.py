@@ -134,6 +134,7 @@ def test_integers_become_levels() -> None:
     assert (line.kind, line.items) == ("levels", ("0", "0.333333", "0.666667", "1"))
     standing = render(build_prompt(disguise.view, VARIANTS["MP5"], []))[0].content
     assert "one of the numbers 0, 0.333333, 0.666667, 1; " in standing and "integer" not in standing
+    assert '"values": [0.0, 1.0, 0.333333]' in standing
     told = Candidate({"u1": Signal.evenly([0.333333, 1, 0, 0.7], stop_time=10.0, interpolation="linear")})
     back = problem.space.admit(disguise.revealed(told))
     assert (back.signals["u"].values, back.signals["u"].interpolation) == ((2, 4, 1, 3), "constant")

@@ -165,7 +165,7 @@ def test_a_refuted_violation_does_not_count(monkeypatch: pytest.MonkeyPatch) -> 
             reason="did not happen again",
         )
 
-    monkeypatch.setattr("falsifier.search.loop.confirm", refute)
+    monkeypatch.setattr("falsifier.search.steps.confirm", refute)
     result = run(lag_problem(), engine="corners", budget=4)
     assert result.status == "not falsified"
     assert result.counterexample is None

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 
-from falsifier.core.space import InputRange, nearest_value
+from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.core.words import counted
 from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts.blocks import ReplyBlock
@@ -40,7 +40,7 @@ def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "js
     if space.parameters:
         values = _spread([(p.low, p.high) for p in space.parameters])
         one["parameters"] = [
-            {"name": p.name, "value": nearest_value(p, value)}
+            {"name": p.name, "value": _admissible(view, p, value)}
             for p, value in zip(space.parameters, values, strict=True)
         ]
     example = json.dumps(one if count == 1 else {"candidates": [one]})
@@ -86,7 +86,7 @@ def _blank(view: View, variant: Variant, count: int) -> str:
 def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
     limits = [(r.low, r.high)]
     if not free:
-        values = [nearest_value(r, v) for v in _spread(limits * r.control_points, position)]
+        values = [_admissible(view, r, v) for v in _spread(limits * r.control_points, position)]
         return {"name": r.name, "values": values}
     times: list[float] = []
     interpolation: str = r.interpolation
@@ -97,8 +97,14 @@ def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[st
         interpolation, count = "constant", len(times)
     elif r.free is None:
         count = r.control_points
-    values = [nearest_value(r, v) for v in _spread(limits * count, position)]
+    values = [_admissible(view, r, v) for v in _spread(limits * count, position)]
     return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
+
+
+def _admissible(view: View, ranged: InputRange | ParameterRange, value: float) -> float:
+    """The nearest value that a reply may contain; a type that is not told has levels."""
+    levels = view.levels.get(ranged.name)
+    return min(levels, key=lambda level: abs(level - value)) if levels else nearest_value(ranged, value)
 
 
 def _spread(limits: Sequence[tuple[float, float]], first: int = 0) -> list[float]:
