@@ -115,7 +115,9 @@ def _outcomes(result: Result) -> tuple[Outcome, ...]:
     if not result.levels:
         return ()
     starts = [level.first for level in result.levels]
-    return outcomes(starts, [e.robustness for e in result.evaluations], falsified=result.falsified)
+    # What was simulated at the same time as the counterexample comes after it and does not count.
+    end = result.spent.simulations if result.falsified else None
+    return outcomes(starts, [e.robustness for e in result.evaluations[:end]], falsified=result.falsified)
 
 
 def _levels_json(result: Result) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ import pytest
 
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event
+from falsifier.search.levels import Level
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
 from falsifier.views.text import (
@@ -122,3 +123,12 @@ def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
 def test_seconds_say_where_they_went() -> None:
     spent = Spent(seconds=12.34, simulation_seconds=10.0, engine_seconds=2.0)
     assert seconds_text(spent) == "12.3 s; simulator 10.00 s, engine 2.00 s"
+
+
+def test_a_level_counts_no_simulation_after_the_counterexample(found: Result) -> None:
+    """With several at a time, some end after the counterexample."""
+    levels = (Level(0, found.problem.space),)
+    count = found.spent.simulations
+    longer = replace(found, evaluations=(*found.evaluations[:count], *found.evaluations[:1]), levels=levels)
+    assert result_json(longer)["levels"][0]["simulations"] == count
+    assert f"level 1 of 1   falsified after {count} simulation" in result_text(longer)
