@@ -21,8 +21,7 @@ from falsifier.search.result import Result
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    untested = ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
-    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{untested}"
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{_untested(result)}"
     lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
@@ -52,6 +51,10 @@ def result_text(result: Result) -> str:
     return "\n".join(map(one_line, lines))
 
 
+def _untested(result: Result) -> str:
+    return ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
+
+
 def results_text(results: Sequence[Result]) -> str:
     """Format the results of several requirements as text, one line each."""
     width = max(len(result.problem.name) for result in results)
@@ -62,7 +65,7 @@ def results_text(results: Sequence[Result]) -> str:
         where = "" if result.counterexample is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
-            f"{result.spent.simulations_text}{robustness}{where}"
+            f"{result.spent.simulations_text}{_untested(result)}{robustness}{where}"
         )
         lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]

@@ -6,6 +6,7 @@ import pytest
 
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event
+from falsifier.search.findings import Finding
 from falsifier.search.levels import Level
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
@@ -93,6 +94,13 @@ def test_several_results_are_a_line_each_with_notes_below(tmp_path: Path) -> Non
     assert hard_line.startswith("HARD   falsified after")
     assert str(tmp_path / "counterexample-HARD.png") in hard_line
     assert last.startswith("1 of 2 falsified")
+
+
+def test_a_line_of_several_says_if_a_part_was_not_tested(found: Result) -> None:
+    finding = Finding(kind="condition", text="never held")
+    partly = replace(found, status="not falsified", counterexample=None, findings=(finding,))
+    line = results_text([partly, found]).splitlines()[0]
+    assert "and a part of it was not tested, robustness" in line
 
 
 def test_a_shared_directory_has_a_counterexample_for_each_requirement(tmp_path: Path, found: Result) -> None:
