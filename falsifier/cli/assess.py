@@ -183,6 +183,9 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     if changed:
         raise click.UsageError(f"{place}: a run is assessed as it was searched; drop {', '.join(changed)}")
     described = read_manifest(place)
+    if requirement is None and described.shared:
+        first, *others = described.names
+        warn(f"{first} is assessed; --requirement NAME chooses another one: {', '.join(others)}")
     described = described.of(requirement or described.requirement.name)
     source = described.request.source
     if source is None:

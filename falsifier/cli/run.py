@@ -145,6 +145,8 @@ def run(
             refine=refine,
             listeners=[display, *logs],
         )
+    if refine and not any(result.problem.space.inputs for result in results):
+        warn("--refine: no input is searched, so there was nothing to refine")
     _finish(results, as_json=as_json)
 
 
@@ -169,15 +171,21 @@ def resume(
 ) -> None:
     """Continue the run or campaign in DIRECTORY; nothing that is recorded is simulated or asked again.
 
-    --jobs, --executor and the limits apply to campaigns. The limits on simulations, tokens and cost include
-    what was spent before.
+    --jobs, --executor and the limits apply to campaigns only; a run keeps its own. The limits on simulations,
+    tokens and cost include what was spent before.
     """
+    given = (total_budget, total_seconds, total_tokens, total_cost)
+    has_limits = any(x is not None for x in given)
     if is_campaign(directory):
-        given = (total_budget, total_seconds, total_tokens, total_cost)
-        limits = Budget(*given) if any(x is not None for x in given) else None
+        limits = Budget(*given) if has_limits else None
         resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
         return
     places = run_directories(directory)
+    if has_limits or executor is not None or jobs > 1:
+        raise click.UsageError(
+            f"{directory}: --jobs, --executor and the limits apply to campaigns only; a run continues with "
+            "the jobs and the limits that it began with"
+        )
     results: list[Result] = []
     with make_display(quiet=quiet) as display:
         for place in places:

@@ -15,10 +15,12 @@ class Level:
     Attributes:
         first: number of simulations before it.
         space: the part of the search space that it searches.
+        leaves_finer: whether the budget allowed no level after it, although there are finer inputs.
     """
 
     first: int
     space: SearchSpace
+    leaves_finer: bool = False
 
 
 def reached(levels: Sequence[Level], simulations: int) -> tuple[Level, ...]:

@@ -53,7 +53,7 @@ class Margin:
             f"{counted(self.simulations, 'simulation')}, {count} {'search' if count == 1 else 'searches'}"
         )
         if self.unfalsified is None:
-            found = f"falsified in the whole range, up to {self.falsified:.6g}"
+            found = f"falsified in the whole range, even at {self.falsified:.6g}"
         elif self.falsified is None:
             found = f"not falsified in the whole range, not even at {self.unfalsified:.6g}"
         else:

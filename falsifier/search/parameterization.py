@@ -69,7 +69,9 @@ def inexpressible(problem: Problem, levels: Sequence[Level], simulations: int) -
     against = "" if window is None else f". The formula's smallest window is {window:g} s"
     remedy = _remedy(problem, coarse)
     if len(begun) < len(levels):
-        remedy = f"a larger budget; the search ended on level {len(begun)} of {len(levels)}"
+        remedy = f"more simulations; the search ended on level {len(begun)} of {len(levels)}"
+    elif begun[-1].leaves_finer:
+        remedy = "a larger budget, which allows another level"
     return Finding(
         kind="parameterization",
         text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}.",

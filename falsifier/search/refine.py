@@ -33,7 +33,11 @@ def levels_of(request: RunRequest, space: SearchSpace) -> tuple[Level, ...]:
     if not request.levels:
         return (Level(0, searched_space(space, request.engine, request.llm)),)
     spaces = level_spaces(space, free=engine_parameterization(request.engine, request.llm) == "free")
-    return tuple(Level(first, each) for first, each in zip(request.levels, spaces, strict=False))
+    count = len(request.levels)
+    return tuple(
+        Level(first, each, leaves_finer=number == count < len(spaces))
+        for number, (first, each) in enumerate(zip(request.levels, spaces, strict=False), start=1)
+    )
 
 
 def make_refining(

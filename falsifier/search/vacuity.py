@@ -131,9 +131,9 @@ class Vacuity:
         value = next(iter(self._robustness))
         if not self._moved:
             text = (
-                f"Nothing that was searched has an effect on {listed(signals)}: the same {self._in_all()}, "
-                f"with robustness {value:+.6g}. Search inputs or parameters on which "
-                f"{'it depends' if len(signals) == 1 else 'they depend'}."
+                f"Nothing that was searched had an effect on {listed(signals)}: the same {self._in_all()}, "
+                f"with robustness {value:+.6g}. Search longer, or search inputs and "
+                f"parameters on which {'it depends' if len(signals) == 1 else 'they depend'}."
             )
         elif all(name in info and info[name].kind == "real" for name in signals):
             text = (

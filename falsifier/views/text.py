@@ -21,8 +21,7 @@ from falsifier.search.result import Result
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    untested = ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
-    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{untested}"
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{_untested(result)}"
     lines = [f"{head} ({seconds_text(result.spent)})"]
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
@@ -53,6 +52,10 @@ def result_text(result: Result) -> str:
     return "\n".join(map(one_line, lines))
 
 
+def _untested(result: Result) -> str:
+    return ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
+
+
 def results_text(results: Sequence[Result]) -> str:
     """Format the results of several requirements as text, one line each."""
     width = max(len(result.problem.name) for result in results)
@@ -63,7 +66,7 @@ def results_text(results: Sequence[Result]) -> str:
         where = "" if result.counterexample is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
-            f"{result.spent.simulations_text}{robustness}{where}"
+            f"{result.spent.simulations_text}{_untested(result)}{robustness}{where}"
         )
         lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
@@ -118,7 +121,9 @@ def _outcomes(result: Result) -> tuple[Outcome, ...]:
     if not result.levels:
         return ()
     starts = [level.first for level in result.levels]
-    return outcomes(starts, [e.robustness for e in result.evaluations], falsified=result.falsified)
+    # What was simulated at the same time as the counterexample comes after it and does not count.
+    end = result.spent.simulations if result.falsified else None
+    return outcomes(starts, [e.robustness for e in result.evaluations[:end]], falsified=result.falsified)
 
 
 def _levels_json(result: Result) -> list[dict[str, Any]]:

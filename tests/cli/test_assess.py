@@ -1,6 +1,7 @@
 import json
 from pathlib import Path
 
+from falsifier.search.run import falsify
 from tests.command import falsifier
 
 HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"
@@ -52,3 +53,11 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
     assert 0.99 < done.json["optimum"] < 1.01
     refused = falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path)
     assert refused.code == 2 and "drop stl" in refused.err
+
+
+def test_a_run_of_several_requirements_says_which_one_is_assessed(tmp_path: Path) -> None:
+    problems = [f"python:tests.problems:{name}" for name in ("impossible", "hard")]
+    falsify(problems, "corners", budget=5, directory=tmp_path / "r")
+    done = falsifier("assess", "r", "--budget", "20", "--quiet", cwd=tmp_path)
+    assert "NEVER is assessed; --requirement NAME chooses another one: HARD" in done.err
+    assert done.out.startswith("NEVER: ")

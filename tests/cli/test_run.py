@@ -169,6 +169,21 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     assert f"after {kept + 2} simulations" in resumed.out
 
 
+def test_limits_of_a_campaign_are_refused_for_a_run(tmp_path: Path) -> None:
+    falsify("AT1", "corners", budget=1, directory=tmp_path / "run")
+    for option in (("--total-budget", "8"), ("--jobs", "2")):
+        refused = falsifier("resume", "run", *option, cwd=tmp_path)
+        assert refused.code == 2
+        assert "apply to campaigns only" in refused.err
+
+
+def test_parameters_alone_cannot_be_refined(tmp_path: Path) -> None:
+    stl = ("--stl", "G[0,10] (y <= 11)", "--input", "u=3", "--param", "gain=0.5:1", "--budget", "1")
+    done = falsifier("run", str(fixture("CheapLag_2")), *stl, "--refine", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "--refine: no input is searched" in done.err
+
+
 def test_a_run_directory_is_not_overwritten(tmp_path: Path) -> None:
     options = ("run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "run", "--quiet")
     assert falsifier(*options, cwd=tmp_path).code == 0

@@ -73,7 +73,7 @@ def test_a_requirement_that_nothing_moves_is_told() -> None:
     (found,) = findings(lag_problem("G[0,10] (x <= 0.1)", response=dead))
     assert found.kind == "constant"
     assert found.text.startswith(
-        "Nothing that was searched has an effect on x: the same in 5 simulations, with robustness +0.1."
+        "Nothing that was searched had an effect on x: the same in 5 simulations, with robustness +0.1."
     )
 
 

@@ -10,6 +10,8 @@ from falsifier.errors import ChatError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event
+from falsifier.search.findings import Finding
+from falsifier.search.levels import Level
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
 from falsifier.views.text import (
@@ -98,6 +100,13 @@ def test_several_results_are_a_line_each_with_notes_below(tmp_path: Path) -> Non
     assert last.startswith("1 of 2 falsified")
 
 
+def test_a_line_of_several_says_if_a_part_was_not_tested(found: Result) -> None:
+    finding = Finding(kind="condition", text="never held")
+    partly = replace(found, status="not falsified", counterexample=None, findings=(finding,))
+    line = results_text([partly, found]).splitlines()[0]
+    assert "and a part of it was not tested, robustness" in line
+
+
 def test_a_shared_directory_has_a_counterexample_for_each_requirement(tmp_path: Path, found: Result) -> None:
     shared = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path / "shared")
     alone = falsify(easy(), "corners", budget=5, directory=tmp_path / "alone")
@@ -141,3 +150,12 @@ def test_samples_of_a_fallback_are_told_with_the_reason(tmp_path: Path) -> None:
     again = make_llm_engine(impossible(), chat, fallback=make_engine("uniform", impossible(), seed=0))
     (resumed,) = resume(tmp_path / "run", problems=[impossible()], engine=again, budget=5)
     assert resumed.remarks == (remark.replace("3 of 3", "5 of 5"),)
+
+
+def test_a_level_counts_no_simulation_after_the_counterexample(found: Result) -> None:
+    """With several at a time, some end after the counterexample."""
+    levels = (Level(0, found.problem.space),)
+    count = found.spent.simulations
+    longer = replace(found, evaluations=(*found.evaluations[:count], *found.evaluations[:1]), levels=levels)
+    assert result_json(longer)["levels"][0]["simulations"] == count
+    assert f"level 1 of 1   falsified after {count} simulation" in result_text(longer)

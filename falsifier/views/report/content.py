@@ -184,6 +184,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--max-tokens", budget.tokens),
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
+        ("--jobs", request.jobs if request.jobs > 1 else None),
         ("--all", True if shared else None),
         ("--refine", True if request.levels else None),
     ]

@@ -75,7 +75,7 @@ def test_a_requirement_that_nothing_moves_is_told() -> None:
         inputs=0, parameters=[BIAS], response=lambda times, *_: {"x": np.zeros_like(times)}, name="STILL"
     )
     found = assess(still, budget=30)
-    assert "Nothing that was searched has an effect on x" in found.text
+    assert "Nothing that was searched had an effect on x" in found.text
     assert not assess(system(0.8), budget=30).findings
 
 

@@ -23,10 +23,11 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         engine="uniform",
         seed=3,
         budget=Budget(7, cost=0.5),
+        jobs=2,
     )
     assert run_command(request) == (
         "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --input u=0:1:3 --stop-time 5.0 --engine uniform "
-        "--budget 7 --max-cost 0.5 --seed 3"
+        "--budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
 
 
