@@ -77,6 +77,14 @@ def problem_options(command: Function) -> Function:
         profile_option,
         parameterization_option(),
         click.option(
+            "--free",
+            "shortest_piece",
+            type=float,
+            metavar="SECONDS",
+            help="Free parameterization of every input, with pieces at least this long; default: the spec's "
+            "limits, or some derived from the formula's windows.",
+        ),
+        click.option(
             "--interface",
             type=click.Choice(["co-simulation", "model-exchange"]),
             help="FMI interface to simulate; default: the spec's, or co-simulation if the FMU offers it.",
@@ -125,7 +133,7 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the values of problem_options out of a command's keyword arguments."""
     varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
-    stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization")}
+    stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")}
     return ProblemSource(**stated, changes=changes)
 
 

@@ -179,6 +179,20 @@ class SearchSpace:
         """The same space, with only the control points of the spec allowed."""
         return replace(self, inputs=tuple(replace(r, free=None) for r in self.inputs))
 
+    def freed(self, shortest: float) -> "SearchSpace":
+        """Return the same space in which every input may have control points as little as this apart, in s.
+
+        Raises:
+            SpecError: if this is not positive, or longer than the simulation.
+        """
+        if not 0 < shortest <= self.stop_time:
+            raise SpecError(
+                f"the shortest piece of an input must be positive and at most the stop time of "
+                f"{self.stop_time:g} s, got {shortest:g} s"
+            )
+        free = Freedom(max(1, int(self.stop_time / shortest + 1e-9)), shortest)
+        return replace(self, inputs=tuple(replace(r, free=free) for r in self.inputs))
+
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
         """Coordinates of the vector form: control points input by input in time order, then parameters."""

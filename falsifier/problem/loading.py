@@ -68,6 +68,7 @@ def load_problem(
     stl: str | None = None,
     profile: str | None = None,
     parameterization: Parameterization = "free",
+    shortest_piece: float | None = None,
     inputs: Mapping[str, InputChoice] | None = None,
     parameters: Mapping[str, ParameterChoice] | None = None,
     stop_time: float | None = None,
@@ -83,6 +84,8 @@ def load_problem(
         profile: name of a profile of the spec, e.g. ``instance2``.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
             only the control points of the spec are allowed.
+        shortest_piece: minimum time in s between two control points of every input, which makes all inputs
+            free; None: the spec's or the default limits.
         inputs: overrides for the spec's inputs; see InputChoice.
         parameters: overrides for the spec's parameters; see ParameterChoice.
         stop_time: end of each simulation in s.
@@ -104,7 +107,12 @@ def load_problem(
     )
     return load_source(
         ProblemSource(
-            target=target, stl=stl, profile=profile, parameterization=parameterization, changes=changes
+            target=target,
+            stl=stl,
+            profile=profile,
+            parameterization=parameterization,
+            shortest_piece=shortest_piece,
+            changes=changes,
         )
     )
 
@@ -149,7 +157,8 @@ def load_source(source: ProblemSource) -> Problem:
     if kind == "python":
         freed = {name: InputSection(free=s.free) for name, s in source.changes.inputs.items() if s.free}
         allowed = ProblemSource(target=source.target, changes=ModelChanges(inputs=freed))
-        if source.model_copy(update={"parameterization": "free"}) != allowed:
+        stated = source.model_copy(update={"parameterization": "free", "shortest_piece": None})
+        if stated != allowed:
             raise SpecError(
                 f"{source.target}: a problem made in Python takes no options; change it where it is made"
             )
@@ -163,6 +172,10 @@ def load_source(source: ProblemSource) -> Problem:
         )
     else:
         problem = _of_spec(source)
+    if source.shortest_piece is not None:
+        if source.parameterization == "fixed":
+            raise SpecError("--free makes the inputs free; drop --parameterization fixed, or --free")
+        problem = replace(problem, space=problem.space.freed(source.shortest_piece))
     if source.parameterization == "fixed":
         problem = replace(problem, space=problem.space.fixed)
     return problem

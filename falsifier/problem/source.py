@@ -56,6 +56,8 @@ class ProblemSource(BaseModel):
         profile: name of a profile of the spec.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
             only the control points of the spec are allowed.
+        shortest_piece: minimum time in s between two control points of every input, which makes all inputs
+            free; None: the spec's or the default limits.
         changes: overrides for experiment, inputs and parameters.
     """
 
@@ -66,6 +68,7 @@ class ProblemSource(BaseModel):
     stl_name: str = STL_NAME
     profile: str | None = None
     parameterization: Parameterization = "free"
+    shortest_piece: float | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
 
     @field_serializer("changes")

@@ -3,9 +3,10 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.space import Freedom
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.loading import load_problem, load_problems
+from falsifier.problem.loading import load_problem, load_problems, load_source
 from falsifier.problem.problem import Problem
 from tests.problem.support import GOOD, echo, spec
 
@@ -29,6 +30,14 @@ def test_profiles_change_the_parameterization() -> None:
         (7, "constant", None),
         (3, "constant", None),
     ]
+
+
+def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
+    problem = load_problem("AT1", shortest_piece=2.5)
+    assert {r.free for r in problem.space.inputs} == {Freedom(20, 2.5)}
+    assert problem.source is not None and load_source(problem.source).space == problem.space
+    with pytest.raises(SpecError, match="drop --parameterization fixed, or --free"):
+        load_problem("AT1", parameterization="fixed", shortest_piece=2.5)
 
 
 def test_what_the_spec_leaves_out_comes_from_the_fmu(folder: Path) -> None:

@@ -176,6 +176,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--stl", problem.stl),
         ("--profile", problem.profile),
         ("--parameterization", None if problem.parameterization == "free" else problem.parameterization),
+        ("--free", None if problem.shortest_piece is None else f"{problem.shortest_piece:g}"),
         *options_from(without_limits(problem.changes) if request.levels else problem.changes),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
