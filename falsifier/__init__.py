@@ -59,7 +59,16 @@ if TYPE_CHECKING:
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
     from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for, simulate
-    from falsifier.fmu import Component, Connection, Coupling, FmuModel, System, read_info
+    from falsifier.fmu import (
+        Component,
+        Connection,
+        Coupling,
+        FmuModel,
+        Frame,
+        System,
+        read_info,
+        read_package,
+    )
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
@@ -108,6 +117,7 @@ _EXPORTS = {
     "FalsifierError": "falsifier.errors",
     "FmuModel": "falsifier.fmu",
     "Formula": "falsifier.stl",
+    "Frame": "falsifier.fmu",
     "Freedom": "falsifier.core.space",
     "FunctionModel": "falsifier.core.model",
     "InputRange": "falsifier.core.space",
@@ -159,6 +169,7 @@ _EXPORTS = {
     "preview": "falsifier.engines.llm",
     "progress": "falsifier.views.progress",
     "read_info": "falsifier.fmu",
+    "read_package": "falsifier.fmu",
     "replay": "falsifier.counterexamples.store",
     "resume": "falsifier.search.run",
     "resume_campaign": "falsifier.campaigns",
@@ -199,6 +210,7 @@ __all__ = [
     "FalsifierError",
     "FmuModel",
     "Formula",
+    "Frame",
     "Freedom",
     "FunctionModel",
     "InputRange",
@@ -253,6 +265,7 @@ __all__ = [
     "preview",
     "progress",
     "read_info",
+    "read_package",
     "replay",
     "resume",
     "resume_campaign",

@@ -20,7 +20,7 @@ from falsifier.fmu import is_package, read_package
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems
-from falsifier.problem.models import make_system
+from falsifier.problem.models import is_system, make_system
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
@@ -200,10 +200,7 @@ def _named(given: Path) -> "Path | System":
 
 def _of_spec(path: Path) -> "Path | System":
     spec = read_spec(path)
-    if spec.model.fmu is None:
-        return make_system(spec, path)
-    fmu = path.parent / spec.model.fmu
-    return read_package(fmu) if is_package(fmu) else _existing_fmu(fmu)
+    return make_system(spec, path) if is_system(spec) else _existing_fmu(path.parent / (spec.model.fmu or ""))
 
 
 def _one_fmu(given: Path) -> Path:
