@@ -60,7 +60,16 @@ if TYPE_CHECKING:
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
     from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for, simulate
-    from falsifier.fmu import Component, Connection, Coupling, FmuModel, System, read_info
+    from falsifier.fmu import (
+        Component,
+        Connection,
+        Coupling,
+        FmuModel,
+        Frame,
+        System,
+        read_info,
+        read_package,
+    )
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
@@ -109,6 +118,7 @@ _EXPORTS = {
     "FalsifierError": "falsifier.errors",
     "FmuModel": "falsifier.fmu",
     "Formula": "falsifier.stl",
+    "Frame": "falsifier.fmu",
     "Freedom": "falsifier.core.space",
     "FunctionModel": "falsifier.core.model",
     "InputRange": "falsifier.core.space",
@@ -160,6 +170,7 @@ _EXPORTS = {
     "preview": "falsifier.engines.preview",
     "progress": "falsifier.views.progress",
     "read_info": "falsifier.fmu",
+    "read_package": "falsifier.fmu",
     "replay": "falsifier.counterexamples.store",
     "resume": "falsifier.search.run",
     "resume_campaign": "falsifier.campaigns",
@@ -200,6 +211,7 @@ __all__ = [
     "FalsifierError",
     "FmuModel",
     "Formula",
+    "Frame",
     "Freedom",
     "FunctionModel",
     "InputRange",
@@ -254,6 +266,7 @@ __all__ = [
     "preview",
     "progress",
     "read_info",
+    "read_package",
     "replay",
     "resume",
     "resume_campaign",

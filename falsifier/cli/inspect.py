@@ -20,7 +20,7 @@ from falsifier.fmu import is_package, read_package
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems
-from falsifier.problem.models import make_system
+from falsifier.problem.models import is_system, make_system
 from falsifier.problem.problem import Problem
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 # Maximum number of variables that are compared if the FMU declares no outputs.
 _CHECKED_VARIABLES = 50
+# What halving the step may change in a system, as a share of an output's range, and how often it is halved.
+_COUPLING_SHARE, _HALVINGS = 0.01, 6
 
 
 @click.command()
@@ -151,7 +153,7 @@ def _schema(what: str) -> dict[str, Any]:
 
 def _print_convergence(source: "Path | System", found: ModelInfo) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
-    from falsifier.fmu import FmuModel
+    from falsifier.fmu import FmuModel, System
     from falsifier.fmu.step_effect import step_convergence
 
     interface = default_interface(found)
@@ -171,6 +173,7 @@ def _print_convergence(source: "Path | System", found: ModelInfo) -> None:
     model = FmuModel(source, interface=interface) if isinstance(source, Path) else source
     try:
         movements = step_convergence(model, experiment, signals)
+        advice = _step_advice(source, experiment, signals) if isinstance(source, System) else ""
     finally:
         model.close()
     say(
@@ -185,6 +188,26 @@ def _print_convergence(source: "Path | System", found: ModelInfo) -> None:
             f"  {name} changes by at most {moved.largest:.3g}{unit}, at {moved.time:.4g} s "
             f"({100 * moved.relative:.2f} % of its range)"
         )
+    if advice:
+        say(f"  {advice}")
+
+
+def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Signal]) -> str:
+    """Say which step keeps the error of the coupling small."""
+    from falsifier.fmu.step_effect import sufficient_step
+
+    share = f"{100 * _COUPLING_SHARE:g} % of its range"
+    step = sufficient_step(system, experiment, signals, share=_COUPLING_SHARE, halvings=_HALVINGS)
+    if step is None:
+        finest = experiment.output_interval / 2**_HALVINGS
+        return (
+            f"no step down to {finest:g} s keeps every output within {share} when it is halved: the coupling "
+            "is too coarse, or outputs jump at events"
+        )
+    kept = f"keeps every output within {share} when it is halved"
+    if step == experiment.output_interval:
+        return f"this step {kept}"
+    return f"step_size = {step:g} {kept}; set it in [model]"
 
 
 def _named(given: Path) -> "Path | System":
@@ -200,10 +223,7 @@ def _named(given: Path) -> "Path | System":
 
 def _of_spec(path: Path) -> "Path | System":
     spec = read_spec(path)
-    if spec.model.fmu is None:
-        return make_system(spec, path)
-    fmu = path.parent / spec.model.fmu
-    return read_package(fmu) if is_package(fmu) else _existing_fmu(fmu)
+    return make_system(spec, path) if is_system(spec) else _existing_fmu(path.parent / (spec.model.fmu or ""))
 
 
 def _one_fmu(given: Path) -> Path:

@@ -133,7 +133,9 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the values of problem_options out of a command's keyword arguments."""
     varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
-    stated = {name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")}
+    stated = {
+        name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")
+    }
     return ProblemSource(**stated, changes=changes)
 
 

@@ -2,7 +2,7 @@
 
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
-from falsifier.fmu.network import Coupling
+from falsifier.fmu.network import Coupling, Frame
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.ssp import is_package, read_package
 from falsifier.fmu.system import Component, System
@@ -13,6 +13,7 @@ __all__ = [
     "Connection",
     "Coupling",
     "FmuModel",
+    "Frame",
     "System",
     "fmu_files",
     "fmus_sha256",

@@ -241,7 +241,9 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
                 _gather(component, count, start, 0.5 * (start + end))
             store_f8(running, float(c))
             status, where, ended = _step(component, start, end, scratch)
-            ends = ends or ended
+            if ended:
+                ends = True
+                report[COMPONENT] = c
             if where == DONE and not jacobi:
                 status = read_signals(component, end)
                 where = GETTING if status > 1 else DONE

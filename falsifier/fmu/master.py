@@ -76,7 +76,8 @@ class Master:
         for _ in range(coupling.max_rounds):
             loops.start_round(*self._rows, self._plan.pieces, self._running, self._report)
             self._check(0.0)
-            change = np.abs(values - before)
+            with np.errstate(invalid="ignore"):  # an FMU may return infinite values
+                change = np.abs(values - before)
             moving = ~(change <= coupling.tolerance * np.maximum(1.0, np.abs(values)))
             if not moving.any():
                 return

@@ -60,3 +60,30 @@ def step_convergence(
         k = int(distance.argmax())
         moved[name] = Movement(float(distance[k]), float(coarse.times[k]), float(np.ptp(fine[name])))
     return moved
+
+
+def sufficient_step(
+    model: Model, experiment: Experiment, signals: Mapping[str, Signal], *, share: float, halvings: int
+) -> float | None:
+    """Return the largest step in s at which halving changes no output by more than a share of its range.
+
+    Args:
+        model: the model to simulate.
+        experiment: times, outputs, and the step to begin with.
+        signals: inputs by name.
+        share: the share, such as 0.01.
+        halvings: maximum number of times that the step is halved.
+
+    Returns:
+        The step, which is the first one or a half, a quarter, ... of it; None if none of these is enough.
+
+    Raises:
+        SimulationError: if a simulation fails.
+    """
+    step = experiment.step_size or experiment.output_interval
+    for _ in range(halvings + 1):
+        moved = step_convergence(model, replace(experiment, step_size=step), signals)
+        if all(each.relative <= share for each in moved.values()):
+            return step
+        step /= 2
+    return None

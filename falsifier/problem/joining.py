@@ -114,7 +114,8 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME
         raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
     if is_package(fmu):
         _refuse_interface(changes, fmu)
-        return join_system(read_package(fmu), stl, path=fmu, changes=changes, name=name)
+        system = replace(read_package(fmu), logging=bool(changes.logging))
+        return join_system(system, stl, path=fmu, changes=changes, name=name)
     info = read_info(fmu)
     interface = changes.interface or default_interface(info)
     return _join_formula(

@@ -1,6 +1,7 @@
 """The model that a spec names: one FMU, or a system of several."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
@@ -32,24 +33,29 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     """
     stated = [layer.logging for layer in layers if layer.logging is not None]
     logging = stated[-1] if stated else spec.model.logging
-    if spec.components:
+    if is_system(spec):
         _check_interface(spec, layers, str(path))
         return make_system(spec, path, logging=logging)
-    assert spec.model.fmu is not None, "a spec without components has an FMU"
-    fmu = _existing(path, spec.model.fmu, "model.fmu")
-    if is_package(fmu):
-        _check_interface(spec, layers, str(path))
-        return read_package(fmu)
+    fmu = _existing(path, spec.model.fmu or "", "model.fmu")
     return FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), str(path)), logging=logging)
 
 
+def is_system(spec: Spec) -> bool:
+    """Whether a spec has components, or an SSP package in place of an FMU."""
+    return spec.model.fmu is None or is_package(spec.model.fmu)
+
+
 def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
-    """Return the system of a spec with components.
+    """Return the system of a spec for which ``is_system`` is true.
 
     Raises:
         SpecError: naming the file, both ends of a connection that does not fit, and the remedy.
         ModelError: if an FMU cannot be read.
     """
+    coupling = Coupling(**spec.coupling.model_dump())
+    if spec.model.fmu is not None:
+        package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
+        return replace(package, logging=logging)
     components = {
         name: Component(_existing(path, section.fmu, f"components.{name}.fmu"), section.step)
         for name, section in spec.components.items()
@@ -62,7 +68,7 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         return System(
             components,
             connections,
-            coupling=Coupling(**spec.coupling.model_dump()),
+            coupling=coupling,
             name=path.stem,
             logging=logging,
         )

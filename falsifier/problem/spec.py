@@ -18,6 +18,7 @@ from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
 from falsifier.errors import SpecError, did_you_mean, rejected
 from falsifier.fmu.network import Extrapolation, Loops, Method
+from falsifier.fmu.ssp_package import SUFFIXES as PACKAGES
 
 Section = TypeVar("Section", bound=BaseModel)
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
@@ -285,7 +286,8 @@ def _check_model(spec: Spec, file: str) -> None:
             file=file,
             key="model.fmu",
         )
-    if not spec.components and (spec.connections or spec.coupling != CouplingSection()):
+    is_system = bool(spec.components) or str(spec.model.fmu).endswith(PACKAGES)
+    if (spec.connections and not spec.components) or (spec.coupling != CouplingSection() and not is_system):
         key = "connections" if spec.connections else "coupling"
         raise SpecError("only a system has this section: add [components.NAME]", file=file, key=key)
 

@@ -24,7 +24,7 @@ def test_the_component_and_the_time_of_a_failure_are_told(method: str, fmu: str,
 
 
 def test_a_component_that_ends_the_simulation_is_named() -> None:
-    model = system({"bad": "Misdeeds_3"}, {})
+    model = system({"good": "Plant_2", "bad": "Misdeeds_3"}, {})
     with pytest.raises(SimulationError, match=r"^bad: the FMU terminated the simulation at t = 0\.6 s"):
         run(model, "bad.y", parameters={"bad.misdeed": END})
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier import Problem, confirm, evaluate, falsify, load_problem, resume
+from falsifier import Problem, System, confirm, evaluate, falsify, load_problem, resume
+from falsifier.campaigns.work import Missing, _with_local_fmus
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export import export_counterexample
@@ -110,15 +111,11 @@ def test_what_only_the_coupling_violates_is_fragile() -> None:
 
 
 def test_workers_get_the_files_that_they_miss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from falsifier.campaigns.work import Missing, _with_local_fmus
-
     monkeypatch.setenv("FALSIFIER_STORE", str(tmp_path / "store"))
     folder = tmp_path / "there"
     folder.mkdir()
     for name in ("Plant_2", "Gain_2"):
         (folder / f"{name}.fmu").write_bytes(path(name).read_bytes())
-    from falsifier import System
-
     system = System(
         {"plant": folder / "Plant_2.fmu", "pi": folder / "Gain_2.fmu"}, {"plant.u": "pi.y"}, isolate=False
     )
@@ -143,7 +140,11 @@ def test_a_package_is_a_model_wherever_an_fmu_is(tmp_path: Path, monkeypatch: py
     (tmp_path / "loop.toml").write_text(
         SPEC[SPEC.index("[model]") :].replace("[model]", '[model]\nfmu = "loop.ssp"').replace("10]", "2]")
     )
-    assert load_problem("loop.toml").experiment.stop_time == 2.0
+    text = (tmp_path / "loop.toml").read_text()
+    (tmp_path / "loop.toml").write_text(f'{text}[coupling]\nmethod = "jacobi"\n')
+    coupled = load_problem("loop.toml")
+    assert isinstance(coupled.model, System) and coupled.model.coupling.method == "jacobi"
+    assert coupled.experiment.stop_time == 2.0
     problem = load_problem("loop.ssp", stl="G[0,2] (plant.y <= 1.0)", inputs={"pi.r": (0.0, 2.0, 3)})
     result = falsify(problem, engine="corners", budget=2, directory=tmp_path / "run")
     assert result.falsified
