@@ -126,7 +126,9 @@ class RetryingChat:
                     ) from None
                 limit = min(self.attempts, error.patience or self.attempts)
                 if attempt >= limit:
-                    raise ChatError(f"gave up after {counted(attempt, 'attempt')}. {error}") from None
+                    raise ChatError(
+                        f"{counted(attempt, 'attempt')} failed, the last one so: {error}"
+                    ) from None
                 own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
                 delay = min(own, self.longest_delay) if asked is None else asked
                 left = request.seconds_left

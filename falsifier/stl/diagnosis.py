@@ -68,14 +68,14 @@ class Vacuity:
     def text(self) -> str:
         """The finding in words."""
         over = _moment(self.window)
-        near = f"it was false by {_n(-self.margin)}"
+        never, near = "not", f"it was false by {_n(-self.margin)}"
         if self.window[0] < self.window[1]:
+            never = "never"
             near = f"it came closest at {_s(self.nearest)}, false by {_n(-self.margin)}"
         if self.only:
-            return (
-                f"Vacuous: {self.implication} held {over} only because its condition was never true; {near}."
-            )
-        return f"The condition of {self.implication} was never true {over}; {near}."
+            why = f"its condition was {never} true"
+            return f"Vacuous: {self.implication} held {over} only because {why}; {near}."
+        return f"The condition of {self.implication} was {never} true {over}; {near}."
 
 
 @dataclass(frozen=True, slots=True)

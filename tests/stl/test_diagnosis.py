@@ -88,7 +88,7 @@ def test_only_the_times_at_which_an_implication_is_asked_count() -> None:
     assert found.vacuous
     single = diagnose("(G[0,1] (x <= 3)) -> y <= 4", x=[1.0, 4.0], y=[9.0, 9.0])
     assert single.vacuities[0].text == (
-        "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its condition was never true; "
+        "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its condition was not true; "
         "it was false by 1."
     )
 

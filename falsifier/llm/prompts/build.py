@@ -127,8 +127,9 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
 
 _LEGEND = (
     "Signals over time are written as time:value, time in s; between these points they run in straight "
-    "lines. Where a signal oscillates, its period and its lower and upper envelope are given. Up to 3 % of a "
-    "signal's span is rounded off, more where it oscillates, and nothing around the time that decided."
+    "lines. Where a signal oscillates, its period and its lower and upper envelope are given. Up to 2 % of a "
+    "signal's span is rounded off, 4 % of a signal outside the requirement, 1 % around the time that "
+    "decided, and more where it oscillates."
 )
 
 
