@@ -15,6 +15,7 @@ from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.messages import Chat, Exchange
 from falsifier.llm.replay import RecordedChat, Recording
 from falsifier.problem.problem import Problem
@@ -131,7 +132,8 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
 def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
     """The exchanges that a resumed run plays back, and what the others had cost when the run ended.
 
-    The question that a run failed at is asked again: its recorded replies would only fail once more.
+    A question to which no reply was valid, at which the run failed, is asked again: its recorded replies
+    would only fail once more. One that was cut off, whatever by, goes on after its last reply.
     """
     kept: list[Exchange] = []
     unrepeated, answered = Spent(), 0
@@ -141,7 +143,8 @@ def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
         elif isinstance(record, AskedRecord):
             answered = len(kept)
         elif isinstance(record, EndedRecord):
-            if record.status == "failed":
+            rejected = sum(bool(e.problem) and e.reply is not None for e in kept[answered:])
+            if record.status == "failed" and rejected > MAX_REASKS:
                 del kept[answered:]
             unrepeated = _difference(spent_of(record.spent), kept)
     return kept, unrepeated
