@@ -107,7 +107,7 @@ WRONG = [
         COMPONENTS + '[coupling]\nmetod = "jacobi"\n' + REST,
         "coupling.metod: unknown key; did you mean 'method'?",
     ),
-    (COMPONENTS + "[connections]\n'plant.u' = { form = 'pi.y' }\n" + REST, "connections.plant.u"),
+    (COMPONENTS + "[connections]\n'plant.u' = { form = 'pi.y' }\n" + REST, "plant.u.from: this key is missing"),
 ]
 
 
