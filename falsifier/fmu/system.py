@@ -86,6 +86,8 @@ class System:
         instance("connections", self.connections, Mapping, "outputs by input")
         if not self.components:
             raise SpecError("components: expected at least one FMU")
+        if "" in self.components:
+            raise SpecError("components: the name of a component is empty; give it one")
         components = {
             name: each if isinstance(each, Component) else Component(Path(each))
             for name, each in self.components.items()

@@ -108,6 +108,11 @@ WRONG = [
         "components.pi.step: 100 s is longer than the simulation, which stops at ",
     ),
     (
+        COMPONENTS.replace("Gain_2.fmu", "inner.ssp") + REST,
+        "components.pi.fmu: an SSP package cannot be a component",
+    ),
+    (COMPONENTS.replace("[components.pi]", "[components.'']") + REST, "the name of a component is empty"),
+    (
         COMPONENTS + '[coupling]\nmetod = "jacobi"\n' + REST,
         "coupling.metod: unknown key; did you mean 'method'?",
     ),
