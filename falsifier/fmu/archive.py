@@ -95,7 +95,7 @@ def read_entry(path: Path, name: str) -> bytes:
             raise ModelError(
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
-        except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
             raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
 
 

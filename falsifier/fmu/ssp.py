@@ -25,6 +25,8 @@ _FMU_TYPE = "application/x-fmu-sharedlibrary"
 _NESTED_TYPES = ("application/x-ssp-definition", "application/x-ssp-package")
 _SOURCES, _SINKS = ("output", "calculatedParameter"), ("input", "parameter")
 _KINDS = ("input", "output", "parameter", "calculatedParameter")
+# Far more than systems have; packages that refer to each other several times grow like powers.
+_MAX_ELEMENTS = 2_000
 
 # A connector: path of its element, joined by dots (empty: the whole), and its name.
 End = tuple[str, str]
@@ -43,6 +45,7 @@ class _Flat:
     """What the walk through nested systems collects."""
 
     shown: str
+    elements: set[str] = field(default_factory=set)
     fmus: dict[str, Path] = field(default_factory=dict)
     descriptions: dict[str, Description] = field(default_factory=dict)
     connectors: dict[End, Connector] = field(default_factory=dict)
@@ -63,7 +66,10 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
     """
     path = Path(path)
     flat = _Flat(str(path))
-    structure = _walk_file(Package(path, str(path)), "", flat, ())
+    try:
+        structure = _walk_file(Package(path, str(path)), "", flat, ())
+    except RecursionError:
+        raise SpecError(f"{path}: its systems are nested too deeply; flatten them") from None
     connections: dict[str, Connection | str] = {}
     inputs: dict[End, list[End]] = {}
     notes: list[str] = []
@@ -116,8 +122,11 @@ def _walk(part: Part, at: str, package: Package, flat: _Flat, above: tuple[str, 
     inner: dict[str, dict[str, Connector]] = {}
     for child in part.parts:
         path = f"{at}.{child.name}" if at else child.name
-        if child.name in inner:
+        if path in flat.elements:
             raise SpecError(f"{flat.shown}: two elements are named {path!r}; rename one of them")
+        flat.elements.add(path)
+        if len(flat.elements) > _MAX_ELEMENTS:
+            raise SpecError(f"{flat.shown}: the system has more than {_MAX_ELEMENTS} elements; split it")
         inner[child.name] = {c.name: c for c in child.connectors}
         if not child.source:
             _walk(child, path, package, flat, above)

@@ -93,7 +93,10 @@ class Package:
 
     def _name(self, source: str) -> str:
         """Return the path of a resource within the package."""
-        parts = urlsplit(source)
+        try:
+            parts = urlsplit(source)
+        except ValueError:
+            raise SpecError(f"{self.shown}: {source!r} is not a path; name a file in the package") from None
         path = PurePosixPath(unquote(parts.path))
         if parts.scheme or parts.netloc or path.is_absolute() or ".." in path.parts:
             raise SpecError(
@@ -101,10 +104,17 @@ class Package:
                 f"relative to {self.description}"
             )
         name = (self._base / path).as_posix() if self._is_archive else path.as_posix()
-        found = name in self._names if self._is_archive else (self._path.parent / name).is_file()
+        found = name in self._names if self._is_archive else _is_file(self._path.parent / name)
         if not found:
             raise SpecError(f"{self.shown}: the resource {source!r} is missing; export the package again")
         return name
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # the name is too long
+        return False
 
 
 def _checked(read: Callable[[], T]) -> T:

@@ -184,10 +184,14 @@ def _part(element: Element) -> Part:
                 _transformation(wire),
             )
         )
+    name = element.get("name", "") if kind == "System" else element.attrib["name"]
+    source = element.attrib["source"] if kind == "Component" else ""
+    if kind == "Component" and not (name and source):
+        raise ValueError(f"a component has the name {name!r} and the source {source!r}; neither may be empty")
     return Part(
-        name=element.get("name", "") if kind == "System" else element.attrib["name"],
+        name=name,
         type=element.get("type", "application/x-fmu-sharedlibrary") if kind == "Component" else "",
-        source=element.attrib["source"] if kind == "Component" else "",
+        source=source,
         connectors=tuple(map(_connector, element.findall("{*}Connectors/{*}Connector"))),
         bindings=tuple(map(_binding, element.findall("{*}ParameterBindings/{*}ParameterBinding"))),
         parts=tuple(parts),
@@ -204,13 +208,14 @@ def _connector(element: Element) -> Connector:
 def _transformation(element: Element) -> Transformation:
     for child in element:
         if child.tag.rpartition("}")[2] in _MAPPINGS:
-            raise ValueError(
-                f"a {child.tag.rpartition('}')[2]} is not supported; map the values inside a component"
-            )
+            kind = child.tag.rpartition("}")[2]
+            raise ValueError(f"the element {kind} is not supported; map the values inside a component")
     linear = element.find("{*}LinearTransformation")
     factor, offset = (1.0, 0.0) if linear is None else (
         _number(linear.get("factor", "1")), _number(linear.get("offset", "0"))
     )  # fmt: skip
+    if factor == 0.0:
+        raise ValueError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
     return Transformation(factor, offset, _flag(element.get("suppressUnitConversion")))
 
 

@@ -86,6 +86,8 @@ class System:
         instance("connections", self.connections, Mapping, "outputs by input")
         if not self.components:
             raise SpecError("components: expected at least one FMU")
+        if "" in self.components:
+            raise SpecError("components: the name of a component is empty; give it one")
         components = {
             name: each if isinstance(each, Component) else Component(Path(each))
             for name, each in self.components.items()
@@ -140,7 +142,7 @@ class System:
         return run_task(self._runner(), task, tables, parameters, self.info.name)
 
     def check_steps(self, experiment: Experiment) -> None:
-        """Check that each component's own step is an integer multiple of the communication step.
+        """Check that each component's own step is an integer multiple of the communication step, and fits in.
 
         Raises:
             SpecError: naming the component and steps that fit.
@@ -149,13 +151,20 @@ class System:
         for name, component in self.parts.items():
             if component.step is None:
                 continue
+            key = f"components.{name}.step"
+            if component.step > experiment.stop_time * (1.0 + GRID_ROUNDING):
+                raise SpecError(
+                    f"{component.step:g} s is longer than the simulation, which stops at "
+                    f"{experiment.stop_time:g} s; the component would never step; shorten its step",
+                    key=key,
+                )
             count = max(round(component.step / step), 1)
             if abs(component.step / step - count) > GRID_ROUNDING * count:
                 raise SpecError(
                     f"{component.step:g} s is not an integer multiple of the communication step {step:g} s; "
                     f"set step_size = {component.step / (count + (component.step > count * step)):.12g}, or "
                     "another step here",
-                    key=f"components.{name}.step",
+                    key=key,
                 )
 
     def load(self) -> None:

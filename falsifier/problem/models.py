@@ -57,7 +57,7 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
         return replace(package, logging=logging)
     components = {
-        name: Component(_existing(path, section.fmu, f"components.{name}.fmu"), section.step)
+        name: Component(_single(path, section.fmu, f"components.{name}.fmu"), section.step)
         for name, section in spec.components.items()
     }
     connections = {
@@ -87,6 +87,16 @@ def check_own_steps(model: Model, experiment: Experiment, file: str) -> None:
             model.check_steps(experiment)
         except SpecError as error:
             raise SpecError(str(error), file=file) from None
+
+
+def _single(path: Path, fmu: str, key: str) -> Path:
+    if is_package(fmu):
+        raise SpecError(
+            "an SSP package cannot be a component; name it as fmu in [model], or its FMUs here",
+            file=str(path),
+            key=key,
+        )
+    return _existing(path, fmu, key)
 
 
 def _existing(path: Path, fmu: str, key: str) -> Path:

@@ -339,7 +339,8 @@ def _unquoted(error: ValidationError) -> str:
         name = f'"{".".join(names)}"'
         if section in ("inputs", "parameters") and isinstance(each["input"], dict):
             return f"[{section}.{name}]"
-        if section in ("connections", "parameters"):
+        is_quoted = "." in names[0]
+        if section == "parameters" or (section == "connections" and not is_quoted):
             return f"{name} = ..."
     return ""
 

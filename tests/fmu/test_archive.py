@@ -74,6 +74,16 @@ def test_a_damaged_entry_is_named(tmp_path: Path) -> None:
         read_info(tmp_path / "damaged.fmu")
 
 
+def test_an_unknown_compression_method_is_named(tmp_path: Path) -> None:
+    data = write(tmp_path / "packed.fmu", ("modelDescription.xml", b"<a/>")).read_bytes()
+    for header, position in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
+        at = data.index(header) + position
+        data = data[:at] + b"\x63\x00" + data[at + 2 :]
+    (tmp_path / "packed.fmu").write_bytes(data)
+    with pytest.raises(ModelError, match=r"packed\.fmu: modelDescription\.xml is damaged \(.*compression"):
+        read_info(tmp_path / "packed.fmu")
+
+
 def test_platforms_have_one_name_in_all_versions() -> None:
     names = ["binaries/linux64/a.so", "binaries/x86_64-windows/a.dll", "binaries/win32/a.dll", "sources/a.c"]
     assert archive.platforms(names) == ("x86-windows", "x86_64-linux", "x86_64-windows")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.signals import Signal
-from falsifier.fmu import System, read_package
+from falsifier.fmu import System, read_package, ssp
 from tests.fmu import packages
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.systems import run, sampled_loop
@@ -123,6 +123,27 @@ WRONG: list[tuple[str, str]] = [
     (structure(system(PLANT.replace("Plant_2", "Broken"))), "resources/Broken.fmu: "),
     (structure(system(PLANT + PLANT)), "two elements are named 'plant'"),
     (
+        structure(system(PLANT.replace('"plant"', '"a.plant"') + system(PLANT, name="a"))),
+        "two elements are named 'a.plant'",
+    ),
+    (structure(system(PLANT.replace('"plant"', '""'))), "has the name '' and the source"),
+    (structure(system(PLANT.replace("resources/Plant_2.fmu", ""))), "neither may be empty"),
+    (structure(system(PLANT.replace("resources/", "http://["))), "is not a path"),
+    (
+        structure(
+            system(
+                PLANT,
+                '<ssd:Connection startConnector="a" endElement="plant" endConnector="u">'
+                '<ssc:LinearTransformation factor="0"/></ssd:Connection>',
+            )
+        ),
+        "a LinearTransformation has the factor 0",
+    ),
+    (
+        structure('<ssd:System name="a"><ssd:Elements>' * 1500 + "</ssd:Elements></ssd:System>" * 1500),
+        "too deeply",
+    ),
+    (
         structure(system(PLANT.replace('"u"', '"v"'))),
         "the FMU of plant has no variable for the connector plant.v; ",
     ),
@@ -194,7 +215,7 @@ WRONG: list[tuple[str, str]] = [
                 ),
             )
         ),
-        "a IntegerMappingTransformation is not supported",
+        "the element IntegerMappingTransformation is not supported",
     ),
 ]
 
@@ -208,6 +229,21 @@ def test_a_wrong_package_is_one_clear_line(ssd: str, message: str, tmp_path: Pat
     assert message in str(wrong.value) and "\n" not in str(wrong.value)
     assert str(wrong.value).startswith(str(file))
     assert getattr(wrong.value, "exit_code", None) == 2
+
+
+def test_descriptions_that_grow_like_powers_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ssp, "_MAX_ELEMENTS", 100)
+
+    def twice(name: str) -> str:
+        each = '<ssd:Component name="{}" source="{}.ssd" type="application/x-ssp-definition"/>'
+        return structure(system(each.format("a", name) + each.format("b", name)))
+
+    more: dict[str, str | bytes] = {f"d{k}.ssd": twice(f"d{k + 1}") for k in range(40)}
+    file = write(tmp_path / "powers.ssp", twice("d0"), more={**more, "d40.ssd": structure(system(""))})
+    with pytest.raises(Exception, match=r"powers\.ssp: the system has more than 100 elements"):
+        read_package(file)
 
 
 def test_an_algebraic_loop_of_a_package_is_refused(tmp_path: Path) -> None:

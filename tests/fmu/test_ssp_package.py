@@ -46,3 +46,9 @@ def test_a_zip_bomb_is_rejected_before_it_is_unpacked(
         package.writestr("resources/Plant_2.fmu", bytes(2 << 20))
     with pytest.raises(SpecError, match=r"bomb\.ssp: rejected because .* like a zip bomb"):
         read_package(file)
+
+
+def test_a_name_that_is_too_long_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "a.ssd").write_text(structure(system(PLANT.replace("resources/", "x" * 300))))
+    with pytest.raises(SpecError, match=r"a\.ssd: the resource 'x+Plant_2\.fmu' is missing"):
+        read_package(tmp_path / "a.ssd")

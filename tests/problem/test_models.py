@@ -104,10 +104,22 @@ WRONG = [
         "set step_size = 0.015",
     ),
     (
+        COMPONENTS.replace('Gain_2.fmu"', 'Gain_2.fmu"\nstep = 100') + REST,
+        "components.pi.step: 100 s is longer than the simulation, which stops at ",
+    ),
+    (
+        COMPONENTS.replace("Gain_2.fmu", "inner.ssp") + REST,
+        "components.pi.fmu: an SSP package cannot be a component",
+    ),
+    (COMPONENTS.replace("[components.pi]", "[components.'']") + REST, "the name of a component is empty"),
+    (
         COMPONENTS + '[coupling]\nmetod = "jacobi"\n' + REST,
         "coupling.metod: unknown key; did you mean 'method'?",
     ),
-    (COMPONENTS + "[connections]\n'plant.u' = { form = 'pi.y' }\n" + REST, "connections.plant.u"),
+    (
+        COMPONENTS + "[connections]\n'plant.u' = { form = 'pi.y' }\n" + REST,
+        "plant.u.from: this key is missing",
+    ),
 ]
 
 
