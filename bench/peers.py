@@ -34,7 +34,7 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 
 OURS = ("surrogate", "uniform", "corners", "cma")
 PEERS = ("uniform", "dual annealing")
-REQUIREMENTS = ("AT1", "AT2", "AT53", "AT6a", "AT6b", "NN", "CC1", "CC3", "CC5", "F16")
+REQUIREMENTS = ("AT1", "AT2", "AT53", "AT6a", "CC1", "CC3", "CC5", "F16")
 
 
 @dataclass(frozen=True, slots=True)
