@@ -7,6 +7,7 @@ campaign's directory writes there; otherwise it uses a local folder and sends th
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
@@ -138,11 +139,12 @@ def unpack(packed: bytes, directory: Path) -> None:
 
 
 def _sweep(store: Path) -> None:
-    """Remove runs in which nothing has been written for long."""
+    """Remove runs in which nothing has been written for long; other workers may be at work here."""
     for directory in store.glob("runs/*/runs/*"):
-        written = max((path.stat().st_mtime for path in directory.rglob("*")), default=0.0)
-        if time() - written > _KEPT_SECONDS:
-            rmtree(directory, ignore_errors=True)
+        with suppress(OSError):  # another worker has just removed or renamed a file
+            written = max(path.stat().st_mtime for path in (directory, *directory.rglob("*")))
+            if time() - written > _KEPT_SECONDS:
+                rmtree(directory, ignore_errors=True)
 
 
 class _StopWatch:

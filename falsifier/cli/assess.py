@@ -181,7 +181,9 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
         name for name, value in options.items() if name != "target" and value and value != unset.get(name)
     ]
     if changed:
-        raise click.UsageError(f"{place}: a run is assessed as it was searched; drop {', '.join(changed)}")
+        stated = {p.name: p.opts[0] for p in click.get_current_context().command.params}
+        what = ", ".join(stated.get(name, name) for name in changed)
+        raise click.UsageError(f"{place}: a run is assessed as it was searched; drop {what}")
     described = read_manifest(place)
     if requirement is None and described.shared:
         first, *others = described.names

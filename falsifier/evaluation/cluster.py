@@ -49,7 +49,7 @@ class ClusterExecutor(Executor):
         if wait and not cancel_futures:
             for promised in unfinished:
                 promised.exception()
-        else:
+        elif self._client.status == "running":
             self._client.cancel(list(unfinished.values()))
 
     def slots(self) -> int:

@@ -15,6 +15,7 @@ from falsifier.problem.models import check_own_steps, make_model
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.problem.sizes import check_sizes, check_steps
+from falsifier.problem.source import MODEL_FILES
 from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
 
 _DEFAULT_TIME_LIMIT = 60.0
@@ -80,7 +81,7 @@ def join(
     strings = _strings(parameters, model.info, path.parent)
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
-    is_option = stl is not None or path.suffix in (".fmu", ".ssp", ".ssd")
+    is_option = stl is not None or path.suffix in MODEL_FILES
     key = "--stl" if is_option else f"requirements.{requirement}.formula"
     formula = parse_requirement(
         section.formula if stl is None else stl, model.info, experiment, file=file, key=key
@@ -349,7 +350,7 @@ def _space(
         elif parameter.value is not None:
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
     if not searched and not ranges:
-        if file.endswith((".fmu", ".ssp", ".ssd")):  # there is no spec file
+        if file.endswith(MODEL_FILES):  # there is no spec file
             raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
         raise SpecError(
             "nothing to search; add [inputs.NAME] with range and control_points, "
@@ -392,7 +393,7 @@ def _as_input(name: str, section: ParameterSection, file: str) -> str:
     if section.range is not None:
         text = ":".join(f"{value:g}" for value in section.range)
     option = f"--input {name}={text}"
-    if file.endswith((".fmu", ".ssp", ".ssd")):
+    if file.endswith(MODEL_FILES):
         return f"write {option}"
     return f"write {option}, or [inputs.{name}] in the spec"
 

@@ -175,6 +175,12 @@ def load_source(source: ProblemSource) -> Problem:
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
             raise SpecError("--free makes the inputs free; drop --parameterization fixed, or --free")
+        step = problem.experiment.step_size or problem.experiment.output_interval
+        if source.shortest_piece < step:
+            raise SpecError(
+                f"--free {source.shortest_piece:g}: inputs change at communication steps, {step:g} s apart; "
+                "give at least that, or a smaller --output-interval"
+            )
         problem = replace(problem, space=problem.space.freed(source.shortest_piece))
     if source.parameterization == "fixed":
         problem = replace(problem, space=problem.space.fixed)

@@ -6,8 +6,12 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
+from falsifier.fmu.ssp_package import SUFFIXES as PACKAGES
 from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.spec import ModelChanges
+
+# Endings of files that are a model themselves; all others need a spec.
+MODEL_FILES = (".fmu", *PACKAGES)
 
 Parameterization = Literal["free", "fixed"]
 # What a search did with it; refined: the spec's own control points first, then freer ones.
@@ -40,7 +44,7 @@ class Target:
         path, colon, requirement = text.partition(".toml:")
         if colon or text.endswith(".toml"):
             return cls("spec", f"{path.removesuffix('.toml')}.toml", requirement)
-        if text.endswith((".fmu", ".ssp", ".ssd")):
+        if text.endswith(MODEL_FILES):
             return cls("fmu", text)
         return cls("bundled", requirement=text.partition(":")[2])
 

@@ -25,8 +25,8 @@ def compiled(function: _Function, *, forceinline: bool = False, fastmath: bool =
 
     from falsifier.stl.checked_cache import check_cache
 
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": forceinline}
-    options["fastmath"] = fastmath
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    options |= {"forceinline": forceinline, "fastmath": fastmath}
 
     try:
         result: _Function = numba.njit(cache=True, **options)(function)

@@ -64,11 +64,14 @@ def test_a_run_that_got_lost_on_its_way_is_sent_once_more(store: Path, tmp_path:
     assert (again.status, again.reason) == (first.status, first.reason)
     assert journal.read_bytes().startswith(recorded)
     assert journal.read_bytes()[len(recorded) :].count(b'"kind":"ended"') == 1, "nothing was simulated again"
-    for path in journal.parent.rglob("*"):
+    begun = journal.parent.with_name("R-2")
+    begun.mkdir()
+    for path in (journal.parent, *journal.parent.rglob("*")):
         os.utime(path, (0, 0))
     other = run_task(replace(task, name="R-1"), {})
     assert isinstance(other, Done)
     assert [path.parent.name for path in store.rglob("journal.jsonl")] == ["R-1"], "kept for a day"
+    assert begun.is_dir(), "another worker is about to write there"
 
 
 def test_an_fmu_that_the_worker_does_not_have_is_asked_for_and_kept(store: Path, tmp_path: Path) -> None:

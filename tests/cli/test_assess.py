@@ -52,7 +52,7 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
     assert done.json["requirement"] == "NEVER" and done.json["drawn"] == 20
     assert 0.99 < done.json["optimum"] < 1.01
     refused = falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path)
-    assert refused.code == 2 and "drop stl" in refused.err
+    assert refused.code == 2 and "drop --stl" in refused.err
 
 
 def test_a_run_of_several_requirements_says_which_one_is_assessed(tmp_path: Path) -> None:

@@ -38,6 +38,8 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
     assert problem.source is not None and load_source(problem.source).space == problem.space
     with pytest.raises(SpecError, match="drop --parameterization fixed, or --free"):
         load_problem("AT1", parameterization="fixed", shortest_piece=2.5)
+    with pytest.raises(SpecError, match=r"communication steps, 0\.01 s apart; give at least that"):
+        load_problem("AT1", shortest_piece=1e-9)
 
 
 def test_what_the_spec_leaves_out_comes_from_the_fmu(folder: Path) -> None:
