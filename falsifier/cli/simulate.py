@@ -24,7 +24,7 @@ from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.evaluate import simulate as simulate_inputs
 from falsifier.evaluation.input_file import read_inputs
-from falsifier.fmu import read_info
+from falsifier.fmu import is_package, read_info, read_package
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -115,7 +115,8 @@ def _loaded(source: ProblemSource, file: Path | None, given: Mapping[str, float]
     """Load the problem; the inputs themselves give the ranges that an FMU without a spec needs."""
     if source.parts.kind != "fmu" or source.stl is None or not Path(source.parts.file).is_file():
         return load_source(source)
-    info = read_info(Path(source.parts.file))
+    given_file = Path(source.parts.file)
+    info = read_package(given_file).info if is_package(given_file) else read_info(given_file)
     signals = dict(read_inputs(file, info).signals) if file else {}
     signals |= {v.name: _constant(given[v.name]) for v in info.inputs if v.name in given}
     own = {name: InputSection(range=_range(info[name], signal)) for name, signal in signals.items()}

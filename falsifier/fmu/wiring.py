@@ -192,6 +192,10 @@ class _Joiner:
     ) -> tuple[float, float]:
         if connection.factor is not None or connection.offset is not None:
             factor = 1.0 if connection.factor is None else finite(f"{title}: factor", connection.factor)
+            if factor == 0.0:
+                raise _misfit(
+                    title, "factor = 0 passes nothing on; state another, or remove it and fix the input"
+                )
             return factor, finite(f"{title}: offset", connection.offset or 0.0)
         a, b = self._variable(source), self._variable(target)
         units = self._structures[target.member].units

@@ -5,6 +5,7 @@ import pytest
 
 from tests.command import falsifier
 from tests.fmu.fixtures import path as fixture
+from tests.fmu.packages import PLANT, structure, system, write
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
 EASY = "python:tests.problems:easy"
@@ -42,6 +43,14 @@ def test_an_fmu_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
     done = falsifier("simulate", lag, "--stl", "G[0,1] (y <= 5)", "--set", "u=2", "--json", cwd=tmp_path)
     assert done.code == 0, done.err
     assert done.json["signals"]["u"]["values"] == [2.0]
+
+
+def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
+    package = str(write(tmp_path / "plant.ssp", structure(system(PLANT)), "Plant_2"))
+    formula = "G[0,1] (plant.y <= 5)"
+    done = falsifier("simulate", package, "--stl", formula, "--set", "plant.u=2", "--json", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert done.json["signals"]["plant.u"]["values"] == [2.0]
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,4 @@
+import re
 import tomllib
 from typing import Any
 
@@ -23,6 +24,12 @@ SYSTEMS = {
 }
 # Systems of several FMUs.
 COUPLED = {
+    "ATsplit": (
+        "ATsplit1 ATsplit2 ATsplit51 ATsplit52 ATsplit53 ATsplit54 ATsplit6a ATsplit6b ATsplit6c ATsplit6abc",
+        10,
+        None,
+    ),
+    "F16split": ("F16split", 3, None),
     "SharedFeeder": ("SharedFeeder", 14, None),
     "CCcars": ("CCcars1 CCcars2 CCcars3 CCcars4 CCcars5 CCcarsx", 20, None),
 }
@@ -45,6 +52,21 @@ def test_spec_loads(system: str) -> None:
         for problem in load_problems(system, profile="instance2"):
             assert len(problem.space.dimensions) == coordinates_of_instance_2 + (problem.name == "AFC27")
             assert all(r.interpolation == "constant" and r.free is None for r in problem.space.inputs)
+
+
+@pytest.mark.parametrize(("parts", "whole"), [("ATsplit", "AT"), ("CCcars", "CC"), ("F16split", "F16")])
+def test_a_split_system_has_the_requirements_and_ranges_of_the_single_fmu(parts: str, whole: str) -> None:
+    def plain(formula: object) -> str:
+        text = re.sub(r"\bcar(\d)\.y\b", r"y\1", str(formula))
+        return re.sub(r"\b(car|shift|aircraft)\.", "", text)
+
+    for split, one in zip(load_problems(parts), load_problems(whole), strict=True):
+        assert split.name == one.name.replace(whole, parts, 1)
+        assert plain(split.requirement.formula) == str(one.requirement.formula)
+        assert split.space.bounds.tolist() == one.space.bounds.tolist()
+        assert [d.time for d in split.space.dimensions] == [d.time for d in one.space.dimensions]
+        assert [r.hold for r in split.space.inputs] == [r.hold for r in one.space.inputs]
+        assert split.experiment.samples == one.experiment.samples
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
