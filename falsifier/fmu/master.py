@@ -18,7 +18,7 @@ from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.stepper import check_range, what_stopped
 from falsifier.fmu.strings import set_strings
-from falsifier.fmu.system_tables import SystemTables
+from falsifier.fmu.system_tables import SystemTables, steps_with_events
 
 # Maximum number of variables that the error of an initialisation that does not converge names.
 _SHOWN = 6
@@ -59,7 +59,7 @@ class Master:
         self._tables.start_again()
         self._each(lambda starter: starter.enter())
         self._find_first_values()
-        self._each(lambda starter: starter.leave())
+        self._each(lambda starter: starter.leave(self._tables))
         self._record_first()
         self._advance(deadline)
         self._each(lambda starter: starter.terminate())
@@ -111,7 +111,9 @@ class Master:
         plan, report = self._plan, self._report
         stop_time, steps = float(plan.stop_time), plan.steps
         jacobi = self._network.coupling.method == "jacobi"
-        first, chunk = 0, FIRST_CHUNK
+        # The solver may take long for one communication step.
+        is_solved = any(member.interface == "model-exchange" for member in self._network.members)
+        first, chunk = 0, 1 if is_solved else FIRST_CHUNK
         while first < steps:
             started = time.perf_counter()
             last = min(first + chunk, steps)
@@ -156,7 +158,7 @@ class _Starter:
 
     def __init__(self, network: Network, position: int, part: FmuInstance, plan: Plan, room: Room) -> None:
         self._member: Member = network.members[position]
-        self._part, self._plan, self._room = part, plan, room
+        self._position, self._part, self._plan, self._room = position, part, plan, room
         if not isinstance(part.lifecycle, ModalLifecycle):
             raise ModelError(f"{self._member.name}: components need an initialisation mode")
         self._lifecycle = part.lifecycle
@@ -171,11 +173,12 @@ class _Starter:
         """Set the parameters and enter initialisation mode."""
         self._lifecycle.enter(self._plan, self._set_parameters)
 
-    def leave(self) -> None:
-        """Leave initialisation mode, and the event mode that follows it in FMI 3."""
+    def leave(self, tables: SystemTables) -> None:
+        """Leave initialisation mode, and the event mode that follows it in model exchange and in FMI 3."""
         self._lifecycle.leave()
-        library, description = self._part.library, self._member.description
-        if description.major == 3 and description.event_mode:
+        tables.begin(self._position)
+        library = self._part.library
+        if steps_with_events(self._member):
             names = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
             functions = (library.component, *(library.address(name) for name in names), 3, 1)
             status, where = stepping.enter_step_mode(functions)

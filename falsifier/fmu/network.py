@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from falsifier.core.model import Variable
+from falsifier.core.model import Interface, Variable
 from falsifier.fmu.description import Description
 
 Method = Literal["gauss-seidel", "jacobi"]
@@ -68,6 +68,7 @@ class Member:
         sha256: hash of the FMU.
         description: description of the FMU, with the component's name in place of the model's.
         step: step of its own in s; None for the communication step.
+        interface: interface to simulate with.
         folder: name of the folder to which it is extracted.
     """
 
@@ -76,6 +77,7 @@ class Member:
     sha256: str
     description: Description
     step: float | None
+    interface: Interface
     folder: str
 
 

@@ -41,7 +41,7 @@ class SystemInstance:
                 announce(network.order.index(k))
                 self._parts.append(
                     FmuInstance(
-                        member.description, folder / member.folder, "co-simulation", log, logging=logging
+                        member.description, folder / member.folder, member.interface, log, logging=logging
                     )
                 )
         except BaseException:

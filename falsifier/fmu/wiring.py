@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from falsifier.core.arguments import finite, one_of
-from falsifier.core.model import Variable
+from falsifier.core.model import Interface, Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description import describe
 from falsifier.fmu.network import SYSTEM, Coupling, Extrapolation, Frame, Link, Member, Network, Place
@@ -37,7 +37,7 @@ class Connection:
 
 def make_network(
     name: str,
-    components: Mapping[str, tuple[Path, str, float | None]],
+    components: Mapping[str, tuple[Path, str, float | None, Interface | None]],
     connections: Mapping[str, Connection],
     coupling: Coupling,
     frame: Frame,
@@ -46,7 +46,7 @@ def make_network(
 
     Args:
         name: name of the system.
-        components: path and hash of the FMU, and a step of its own in s, by component.
+        components: path and hash of the FMU, a step of its own in s, and the interface, by component.
         connections: where the values of inputs come from, by input, as ``component.variable``.
         coupling: how the components exchange values.
         frame: what the system has as a whole.
@@ -73,15 +73,23 @@ def make_network(
     return Network(name, members, links, order, coupling, description, places)
 
 
-def _member(position: int, name: str, path: Path, sha256: str, step: float | None) -> Member:
+def _member(
+    position: int, name: str, path: Path, sha256: str, step: float | None, interface: Interface | None
+) -> Member:
     description = describe(path, sha256)
     key = f"components.{name}"
-    if "co-simulation" not in description.info.interfaces:
+    offered = description.info.interfaces
+    if not offered:
         raise SpecError(
-            f"{path}: components of a system step by co-simulation, which this FMU does not offer; export it "
-            "for co-simulation",
+            f"{path}: the FMU offers neither co-simulation nor model exchange; export it for one of them",
             key=key,
         )
+    if interface is not None and interface not in offered:
+        raise SpecError(
+            f"the FMU offers {' and '.join(offered)}, not {interface}; change or remove this key",
+            key=f"{key}.interface",
+        )
+    chosen = interface or ("co-simulation" if "co-simulation" in offered else offered[0])
     if description.major == 1:
         raise SpecError(
             f"{path}: an FMU of FMI 1 has no initialisation mode, in which connected components find their "
@@ -89,7 +97,7 @@ def _member(position: int, name: str, path: Path, sha256: str, step: float | Non
             key=key,
         )
     named = replace(description, info=replace(description.info, name=name))
-    return Member(name, path, sha256, named, step, str(position))
+    return Member(name, path, sha256, named, step, chosen, str(position))
 
 
 class _Joiner:
@@ -179,12 +187,11 @@ class _Joiner:
             raise _misfit(title, f"values of type {b.kind} cannot be converted; remove factor and offset")
         extrapolation = connection.extrapolation or self._coupling.extrapolation
         one_of(f"{title}: extrapolation", extrapolation, _EXTRAPOLATIONS)
-        is_continuous = b.kind == "real" and b.variability == "continuous"
-        if connection.extrapolation == "linear" and not is_continuous:
+        if connection.extrapolation == "linear" and not b.is_continuous:
             raise _misfit(title, 'only continuous real inputs follow a line; use extrapolation = "hold"')
         start = float(b.start) if isinstance(b.start, int | float) else 0.0
         self.links.append(
-            Link(source, target, factor, offset, start, extrapolation == "linear" and is_continuous)
+            Link(source, target, factor, offset, start, extrapolation == "linear" and b.is_continuous)
         )
 
     def _conversion(

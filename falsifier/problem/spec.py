@@ -132,6 +132,10 @@ class ComponentSection(_Strict):
     step: Seconds | None = Field(
         None, description="Step of its own in s, an integer multiple of the communication step."
     )
+    interface: Interface | None = Field(
+        None,
+        description="co-simulation or model-exchange; default: co-simulation if the FMU offers it.",
+    )
 
 
 class ConnectionSection(_Strict):

@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.errors import SpecError
 from falsifier.fmu import Connection
-from tests.fmu.systems import LOOP, system
+from tests.fmu.systems import LOOP, solved, system
 
 PAIR = {"plant": "Plant_2", "pi": "Gain_2"}
 ECHO = {"a": "Echo_3", "b": "Echo_3"}
@@ -47,8 +47,10 @@ def test_two_connections_to_one_input_are_both_named() -> None:
 
 
 def test_interfaces_and_versions_without_communication_steps_are_refused() -> None:
-    with pytest.raises(SpecError, match=r"components\.a: .*Stiff_2\.fmu: components .* co-simulation"):
-        system({"a": "Stiff_2"}, {})
+    with pytest.raises(SpecError, match=r"components\.a: .*Scheduled_3\.fmu: the FMU offers neither"):
+        system({"a": "Scheduled_3"}, {})
+    with pytest.raises(SpecError, match=r"components\.a\.interface: the FMU offers co-simulation, not model"):
+        system({"a": solved("Gain_2")}, {})
     with pytest.raises(SpecError, match=r"components\.a: .*Lag_1cs\.fmu: an FMU of FMI 1 has no init"):
         system({"a": "Lag_1cs"}, {})
 
