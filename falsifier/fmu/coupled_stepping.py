@@ -43,6 +43,7 @@ from falsifier.fmu.stepping import (
 )
 
 COMPONENT = 3  # in the report, after STATUS, WHERE and STEP
+NOT_CONVERGED, RESTORING = 9, 10  # where a loop stopped, beside those of stepping.py
 
 # Columns of a component: the functions as for co_simulate, then four tables of ports (Ports.table).
 FUNCTIONS, PLAIN, HELD, SOURCES, RECORDED = 0, 7, 11, 15, 19
@@ -50,13 +51,16 @@ FUNCTIONS, PLAIN, HELD, SOURCES, RECORDED = 0, 7, 11, 15, 19
 # first signal; address of the addresses of the rows to record to; whether a held input has changed. Of model
 # exchange also the address of the function that integrates, and of the solver row; 0 for co-simulation.
 PLAIN_FEEDS, HELD_FEEDS, EVERY, SIGNALS, ROWS, CHANGED = range(23, 29)
-INTEGRATE, SOLVER, COMPONENT_WIDTH = 29, 30, 31
+INTEGRATE, SOLVER = 29, 30
+# Of the first component of a loop that is iterated, the position after its last one, otherwise 0; of all of
+# them, functions that save and restore the state, address of the saved one, and of the feeds as they were.
+LOOP_END, GET_STATE, SET_STATE, STATE, KEPT_FEEDS, COMPONENT_WIDTH = range(31, 37)
 # Columns of a feed: address of pieces or of a signal, which of the two, current piece, value written last,
 # factor, offset, value before the signal is known, whether it follows a line; and of model exchange the
 # address of the piece that the input follows within a step.
 SOURCE, IS_SIGNAL, PIECE, WRITTEN, FACTOR, OFFSET, START, LINEAR, LINE, FEED_WIDTH = range(10)
-# Columns of a signal: value, time in s (negative: not known yet), and the same before.
-VALUE, TIME, OLD_VALUE, OLD_TIME, SIGNAL_WIDTH = range(5)
+# Columns of a signal: value, time in s (negative: not known yet), the same before, value of the round before.
+VALUE, TIME, OLD_VALUE, OLD_TIME, TRIED, SIGNAL_WIDTH = range(6)
 
 _COMPONENT_BYTES, _FEED_BYTES, _SIGNAL_BYTES = 8 * COMPONENT_WIDTH, 8 * FEED_WIDTH, 8 * SIGNAL_WIDTH
 # Columns of a copy: address of a signal, address of the row to record it to.
@@ -72,6 +76,11 @@ SOLVER_STATUS, SOLVER_ENDS = 42, 43
 @intrinsic
 def _integrate(_typing, f, row, start, end, what):  # type: ignore[no-untyped-def]
     return call_signature("nddn")
+
+
+@intrinsic
+def _state(_typing, f, instance, state):  # type: ignore[no-untyped-def]
+    return call_signature("pp")
 
 
 @inlined
@@ -208,11 +217,90 @@ def read_signals(component, time):  # type: ignore[no-untyped-def]
     if status <= 1:
         for j in range(ports[3]):
             signal = load_i8(component + 8 * SIGNALS) + j * _SIGNAL_BYTES
-            store_f8(signal + 8 * OLD_VALUE, load_f8(signal + 8 * VALUE))
-            store_f8(signal + 8 * OLD_TIME, load_f8(signal + 8 * TIME))
+            if load_f8(signal + 8 * TIME) != time:
+                store_f8(signal + 8 * OLD_VALUE, load_f8(signal + 8 * VALUE))
+                store_f8(signal + 8 * OLD_TIME, load_f8(signal + 8 * TIME))
+            store_f8(signal + 8 * TRIED, load_f8(signal + 8 * VALUE))
             store_f8(signal + 8 * VALUE, fetch(ports[2] + j * PLACE_BYTES))
             store_f8(signal + 8 * TIME, time)
     return status
+
+
+@inlined
+def _copy(source, target, numbers):  # type: ignore[no-untyped-def]
+    for i in range(numbers):
+        store_i8(target + 8 * i, load_i8(source + 8 * i))
+
+
+@inlined
+def _keep(component):  # type: ignore[no-untyped-def]
+    """Keep a component's state before a step that may be repeated; return the FMI status."""
+    feeds = FEED_WIDTH * (load_i8(component + 8 * (PLAIN + 3)) + load_i8(component + 8 * (HELD + 3)))
+    _copy(load_i8(component + 8 * PLAIN_FEEDS), load_i8(component + 8 * KEPT_FEEDS), feeds)
+    if load_i8(component + 8 * INTEGRATE):
+        _integrate(load_i8(component + 8 * INTEGRATE), load_i8(component + 8 * SOLVER), 0.0, 0.0, KEEP)
+    return _state(load_i8(component + 8 * GET_STATE), load_i8(component), load_i8(component + 8 * STATE))
+
+
+@inlined
+def _bring_back(component):  # type: ignore[no-untyped-def]
+    """Bring a component back to where its step began; return the FMI status."""
+    feeds = FEED_WIDTH * (load_i8(component + 8 * (PLAIN + 3)) + load_i8(component + 8 * (HELD + 3)))
+    _copy(load_i8(component + 8 * KEPT_FEEDS), load_i8(component + 8 * PLAIN_FEEDS), feeds)
+    if load_i8(component + 8 * INTEGRATE):
+        _integrate(load_i8(component + 8 * INTEGRATE), load_i8(component + 8 * SOLVER), 0.0, 0.0, BRING_BACK)
+    state = load_i8(load_i8(component + 8 * STATE))
+    return _state(load_i8(component + 8 * SET_STATE), load_i8(component), state)
+
+
+@inlined
+def _moves(component, tolerance):  # type: ignore[no-untyped-def]
+    """Whether any connected output has changed since the round before."""
+    moves = False
+    for j in range(load_i8(component + 8 * (SOURCES + 3))):
+        signal = load_i8(component + 8 * SIGNALS) + j * _SIGNAL_BYTES
+        value = load_f8(signal + 8 * VALUE)
+        change = abs(value - load_f8(signal + 8 * TRIED))
+        moves = moves or not change <= tolerance * max(1.0, abs(value))
+    return moves
+
+
+@compiled
+def _iterate(  # type: ignore[no-untyped-def]
+    components, first, last, k, step, end, count, tolerance, rounds, running, scratch, report
+):
+    """Repeat a step of the components of a loop until their outputs agree.
+
+    Returns where it stopped, and whether a component ends the simulation; writes status and component to the
+    report.
+    """
+    report[COMPONENT] = first
+    ends = False
+    for r in range(rounds):
+        moves, ends = False, False
+        for c in range(first, last):
+            component = components + c * _COMPONENT_BYTES
+            own = load_i8(component + 8 * EVERY)
+            if own != 1 and (k + 1) % own:
+                continue
+            store_f8(running, float(c))
+            status = _keep(component) if r == 0 else _bring_back(component)
+            where = RESTORING if status > 1 else DONE
+            if where == DONE:
+                start = (k + 1 - own) * step
+                _prepare(component, count, start, 0.5 * (start + end))
+                status, where, ended = _step(component, start, end, scratch)
+                ends = ends or ended
+            if where == DONE:
+                status = read_signals(component, end)
+                where = GETTING if status > 1 else DONE
+            if where != DONE:
+                report[STATUS], report[COMPONENT] = status, c
+                return where, ends
+            moves = moves or _moves(component, tolerance)
+        if r > 0 and not moves:
+            return DONE, ends
+    return NOT_CONVERGED, ends
 
 
 @compiled
@@ -259,7 +347,8 @@ def start_round(components, number, count, running, report):  # type: ignore[no-
 
 @compiled
 def co_simulate_system(  # type: ignore[no-untyped-def]
-    components, number, jacobi, count, copies, copied, stop_time, steps, first, last, every, running, report,
+    components, number, jacobi, tolerance, rounds, count, copies, copied, stop_time, steps, first, last,
+    every, running, report,
 ):  # fmt: skip
     """Do the communication steps first..last-1 of all components.
 
@@ -270,6 +359,8 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
         components: address of the component rows, in the order in which they step.
         number: number of components.
         jacobi: whether all step from the values of the same communication point.
+        tolerance: change, relative above 1, below which an iterated step has converged.
+        rounds: maximum number of rounds of such a step.
         count: number of pieces per input that is not connected.
         copies: addresses of the signals to record, and of the rows to record them to.
         copied: number of these.
@@ -294,11 +385,22 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
                 if k % own == 0:
                     start = k * step
                     _prepare(component, count, start, start + 0.5 * own * step)
-        ends = False
-        for c in range(number):
+        ends, c = False, 0
+        while c < number:
             component = components + c * _COMPONENT_BYTES
+            loop_end = load_i8(component + 8 * LOOP_END)
+            if loop_end:
+                where, ended = _iterate(
+                    components, c, loop_end, k, step, end, count, tolerance, rounds, running, scratch, report
+                )
+                if where != DONE:
+                    break
+                ends = ends or ended
+                c = loop_end
+                continue
             own = load_i8(component + 8 * EVERY)
             if own != 1 and (k + 1) % own:
+                c += 1
                 continue
             start = (k + 1 - own) * step
             if not jacobi:
@@ -314,6 +416,7 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
             if where != DONE:
                 report[STATUS], report[COMPONENT] = status, c
                 break
+            c += 1
         if jacobi and where == DONE:
             for c in range(number):
                 component = components + c * _COMPONENT_BYTES

@@ -9,7 +9,7 @@ from falsifier.core.model import Interface, Variable
 from falsifier.fmu.description import Description
 
 Method = Literal["gauss-seidel", "jacobi"]
-Loops = Literal["refuse", "delay"]
+Loops = Literal["refuse", "delay", "iterate"]
 Extrapolation = Literal["hold", "linear"]
 
 
@@ -21,11 +21,13 @@ class Coupling:
         method: ``gauss-seidel``: components step one after the other, and later ones get the new values of
             earlier ones; ``jacobi``: all step from the values of the same communication point.
         loops: what to do if outputs and inputs depend on each other without a delay: ``refuse`` the system,
-            or ``delay`` the connection that closes the loop by one communication step.
+            ``delay`` the connection that closes the loop by one communication step, or ``iterate``: repeat
+            the steps of the components in the loop until their outputs no longer change.
         extrapolation: value of an input during a step: ``hold`` the last value, or follow the ``linear``
             course through the last two, for continuous real inputs.
-        tolerance: change, relative for values above 1, below which the initialisation has converged.
-        max_rounds: maximum number of rounds of the initialisation.
+        tolerance: change, relative for values above 1, below which an initialisation or iteration has
+            converged.
+        max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
     """
 
     method: Method = "gauss-seidel"
@@ -119,6 +121,7 @@ class Network:
         members: the components.
         links: the connections.
         order: positions of the components in the order in which they step.
+        loops: first position in the order, and the one after the last, of components that iterate together.
         coupling: how they exchange values.
         description: variables of all components, as ``component.variable``.
         places: where each of these variables is.
@@ -128,6 +131,7 @@ class Network:
     members: tuple[Member, ...]
     links: tuple[Link, ...]
     order: tuple[int, ...]
+    loops: tuple[tuple[int, int], ...]
     coupling: Coupling
     description: Description
     places: Mapping[str, Place]

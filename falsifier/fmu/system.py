@@ -243,3 +243,8 @@ def _check_coupling(coupling: Coupling) -> None:
     one_of("coupling.extrapolation", coupling.extrapolation, get_args(Extrapolation))
     positive("coupling.tolerance", coupling.tolerance)
     whole("coupling.max_rounds", coupling.max_rounds, least=1)
+    if coupling.loops == "iterate" and coupling.method == "jacobi":
+        raise SpecError(
+            'coupling.loops: with the method "jacobi" every connection has a delay, and no step is iterated; '
+            'use method = "gauss-seidel" or loops = "delay"'
+        )

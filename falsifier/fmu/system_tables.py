@@ -13,6 +13,7 @@ from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import check_range
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ class SystemTables:
         components: one row per component, in the order in which they step.
         signals: one row per connected output.
         titles: names of the connected outputs in the system, in the order of their rows.
+        members: positions of the components that have these outputs.
         copies: connected outputs to record, and the addresses of the rows to record them to.
 
     Raises:
@@ -53,6 +55,7 @@ class SystemTables:
         )
         self._signal_of = {Place(member, name): k for k, (_, member, name) in enumerate(sources)}
         self.titles = [network.title(place) for place in self._signal_of]
+        self.members = [place.member for place in self._signal_of]
         self.signals = np.zeros((len(sources), loops.SIGNAL_WIDTH))
         self._links = {n.target: n for n in network.links}
         self._inputs = {network.places[name]: row for row, name in enumerate(plan.inputs)}
@@ -74,6 +77,7 @@ class SystemTables:
         for position, member in enumerate(network.order):
             self._fill(self.components[position], member, recorded)
         self._first_feeds = self._feeds.copy()
+        self._states = [self._iterate(first, last) for first, last in network.loops]
 
     def start_again(self) -> None:
         """Forget the last simulation: no output is known, all inputs are in their first piece.
@@ -96,6 +100,25 @@ class SystemTables:
             check_range(name, names, ports, values)
         for solver, _, places in self._solvers.values():
             solver.start_again([self._pieces_of(place) for place in places])
+
+    def forget(self) -> None:
+        """Free the states that iterated components have saved."""
+        for states in self._states:
+            for state in states:
+                state.forget()
+
+    def _iterate(self, first: int, last: int) -> list[SavedState]:
+        """Let the components at these positions iterate."""
+        states = []
+        self.components[first, loops.LOOP_END] = last
+        for row, member in zip(self.components[first:last], self._network.order[first:last], strict=True):
+            state = SavedState(self._parts[member].library)
+            row[loops.GET_STATE : loops.STATE + 1] = state.addresses
+            kept = np.zeros_like(self._feeds)
+            self._memory.append(kept)
+            row[loops.KEPT_FEEDS] = kept.ctypes.data
+            states.append(state)
+        return states
 
     def begin(self, member: int) -> None:
         """Get a component from initialisation to its first step; only model exchange needs that.

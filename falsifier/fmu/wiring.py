@@ -9,7 +9,7 @@ from falsifier.core.model import Interface, Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description import describe
 from falsifier.fmu.network import SYSTEM, Coupling, Extrapolation, Frame, Link, Member, Network, Place
-from falsifier.fmu.step_order import Dependencies, direct_loop, late_links, step_order
+from falsifier.fmu.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 from falsifier.fmu.structure import Structure, read_structure
 from falsifier.fmu.system_info import merged
 from falsifier.fmu.units import conversion
@@ -65,12 +65,15 @@ def make_network(
     loop = direct_loop(links, dependencies)
     if loop and coupling.loops == "refuse":
         raise SpecError(_loop_text(loop, members), key="connections")
-    order = step_order(len(members), links, dependencies)
-    late = links if coupling.method == "jacobi" else tuple(late_links(links, order))
-    description, places = merged(
-        name, members, links, frame, [*_order_notes(members, order, late), *joiner.notes]
-    )
-    return Network(name, members, links, order, coupling, description, places)
+    if coupling.loops == "iterate":
+        order, loops = iterated_order(len(members), links, dependencies)
+        _check_restorable(members, order, loops)
+    else:
+        order, loops = step_order(len(members), links, dependencies), ()
+    late = links if coupling.method == "jacobi" else tuple(late_links(links, order, loops))
+    notes = [*_order_notes(members, order, late), *_loop_notes(members, order, loops), *joiner.notes]
+    description, places = merged(name, members, links, frame, notes)
+    return Network(name, members, links, order, loops, coupling, description, places)
 
 
 def _member(
@@ -264,8 +267,33 @@ def _loop_text(loop: list[Place], members: tuple[Member, ...]) -> str:
     return (
         f"{' -> '.join([*names, names[0]])}: these depend directly on each other (an algebraic loop), as "
         "their FMUs declare; export one of the components without the direct dependency, for example with a "
-        'delay, or accept a delay of one communication step: [coupling] loops = "delay"'
+        'delay, or accept a delay of one communication step: [coupling] loops = "delay"; or repeat their '
+        'steps until they agree: loops = "iterate"'
     )
+
+
+def _check_restorable(
+    members: tuple[Member, ...], order: tuple[int, ...], loops: tuple[tuple[int, int], ...]
+) -> None:
+    for first, last in loops:
+        inside = [members[m] for m in order[first:last]]
+        fixed = [m.name for m in inside if m.interface not in m.description.saves_state]
+        if fixed:
+            raise SpecError(
+                f'loops = "iterate" repeats the steps of {", ".join(m.name for m in inside)}, but '
+                f"{', '.join(fixed)} cannot restore its state (canGetAndSetFMUState); export it with this "
+                'capability, or accept a delay of one communication step: loops = "delay"',
+                key="coupling.loops",
+            )
+
+
+def _loop_notes(
+    members: tuple[Member, ...], order: tuple[int, ...], loops: tuple[tuple[int, int], ...]
+) -> Iterator[str]:
+    for first, last in loops:
+        names = ", ".join(members[m].name for m in order[first:last])
+        verb = "repeats its" if last - first == 1 else "repeat their"
+        yield f"{names} {verb} steps until the outputs no longer change"
 
 
 def _order_notes(

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.fmu import Connection
+from falsifier.fmu import Connection, Coupling
 from tests.fmu.systems import LOOP, solved, system
 
 PAIR = {"plant": "Plant_2", "pi": "Gain_2"}
@@ -53,6 +53,19 @@ def test_interfaces_and_versions_without_communication_steps_are_refused() -> No
         system({"a": solved("Gain_2")}, {})
     with pytest.raises(SpecError, match=r"components\.a: .*Lag_1cs\.fmu: an FMU of FMI 1 has no init"):
         system({"a": "Lag_1cs"}, {})
+
+
+def test_components_that_cannot_restore_their_state_do_not_iterate() -> None:
+    iterate = Coupling(loops="iterate")
+    with pytest.raises(
+        SpecError, match=r'coupling\.loops: loops = "iterate" repeats .* plant, pi, but plant cannot'
+    ):
+        system({"plant": "Lag_2", "pi": "Gain_2"}, LOOP, iterate)
+    assert system({"plant": "Lag_2", "pi": "Plant_2"}, {"plant.u": "pi.y"}, iterate).network.loops == ()
+    with pytest.raises(
+        SpecError, match=r'coupling\.loops: with the method "jacobi" every connection has a delay'
+    ):
+        system(PAIR, LOOP, Coupling("jacobi", "iterate"))
 
 
 def test_units_are_converted_and_the_conversion_is_told() -> None:
