@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _CHECKED_VARIABLES = 50
 # What halving the step may change in a system, as a share of an output's range, and how often it is halved.
 _COUPLING_SHARE, _HALVINGS = 0.01, 6
+# File name extensions of a diagram.
+_PICTURES = (".svg", ".png", ".pdf")
 
 
 @click.command()
@@ -46,8 +48,15 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
     is_flag=True,
     help="Simulate with the step and with half of it, and show the largest differences of the outputs.",
 )
+@click.option(
+    "--diagram",
+    "drawn",
+    is_flag=True,
+    help="Draw the components and connections of a system: as text, or with --out as a picture.",
+)
+@out_option("Picture to write with --diagram; its extension determines the format (.svg, .png, .pdf).")
 @json_option
-def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
+def info(*, fmu: Path, everything: bool, checked: bool, drawn: bool, out: Path | None, as_json: bool) -> None:
     """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
     FMU is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
@@ -56,6 +65,12 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     from falsifier.fmu import read_info
 
     source = _named(fmu)
+    if drawn or out:
+        _check_diagram(fmu, drawn=drawn, alone=not (as_json or checked or everything), out=out)
+        if isinstance(source, Path):
+            raise SpecError(f"{fmu} is a single FMU, which has no connections; --diagram draws systems")
+        _draw_diagram(source, out)
+        return
     found = read_info(source) if isinstance(source, Path) else source.info
     if as_json:
         say(info_json(found))
@@ -63,6 +78,33 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     say(info_text(found, everything=everything))
     if checked:
         _print_convergence(source, found)
+
+
+def _check_diagram(fmu: Path, *, drawn: bool, alone: bool, out: Path | None) -> None:
+    if not drawn:
+        raise SpecError("--out names the picture of --diagram; add --diagram")
+    if not alone:
+        raise SpecError("--diagram shows connections only; leave out --json, --check and --all")
+    if out is not None and out.suffix.lower() not in _PICTURES:
+        raise SpecError(f"{out}: expected a file name that ends in {', '.join(_PICTURES)}")
+    if out is not None and out.absolute() == fmu.absolute():
+        raise SpecError(f"{out} is the original, which is kept: choose another --out")
+
+
+def _draw_diagram(system: "System", out: Path | None) -> None:
+    from falsifier.views.diagram import diagram, diagram_text
+
+    found = diagram(system)
+    if out is None:
+        say(diagram_text(found))
+        return
+    from falsifier.views.plotting import plot_diagram, save_figure
+
+    try:
+        save_figure(plot_diagram(found), out)
+    except OSError as error:
+        raise SpecError(f"{out} cannot be written: {error.strerror}") from None
+    say(f"picture: {out}")
 
 
 @click.command()

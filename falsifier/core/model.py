@@ -82,6 +82,11 @@ class Variable:
         return None not in self.limits
 
     @property
+    def is_continuous(self) -> bool:
+        """Whether it may change at any time, and not only at events."""
+        return self.kind == "real" and self.variability == "continuous"
+
+    @property
     def type_limits(self) -> tuple[int, int] | None:
         """Smallest and largest number of its data type; None for reals."""
         return _TYPE_LIMITS.get(self.type)

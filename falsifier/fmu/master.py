@@ -18,7 +18,7 @@ from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.stepper import check_range, what_stopped
 from falsifier.fmu.strings import set_strings
-from falsifier.fmu.system_tables import SystemTables
+from falsifier.fmu.system_tables import SystemTables, steps_with_events
 
 # Maximum number of variables that the error of an initialisation that does not converge names.
 _SHOWN = 6
@@ -59,10 +59,14 @@ class Master:
         self._tables.start_again()
         self._each(lambda starter: starter.enter())
         self._find_first_values()
-        self._each(lambda starter: starter.leave())
+        self._each(lambda starter: starter.leave(self._tables))
         self._record_first()
         self._advance(deadline)
         self._each(lambda starter: starter.terminate())
+
+    def forget(self) -> None:
+        """Free what the simulations have saved of the FMUs."""
+        self._tables.forget()
 
     def _each(self, do: "Callable[[_Starter], None]") -> None:
         for position, starter in enumerate(self._steppers):
@@ -85,14 +89,12 @@ class Master:
         raise SimulationError(self._not_converged(np.flatnonzero(moving).tolist(), change.tolist()), time=0.0)
 
     def _not_converged(self, moving: Sequence[int], change: Sequence[float]) -> str:
-        coupling, titles = self._network.coupling, self._tables.titles
-        shown = ", ".join(f"{titles[k]} (by {change[k]:.3g})" for k in moving[:_SHOWN])
-        more = f" and {len(moving) - _SHOWN} more" if len(moving) > _SHOWN else ""
+        coupling = self._network.coupling
         return (
             f"{self._network.name}: the initialisation does not converge: after {coupling.max_rounds} rounds "
-            f"through the connections, these still change: {shown}{more}; they depend on each other in a "
-            "loop: give a component other start values or a delay, or raise coupling.max_rounds or "
-            "coupling.tolerance"
+            f"through the connections, these still change: {self._changes(moving, change)}; they depend on "
+            "each other in a loop: give a component other start values or a delay, or raise "
+            "coupling.max_rounds or coupling.tolerance"
         )
 
     def _record_first(self) -> None:
@@ -110,14 +112,17 @@ class Master:
     def _advance(self, deadline: float) -> None:
         plan, report = self._plan, self._report
         stop_time, steps = float(plan.stop_time), plan.steps
-        jacobi = self._network.coupling.method == "jacobi"
-        first, chunk = 0, FIRST_CHUNK
+        coupling = self._network.coupling
+        jacobi = coupling.method == "jacobi"
+        # The solver may take long for one communication step.
+        is_solved = any(member.interface == "model-exchange" for member in self._network.members)
+        first, chunk = 0, 1 if is_solved else FIRST_CHUNK
         while first < steps:
             started = time.perf_counter()
             last = min(first + chunk, steps)
             loops.co_simulate_system(
-                *self._rows, jacobi, plan.pieces, *self._copies, stop_time, steps, first, last, plan.every,
-                self._running, report,
+                *self._rows, jacobi, coupling.tolerance, coupling.max_rounds, plan.pieces, *self._copies,
+                stop_time, steps, first, last, plan.every, self._running, report,
             )  # fmt: skip
             reached = int(report[stepping.STEP]) * stop_time / steps
             if report[stepping.STEP] == steps and report[stepping.WHERE] == stepping.TERMINATED:
@@ -131,8 +136,32 @@ class Master:
     def _check(self, reached: float) -> None:
         """Raise an error if a loop has reported a failure."""
         status, where, _, position = self._report.tolist()
+        if where == loops.NOT_CONVERGED:
+            raise SimulationError(self._open_loop(position, reached), time=reached)
+        if where == loops.RESTORING:
+            self._fail(position, f"saving or restoring the state returned {status_name(status)}", reached)
         if where != stepping.DONE:
             self._fail(position, what_stopped(stepping, status, where), reached)
+
+    def _open_loop(self, first: int, reached: float) -> str:
+        network, signals = self._network, self._tables.signals
+        last = next(last for start, last in network.loops if start == first)
+        names = {network.members[m].name for m in network.order[first:last]}
+        value, change = signals[:, loops.VALUE], np.abs(signals[:, loops.VALUE] - signals[:, loops.TRIED])
+        moving = ~(change <= network.coupling.tolerance * np.maximum(1.0, np.abs(value)))
+        inside = [
+            k for k in np.flatnonzero(moving).tolist() if self._tables.members[k] in network.order[first:last]
+        ]
+        return (
+            f"{network.name}: the loop of {', '.join(sorted(names))} does not converge at t = {reached:g} s: "
+            f"after {network.coupling.max_rounds} rounds, these still change: "
+            f"{self._changes(inside, change.tolist())}; raise coupling.max_rounds or coupling.tolerance, or "
+            'accept a delay of one communication step: loops = "delay"'
+        )
+
+    def _changes(self, moving: Sequence[int], change: Sequence[float]) -> str:
+        shown = ", ".join(f"{self._tables.titles[k]} (by {change[k]:.3g})" for k in moving[:_SHOWN])
+        return shown + (f" and {len(moving) - _SHOWN} more" if len(moving) > _SHOWN else "")
 
     def _fail(self, position: int, what: str, reached: float) -> None:
         name = self._network.stepped(position)
@@ -156,7 +185,7 @@ class _Starter:
 
     def __init__(self, network: Network, position: int, part: FmuInstance, plan: Plan, room: Room) -> None:
         self._member: Member = network.members[position]
-        self._part, self._plan, self._room = part, plan, room
+        self._position, self._part, self._plan, self._room = position, part, plan, room
         if not isinstance(part.lifecycle, ModalLifecycle):
             raise ModelError(f"{self._member.name}: components need an initialisation mode")
         self._lifecycle = part.lifecycle
@@ -171,11 +200,12 @@ class _Starter:
         """Set the parameters and enter initialisation mode."""
         self._lifecycle.enter(self._plan, self._set_parameters)
 
-    def leave(self) -> None:
-        """Leave initialisation mode, and the event mode that follows it in FMI 3."""
+    def leave(self, tables: SystemTables) -> None:
+        """Leave initialisation mode, and the event mode that follows it in model exchange and in FMI 3."""
         self._lifecycle.leave()
-        library, description = self._part.library, self._member.description
-        if description.major == 3 and description.event_mode:
+        tables.begin(self._position)
+        library = self._part.library
+        if steps_with_events(self._member):
             names = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
             functions = (library.component, *(library.address(name) for name in names), 3, 1)
             status, where = stepping.enter_step_mode(functions)
@@ -212,4 +242,4 @@ def warm_up() -> None:
     row = np.zeros(loops.COMPONENT_WIDTH, dtype=np.int64)
     loops.read_signals(row.ctypes.data, 0.0)
     is_jacobi = False
-    loops.co_simulate_system(0, 0, is_jacobi, 1, 0, 0, 1.0, 1, 0, 0, 1, 0, report)
+    loops.co_simulate_system(0, 0, is_jacobi, 1e-9, 1, 1, 0, 0, 1.0, 1, 0, 0, 1, 0, report)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from falsifier.core.model import Variable
+from falsifier.core.model import Interface, Variable
 from falsifier.fmu.description import Description
 
 Method = Literal["gauss-seidel", "jacobi"]
-Loops = Literal["refuse", "delay"]
+Loops = Literal["refuse", "delay", "iterate"]
 Extrapolation = Literal["hold", "linear"]
 
 
@@ -21,11 +21,13 @@ class Coupling:
         method: ``gauss-seidel``: components step one after the other, and later ones get the new values of
             earlier ones; ``jacobi``: all step from the values of the same communication point.
         loops: what to do if outputs and inputs depend on each other without a delay: ``refuse`` the system,
-            or ``delay`` the connection that closes the loop by one communication step.
+            ``delay`` the connection that closes the loop by one communication step, or ``iterate``: repeat
+            the steps of the components in the loop until their outputs no longer change.
         extrapolation: value of an input during a step: ``hold`` the last value, or follow the ``linear``
             course through the last two, for continuous real inputs.
-        tolerance: change, relative for values above 1, below which the initialisation has converged.
-        max_rounds: maximum number of rounds of the initialisation.
+        tolerance: change, relative for values above 1, below which an initialisation or iteration has
+            converged.
+        max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
     """
 
     method: Method = "gauss-seidel"
@@ -68,6 +70,7 @@ class Member:
         sha256: hash of the FMU.
         description: description of the FMU, with the component's name in place of the model's.
         step: step of its own in s; None for the communication step.
+        interface: interface to simulate with.
         folder: name of the folder to which it is extracted.
     """
 
@@ -76,6 +79,7 @@ class Member:
     sha256: str
     description: Description
     step: float | None
+    interface: Interface
     folder: str
 
 
@@ -117,6 +121,7 @@ class Network:
         members: the components.
         links: the connections.
         order: positions of the components in the order in which they step.
+        loops: first position in the order, and the one after the last, of components that iterate together.
         coupling: how they exchange values.
         description: variables of all components, as ``component.variable``.
         places: where each of these variables is.
@@ -126,6 +131,7 @@ class Network:
     members: tuple[Member, ...]
     links: tuple[Link, ...]
     order: tuple[int, ...]
+    loops: tuple[tuple[int, int], ...]
     coupling: Coupling
     description: Description
     places: Mapping[str, Place]

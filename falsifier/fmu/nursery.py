@@ -12,6 +12,7 @@ import signal
 import socket
 import tempfile
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
@@ -50,7 +51,7 @@ class _Nursery:
     def __init__(self, sock: socket.socket, root: Path) -> None:
         self._sock, self._root = sock, root
         self._scratch: dict[int, Path] = {}
-        self._has_solver = self._has_master = False
+        self._loaded: set[str] = set()
 
     def serve(self) -> None:
         while True:
@@ -77,10 +78,7 @@ class _Nursery:
         connection, log = descriptors
         try:
             folder = self._extracted(order)
-            if order.interface == "model-exchange":
-                self._load_solver()
-            if order.network is not None:
-                self._load_master()
+            self._load_loops(order)
             scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
             me = os.getpid()
             pid = os.fork()
@@ -95,27 +93,29 @@ class _Nursery:
         self._scratch[pid] = scratch
         return Reply(text=str(pid))
 
-    def _load_solver(self) -> None:
-        """Compile the solver before the first fork that needs it, outside any simulation's time limit."""
-        if self._has_solver:
-            return
-        from falsifier.fmu import model_exchange
+    def _load_loops(self, order: Order) -> None:
+        """Compile what an order needs before the first fork for it, outside any simulation's time limit."""
+        members = () if order.network is None else order.network.members
+        if order.interface == "model-exchange":
+            from falsifier.fmu import model_exchange
+
+            self._once("solver", _COMPILING, model_exchange.warm_up)
+        if members:
+            from falsifier.fmu import master
+
+            self._once("master", _COMPILING_MASTER, master.warm_up)
+        if any(member.interface == "model-exchange" for member in members):
+            from falsifier.fmu import system_solver
+
+            self._once("system solver", _COMPILING, system_solver.warm_up)
+
+    def _once(self, name: str, text: str, warm_up: Callable[[], None]) -> None:
         from falsifier.fmu.compiling import on_long_compilation
 
-        with on_long_compilation(lambda: send_reply(self._sock, Reply(text=_COMPILING, more=True))):
-            model_exchange.warm_up()
-        self._has_solver = True
-
-    def _load_master(self) -> None:
-        """Compile the loops of systems before the first fork that needs them."""
-        if self._has_master:
-            return
-        from falsifier.fmu import master
-        from falsifier.fmu.compiling import on_long_compilation
-
-        with on_long_compilation(lambda: send_reply(self._sock, Reply(text=_COMPILING_MASTER, more=True))):
-            master.warm_up()
-        self._has_master = True
+        if name not in self._loaded:
+            with on_long_compilation(lambda: send_reply(self._sock, Reply(text=text, more=True))):
+                warm_up()
+            self._loaded.add(name)
 
     def _reap(self, pid: int) -> Reply:
         posix.end_group(pid)

@@ -1,7 +1,8 @@
 """The saved state of a new FMU instance, from which later simulations can start (FMI 2 and 3)."""
 
-from ctypes import byref, c_void_p
+from ctypes import addressof, byref, c_void_p
 
+from falsifier.errors import ModelError
 from falsifier.fmu.library import Library
 
 _NAMES = {2: "FMUstate", 3: "FMUState"}
@@ -18,6 +19,21 @@ class SavedState:
         self._library = library
         self._name = _NAMES.get(library.description.major, "")
         self._state = c_void_p()
+
+    @property
+    def addresses(self) -> tuple[int, int, int]:
+        """Addresses for compiled code: functions that save and restore, and the pointer to the state.
+
+        Raises:
+            ModelError: if the library does not export the functions.
+        """
+        get, restore = (self._library.address(f"{verb}{self._name}") for verb in ("Get", "Set"))
+        if not (get and restore and self._library.address(f"Free{self._name}")):
+            raise ModelError(
+                f"{self._library.description.info.name}: the FMU declares that its state can be restored, "
+                f"but its library does not export the functions for {self._name}"
+            )
+        return get, restore, addressof(self._state)
 
     @property
     def is_taken(self) -> bool:
@@ -41,4 +57,4 @@ class SavedState:
         """Free the saved state; required before its instance is freed."""
         if self.is_taken:
             self._library.function(f"Free{self._name}", c_void_p)(self._library.component, byref(self._state))
-            self._state = c_void_p()
+            self._state.value = None

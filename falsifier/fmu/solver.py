@@ -69,29 +69,14 @@ def advance(m, s, outputs, steps):  # type: ignore[no-untyped-def]
         if s.counts[COLUMN] >= samples:
             return 0, DONE
         grid_time = m.stop_time * s.counts[COLUMN] / (samples - 1)
-        target = min(grid_time, min(next_break(m, s), s.clock[NEXT_EVENT]))
-        target = max(target, s.clock[TIME])
-        wants_event = False
-        if target - s.clock[TIME] > rounding(target):
-            status, where, wants_event = _step_towards(m, s, target)
-            if where != DONE:
-                return status, where
-        else:
-            s.clock[TIME] = target
+        status, where = proceed(m, s, grid_time)
         time = s.clock[TIME]
-        jumps = enter_pieces(m, s)
-        if wants_event or jumps or s.clock[NEXT_EVENT] <= time + rounding(time):
-            s.counts[EVENTS] += 1
-            if s.counts[EVENTS] > _MAX_EVENTS:
-                return 0, STUCK
-            status, where = handle_event(m, s)
-            if where != DONE:
-                # A model that terminates at the stop time has finished: only the last sample is left to
-                # record.
-                last = s.counts[COLUMN] == samples - 1 and m.stop_time - time <= rounding(time)
-                if where != TERMINATED or not last:
-                    return status, where
-                s.clock[NEXT_EVENT] = np.inf
+        if where != DONE:
+            # A model that terminates at the stop time has finished: only the last sample is left to record.
+            last = s.counts[COLUMN] == samples - 1 and m.stop_time - time <= rounding(time)
+            if where != TERMINATED or not last:
+                return status, where
+            s.clock[NEXT_EVENT] = np.inf
         if grid_time <= time + rounding(time):
             f = m.functions
             status = read_row(
@@ -102,6 +87,34 @@ def advance(m, s, outputs, steps):  # type: ignore[no-untyped-def]
             s.counts[COLUMN] += 1
             s.counts[EVENTS] = 0
     return 0, PAUSED if s.counts[COLUMN] < samples else DONE
+
+
+@compiled
+def proceed(m, s, limit):  # type: ignore[no-untyped-def]
+    """Do one solver step towards a time limit in s, and the events at its end; return status and where."""
+    target = min(limit, min(next_break(m, s), s.clock[NEXT_EVENT]))
+    target = max(target, s.clock[TIME])
+    wants_event = False
+    if target - s.clock[TIME] > rounding(target):
+        status, where, wants_event = _step_towards(m, s, target)
+        if where != DONE:
+            return status, where
+    else:
+        s.clock[TIME] = target
+    time = s.clock[TIME]
+    jumps = enter_pieces(m, s)
+    if wants_event or jumps or s.clock[NEXT_EVENT] <= time + rounding(time):
+        return pass_event(m, s)
+    return 0, DONE
+
+
+@compiled
+def pass_event(m, s):  # type: ignore[no-untyped-def]
+    """Handle an event, unless there were too many since the last output; return status and where."""
+    s.counts[EVENTS] += 1
+    if s.counts[EVENTS] > _MAX_EVENTS:
+        return 0, STUCK
+    return handle_event(m, s)
 
 
 @compiled

@@ -4,11 +4,11 @@ The meaning of connectors, transformations and parameter bindings is that of SSP
 no direction of their own, bindings of outer systems override those of inner ones, later ones earlier ones.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from falsifier.core.model import Variable
+from falsifier.core.model import Interface, Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.archive import file_hash
 from falsifier.fmu.description import Description, read_description
@@ -22,6 +22,11 @@ from falsifier.fmu.units import Unit, conversion
 from falsifier.fmu.wiring import Connection
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
+_INTERFACES: Mapping[str, Interface | None] = {
+    "any": None,
+    "CoSimulation": "co-simulation",
+    "ModelExchange": "model-exchange",
+}
 _NESTED_TYPES = ("application/x-ssp-definition", "application/x-ssp-package")
 _SOURCES, _SINKS = ("output", "calculatedParameter"), ("input", "parameter")
 _KINDS = ("input", "output", "parameter", "calculatedParameter")
@@ -47,6 +52,7 @@ class _Flat:
     shown: str
     elements: set[str] = field(default_factory=set)
     fmus: dict[str, Path] = field(default_factory=dict)
+    interfaces: dict[str, Interface | None] = field(default_factory=dict)
     descriptions: dict[str, Description] = field(default_factory=dict)
     connectors: dict[End, Connector] = field(default_factory=dict)
     steps: dict[End, _Step] = field(default_factory=dict)
@@ -92,7 +98,7 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
     frame = Frame(variables, tuple(_outputs(flat)), tuple(values.items()), structure.stop_time, tuple(notes))
     try:
         return System(
-            {name: Component(fmu) for name, fmu in flat.fmus.items()},
+            {name: Component(fmu, None, flat.interfaces[name]) for name, fmu in flat.fmus.items()},
             connections,
             coupling=coupling or Coupling(),
             frame=frame,
@@ -156,7 +162,13 @@ def _declare(part: Part, at: str, flat: _Flat) -> dict[str, Connector]:
 def _component(part: Part, at: str, package: Package, flat: _Flat) -> None:
     if part.type != _FMU_TYPE:
         raise SpecError(f"{flat.shown}: the component {at} is of type {part.type}; only FMUs are supported")
+    if part.implementation not in _INTERFACES:
+        known = ", ".join(_INTERFACES)
+        raise SpecError(
+            f"{flat.shown}: the implementation of {at} is {part.implementation!r}; expected one of {known}"
+        )
     flat.fmus[at] = package.file(part.source)
+    flat.interfaces[at] = _INTERFACES[part.implementation]
     try:
         description = flat.descriptions[at] = read_description(flat.fmus[at])
     except ModelError as error:

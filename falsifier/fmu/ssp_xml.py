@@ -84,6 +84,7 @@ class Part:
     name: str
     type: str
     source: str
+    implementation: str
     connectors: tuple[Connector, ...]
     bindings: tuple[Binding, ...]
     parts: "tuple[Part, ...]" = ()
@@ -192,6 +193,7 @@ def _part(element: Element) -> Part:
         name=name,
         type=element.get("type", "application/x-fmu-sharedlibrary") if kind == "Component" else "",
         source=source,
+        implementation=element.get("implementation", "any"),
         connectors=tuple(map(_connector, element.findall("{*}Connectors/{*}Connector"))),
         bindings=tuple(map(_binding, element.findall("{*}ParameterBindings/{*}ParameterBinding"))),
         parts=tuple(parts),

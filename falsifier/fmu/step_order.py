@@ -82,11 +82,55 @@ def step_order(members: int, links: Iterable[Link], dependencies: Dependencies) 
     return tuple(order)
 
 
-def late_links(links: Iterable[Link], order: Sequence[int]) -> Iterator[Link]:
-    """Yield the connections whose target steps before their source."""
+def iterated_order(
+    members: int, links: Sequence[Link], dependencies: Dependencies
+) -> tuple[tuple[int, ...], tuple[tuple[int, int], ...]]:
+    """Return the order of stepping if loops are iterated, and the ranges of positions that iterate together.
+
+    An FMU that declares nothing may depend directly on all its inputs, and counts as such.
+    """
+    before = _predecessors(members, links, dependencies, dependencies.is_possible)
+    for link in links:
+        member = link.source.member
+        if member == link.target.member and any(
+            dependencies.is_possible(link.target, name) for name in dependencies.outputs(member)
+        ):
+            before[member].add(member)
+    reached = [_reached(m, before) for m in range(members)]
+    base = {m: k for k, m in enumerate(step_order(members, links, dependencies))}
+    groups = {m: sorted({m} | {n for n in reached[m] if m in reached[n]}, key=base.__getitem__) for m in base}
+    left, order, loops = set(base), list[int](), list[tuple[int, int]]()
+    while left:
+        ready = [m for m in left if not (reached[m] & left) - set(groups[m])]
+        group = groups[min(ready, key=base.__getitem__)]
+        if group[0] in reached[group[0]]:
+            loops.append((len(order), len(order) + len(group)))
+        order += group
+        left -= set(group)
+    return tuple(order), tuple(loops)
+
+
+def _reached(start: int, before: Sequence[set[int]]) -> set[int]:
+    found, left = set[int](), [start]
+    while left:
+        new = before[left.pop()] - found
+        found |= new
+        left += new
+    return found
+
+
+def late_links(
+    links: Iterable[Link], order: Sequence[int], loops: Sequence[tuple[int, int]] = ()
+) -> Iterator[Link]:
+    """Yield the connections whose target steps before their source, except for those that are iterated."""
     position = {member: k for k, member in enumerate(order)}
-    inner = (n for n in links if n.source.member != SYSTEM)
-    return (n for n in inner if position[n.target.member] <= position[n.source.member])
+    for link in links:
+        if link.source.member != SYSTEM:
+            ends = position[link.source.member], position[link.target.member]
+            if ends[1] <= ends[0] and not any(
+                first <= min(ends) and max(ends) < last for first, last in loops
+            ):
+                yield link
 
 
 def _predecessors(

@@ -105,11 +105,7 @@ class Stepper(ABC):
         loops = self._loops
         if where == loops.DONE:
             return
-        what = what_stopped(loops, status, where)
-        raise SimulationError(
-            f"{self._name}: {what} at t = {reached:g} s, before the stop time {self._plan.stop_time:g} s",
-            time=reached,
-        )
+        raise component_failure(self._name, status, where, reached, self._plan.stop_time)
 
     def _watch_clock(self, deadline: float, reached: float) -> None:
         if time.perf_counter() > deadline:
@@ -120,6 +116,16 @@ class Stepper(ABC):
                 status="timeout",
                 time=reached,
             )
+
+
+def component_failure(
+    name: str, status: int, where: int, reached: float, stop_time: float
+) -> SimulationError:
+    """Return the error for an FMU that stopped before the stop time; times in s."""
+    what = what_stopped(loops(), status, where)
+    return SimulationError(
+        f"{name}: {what} at t = {reached:g} s, before the stop time {stop_time:g} s", time=reached
+    )
 
 
 def what_stopped(loops: Any, status: int, where: int) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import instance, one_of, positive, whole
-from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
+from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
@@ -28,6 +28,7 @@ class Component:
     Attributes:
         fmu: path of the .fmu file.
         step: step of its own in s, an integer multiple of the communication step; None for that step.
+        interface: ``co-simulation`` or ``model-exchange``; None: co-simulation if the FMU offers it.
         sha256: hash of the file.
 
     Raises:
@@ -37,18 +38,21 @@ class Component:
 
     fmu: Path
     step: float | None = None
+    interface: Interface | None = None
     sha256: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fmu", Path(self.fmu).absolute())
         if self.step is not None:
             positive("step", self.step)
+        if self.interface is not None:
+            one_of("interface", self.interface, get_args(Interface))
         object.__setattr__(self, "sha256", archive.file_hash(self.fmu))
 
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """Several connected co-simulation FMUs, simulated together; their variables are ``component.variable``.
+    """Several connected FMUs, simulated together; their variables are ``component.variable``.
 
     Attributes:
         components: the FMUs by name: a path, or a Component if it has a step of its own.
@@ -190,7 +194,7 @@ class System:
 
 
 def _key(system: System) -> str:
-    components = [(name, each.sha256, each.step) for name, each in system.parts.items()]
+    components = [(name, each.sha256, each.step, each.interface) for name, each in system.parts.items()]
     connections = sorted(system.connections.items(), key=str)
     content = (system.name, components, connections, system.coupling, system.frame)
     return sha256(repr(content).encode()).hexdigest()
@@ -212,7 +216,9 @@ def _order(system: System, *, logging: bool) -> Order:
 
 @lru_cache(maxsize=32)
 def _network(system: System) -> Network:
-    components = {name: (each.fmu, each.sha256, each.step) for name, each in system.parts.items()}
+    components = {
+        name: (each.fmu, each.sha256, each.step, each.interface) for name, each in system.parts.items()
+    }
     connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
     return make_network(system.name, components, connections, system.coupling, system.frame)
 
@@ -237,3 +243,8 @@ def _check_coupling(coupling: Coupling) -> None:
     one_of("coupling.extrapolation", coupling.extrapolation, get_args(Extrapolation))
     positive("coupling.tolerance", coupling.tolerance)
     whole("coupling.max_rounds", coupling.max_rounds, least=1)
+    if coupling.loops == "iterate" and coupling.method == "jacobi":
+        raise SpecError(
+            'coupling.loops: with the method "jacobi" every connection has a delay, and no step is iterated; '
+            'use method = "gauss-seidel" or loops = "delay"'
+        )

@@ -36,12 +36,13 @@ class SystemInstance:
     ) -> None:
         self._network = network
         self._parts: list[FmuInstance] = []
+        self._master: Master | None = None
         try:
             for k, member in enumerate(network.members):
                 announce(network.order.index(k))
                 self._parts.append(
                     FmuInstance(
-                        member.description, folder / member.folder, "co-simulation", log, logging=logging
+                        member.description, folder / member.folder, member.interface, log, logging=logging
                     )
                 )
         except BaseException:
@@ -60,10 +61,13 @@ class SystemInstance:
 
     def prepare(self, plan: Plan, room: Room) -> None:
         """See Instance."""
+        if self._master is not None:
+            self._master.forget()
         self._master = Master(self._network, self._parts, plan, room)
 
     def simulate(self, deadline: float) -> None:
         """See Instance."""
+        assert self._master is not None, "prepare must be called before simulate"
         self._master.simulate(deadline)
 
     def reset(self) -> bool:
@@ -83,6 +87,8 @@ class SystemInstance:
 
     def forget(self) -> None:
         """Free the saved states."""
+        if self._master is not None:
+            self._master.forget()
         for part in self._parts:
             part.forget()
 

@@ -1,6 +1,7 @@
 """The tables of a system that the compiled loops of coupled_stepping.py work on."""
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,11 @@ from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import check_range
+
+if TYPE_CHECKING:
+    from falsifier.fmu.system_solver import SystemSolver
 
 _FUNCTIONS = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
 
@@ -30,6 +35,7 @@ class SystemTables:
         components: one row per component, in the order in which they step.
         signals: one row per connected output.
         titles: names of the connected outputs in the system, in the order of their rows.
+        members: positions of the components that have these outputs.
         copies: connected outputs to record, and the addresses of the rows to record them to.
 
     Raises:
@@ -49,12 +55,14 @@ class SystemTables:
         )
         self._signal_of = {Place(member, name): k for k, (_, member, name) in enumerate(sources)}
         self.titles = [network.title(place) for place in self._signal_of]
+        self.members = [place.member for place in self._signal_of]
         self.signals = np.zeros((len(sources), loops.SIGNAL_WIDTH))
         self._links = {n.target: n for n in network.links}
         self._inputs = {network.places[name]: row for row, name in enumerate(plan.inputs)}
         self._constants = _Constants(network, plan, room)
         targets = [*self._links, *self._inputs]
         self._feeds = np.zeros((len(targets), loops.FEED_WIDTH), dtype=np.int64)
+        self._solvers: dict[int, tuple[SystemSolver, NDArray[np.int64], list[Place]]] = {}
         self._fed = 0
         self.components = np.zeros((len(parts), loops.COMPONENT_WIDTH), dtype=np.int64)
         recorded = [(network.places[name], row) for row, name in enumerate(plan.outputs)]
@@ -69,6 +77,7 @@ class SystemTables:
         for position, member in enumerate(network.order):
             self._fill(self.components[position], member, recorded)
         self._first_feeds = self._feeds.copy()
+        self._states = [self._iterate(first, last) for first, last in network.loops]
 
     def start_again(self) -> None:
         """Forget the last simulation: no output is known, all inputs are in their first piece.
@@ -89,11 +98,56 @@ class SystemTables:
             # Interpolated values are always between those at the ends of a piece.
             values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
             check_range(name, names, ports, values)
+        for solver, _, places in self._solvers.values():
+            solver.start_again([self._pieces_of(place) for place in places])
+
+    def forget(self) -> None:
+        """Free the states that iterated components have saved."""
+        for states in self._states:
+            for state in states:
+                state.forget()
+
+    def _iterate(self, first: int, last: int) -> list[SavedState]:
+        """Let the components at these positions iterate."""
+        states = []
+        self.components[first, loops.LOOP_END] = last
+        for row, member in zip(self.components[first:last], self._network.order[first:last], strict=True):
+            state = SavedState(self._parts[member].library)
+            row[loops.GET_STATE : loops.STATE + 1] = state.addresses
+            kept = np.zeros_like(self._feeds)
+            self._memory.append(kept)
+            row[loops.KEPT_FEEDS] = kept.ctypes.data
+            states.append(state)
+        return states
+
+    def begin(self, member: int) -> None:
+        """Get a component from initialisation to its first step; only model exchange needs that.
+
+        Raises:
+            SimulationError: if an event at time 0 fails.
+        """
+        if member in self._solvers:
+            solver, feeds, _ = self._solvers[member]
+            written = feeds.view(np.float64)[:, loops.WRITTEN].tolist()
+            is_connected = feeds[:, loops.IS_SIGNAL].tolist()
+            solver.begin([value if fed else None for value, fed in zip(written, is_connected, strict=True)])
+
+    def _pieces_of(self, place: Place) -> tuple[NDArray[np.float64], float, float] | None:
+        """Return the pieces of a driven input, with factor and offset; None if an output feeds it."""
+        link = self._links.get(place)
+        source = place if link is None else link.source
+        if link is not None and link.source.member != SYSTEM:
+            return None
+        if source in self._inputs:
+            pieces = self._room.inputs[self._inputs[source]].reshape(-1, 5)
+        else:
+            pieces = self._constants.pieces(source.name)
+        return (pieces, 1.0, 0.0) if link is None else (pieces, link.factor, link.offset)
 
     def _fill(self, row: NDArray[np.int64], member: int, recorded: Sequence[tuple[Place, int]]) -> None:
         part, one = self._parts[member], self._network.members[member]
         library = part.library
-        has_events = one.description.major == 3 and one.description.event_mode
+        has_events = steps_with_events(one)
         row[loops.FUNCTIONS : loops.PLAIN] = [
             0,  # the instance, see start_again
             *(library.address(name) for name in _FUNCTIONS),
@@ -102,10 +156,14 @@ class SystemTables:
         ]
         kinds = {v.name: v for v in one.description.info.variables}
         places = [p for p in (*self._links, *self._inputs) if p.member == member]
-        held = [p for p in places if has_events and _is_discrete(kinds[p.name])]
+        is_solved = one.interface == "model-exchange"
+        held = [p for p in places if _is_held(kinds[p.name], has_events=has_events, is_solved=is_solved)]
         plain = [p for p in places if p not in held]
-        self._inputs_to(row, loops.PLAIN, loops.PLAIN_FEEDS, plain, one, library.setters())
-        self._inputs_to(row, loops.HELD, loops.HELD_FEEDS, held, one, library.setters())
+        first = self._fed
+        ports = self._inputs_to(row, loops.PLAIN, loops.PLAIN_FEEDS, plain, one, library.setters())
+        held_ports = self._inputs_to(row, loops.HELD, loops.HELD_FEEDS, held, one, library.setters())
+        if is_solved:
+            self._solve(row, member, (ports, held_ports), [*plain, *held], first)
         signals = {place: k for place, k in self._signal_of.items() if place.member == member}
         self._ports_to(row, loops.SOURCES, one, signals, library.getters())
         row[loops.SIGNALS] = self._address_of_signal(min(signals.values(), default=0))
@@ -117,6 +175,23 @@ class SystemTables:
         step = self._plan.stop_time / self._plan.steps
         row[loops.EVERY] = 1 if one.step is None else round(one.step / step)
 
+    def _solve(
+        self,
+        row: NDArray[np.int64],
+        member: int,
+        ports: tuple[Ports, Ports],
+        places: list[Place],
+        first: int,
+    ) -> None:
+        # The solver takes seconds to load and is not needed for co-simulation.
+        from falsifier.fmu.system_solver import SystemSolver
+
+        solver = SystemSolver(self._network.members[member], self._parts[member], self._plan, ports)
+        feeds = self._feeds[first : first + len(places)]
+        feeds[:, loops.LINE] = solver.lines.ctypes.data + solver.lines.strides[0] * np.arange(len(places))
+        row[loops.INTEGRATE], row[loops.SOLVER] = solver.address, solver.row.ctypes.data
+        self._solvers[member] = (solver, feeds, places)
+
     def _inputs_to(
         self,
         row: NDArray[np.int64],
@@ -125,7 +200,7 @@ class SystemTables:
         places: Sequence[Place],
         member: Member,
         setters: dict[str, int],
-    ) -> None:
+    ) -> Ports:
         ports = self._ports_to(row, ports_column, member, places, setters)
         row[feeds_column] = self._feeds.ctypes.data + self._fed * self._feeds.itemsize * loops.FEED_WIDTH
         for place in places:
@@ -137,6 +212,7 @@ class SystemTables:
             names = [place.name for place in rows]
             part = make_ports(member.description, names, setters)
             self._checked.append((member.name, names, part, list(rows.values())))
+        return ports
 
     def _feed(self, feed: NDArray[np.int64], place: Place) -> None:
         numbers = feed.view(np.float64)
@@ -193,10 +269,23 @@ class _Constants:
     def address(self, name: str) -> int:
         return int(self._pieces.ctypes.data) + self._names.index(name) * self._pieces.strides[0]
 
+    def pieces(self, name: str) -> NDArray[np.float64]:
+        found: NDArray[np.float64] = self._pieces[self._names.index(name)]
+        return found
+
     def fill(self) -> None:
         for k, row in enumerate(self._rows):
             self._pieces[k, 0, 1] = self._starts[k] if row is None else self._room.parameters[row]
 
 
-def _is_discrete(variable: Variable) -> bool:
-    return variable.variability != "continuous"
+def steps_with_events(member: Member) -> bool:
+    """Whether a component of co-simulation has an event mode, in which its discrete inputs change."""
+    description = member.description
+    return member.interface == "co-simulation" and description.major == 3 and description.event_mode
+
+
+def _is_held(variable: Variable, *, has_events: bool, is_solved: bool) -> bool:
+    """Whether an input changes at events."""
+    if is_solved:
+        return not variable.is_continuous
+    return has_events and variable.variability != "continuous"

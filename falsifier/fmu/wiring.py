@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from falsifier.core.arguments import finite, one_of
-from falsifier.core.model import Variable
+from falsifier.core.model import Interface, Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description import describe
 from falsifier.fmu.network import SYSTEM, Coupling, Extrapolation, Frame, Link, Member, Network, Place
-from falsifier.fmu.step_order import Dependencies, direct_loop, late_links, step_order
+from falsifier.fmu.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 from falsifier.fmu.structure import Structure, read_structure
 from falsifier.fmu.system_info import merged
 from falsifier.fmu.units import conversion
@@ -37,7 +37,7 @@ class Connection:
 
 def make_network(
     name: str,
-    components: Mapping[str, tuple[Path, str, float | None]],
+    components: Mapping[str, tuple[Path, str, float | None, Interface | None]],
     connections: Mapping[str, Connection],
     coupling: Coupling,
     frame: Frame,
@@ -46,7 +46,7 @@ def make_network(
 
     Args:
         name: name of the system.
-        components: path and hash of the FMU, and a step of its own in s, by component.
+        components: path and hash of the FMU, a step of its own in s, and the interface, by component.
         connections: where the values of inputs come from, by input, as ``component.variable``.
         coupling: how the components exchange values.
         frame: what the system has as a whole.
@@ -65,23 +65,34 @@ def make_network(
     loop = direct_loop(links, dependencies)
     if loop and coupling.loops == "refuse":
         raise SpecError(_loop_text(loop, members), key="connections")
-    order = step_order(len(members), links, dependencies)
-    late = links if coupling.method == "jacobi" else tuple(late_links(links, order))
-    description, places = merged(
-        name, members, links, frame, [*_order_notes(members, order, late), *joiner.notes]
-    )
-    return Network(name, members, links, order, coupling, description, places)
+    if coupling.loops == "iterate":
+        order, loops = iterated_order(len(members), links, dependencies)
+        _check_restorable(members, order, loops)
+    else:
+        order, loops = step_order(len(members), links, dependencies), ()
+    late = links if coupling.method == "jacobi" else tuple(late_links(links, order, loops))
+    notes = [*_order_notes(members, order, late), *_loop_notes(members, order, loops), *joiner.notes]
+    description, places = merged(name, members, links, frame, notes)
+    return Network(name, members, links, order, loops, coupling, description, places)
 
 
-def _member(position: int, name: str, path: Path, sha256: str, step: float | None) -> Member:
+def _member(
+    position: int, name: str, path: Path, sha256: str, step: float | None, interface: Interface | None
+) -> Member:
     description = describe(path, sha256)
     key = f"components.{name}"
-    if "co-simulation" not in description.info.interfaces:
+    offered = description.info.interfaces
+    if not offered:
         raise SpecError(
-            f"{path}: components of a system step by co-simulation, which this FMU does not offer; export it "
-            "for co-simulation",
+            f"{path}: the FMU offers neither co-simulation nor model exchange; export it for one of them",
             key=key,
         )
+    if interface is not None and interface not in offered:
+        raise SpecError(
+            f"the FMU offers {' and '.join(offered)}, not {interface}; change or remove this key",
+            key=f"{key}.interface",
+        )
+    chosen = interface or ("co-simulation" if "co-simulation" in offered else offered[0])
     if description.major == 1:
         raise SpecError(
             f"{path}: an FMU of FMI 1 has no initialisation mode, in which connected components find their "
@@ -89,7 +100,7 @@ def _member(position: int, name: str, path: Path, sha256: str, step: float | Non
             key=key,
         )
     named = replace(description, info=replace(description.info, name=name))
-    return Member(name, path, sha256, named, step, str(position))
+    return Member(name, path, sha256, named, step, chosen, str(position))
 
 
 class _Joiner:
@@ -179,12 +190,11 @@ class _Joiner:
             raise _misfit(title, f"values of type {b.kind} cannot be converted; remove factor and offset")
         extrapolation = connection.extrapolation or self._coupling.extrapolation
         one_of(f"{title}: extrapolation", extrapolation, _EXTRAPOLATIONS)
-        is_continuous = b.kind == "real" and b.variability == "continuous"
-        if connection.extrapolation == "linear" and not is_continuous:
+        if connection.extrapolation == "linear" and not b.is_continuous:
             raise _misfit(title, 'only continuous real inputs follow a line; use extrapolation = "hold"')
         start = float(b.start) if isinstance(b.start, int | float) else 0.0
         self.links.append(
-            Link(source, target, factor, offset, start, extrapolation == "linear" and is_continuous)
+            Link(source, target, factor, offset, start, extrapolation == "linear" and b.is_continuous)
         )
 
     def _conversion(
@@ -261,8 +271,33 @@ def _loop_text(loop: list[Place], members: tuple[Member, ...]) -> str:
     return (
         f"{' -> '.join([*names, names[0]])}: these depend directly on each other (an algebraic loop), as "
         "their FMUs declare; export one of the components without the direct dependency, for example with a "
-        'delay, or accept a delay of one communication step: [coupling] loops = "delay"'
+        'delay, or accept a delay of one communication step: [coupling] loops = "delay"; or repeat their '
+        'steps until they agree: loops = "iterate"'
     )
+
+
+def _check_restorable(
+    members: tuple[Member, ...], order: tuple[int, ...], loops: tuple[tuple[int, int], ...]
+) -> None:
+    for first, last in loops:
+        inside = [members[m] for m in order[first:last]]
+        fixed = [m.name for m in inside if m.interface not in m.description.saves_state]
+        if fixed:
+            raise SpecError(
+                f'loops = "iterate" repeats the steps of {", ".join(m.name for m in inside)}, but '
+                f"{', '.join(fixed)} cannot restore its state (canGetAndSetFMUState); export it with this "
+                'capability, or accept a delay of one communication step: loops = "delay"',
+                key="coupling.loops",
+            )
+
+
+def _loop_notes(
+    members: tuple[Member, ...], order: tuple[int, ...], loops: tuple[tuple[int, int], ...]
+) -> Iterator[str]:
+    for first, last in loops:
+        names = ", ".join(members[m].name for m in order[first:last])
+        verb = "repeats its" if last - first == 1 else "repeat their"
+        yield f"{names} {verb} steps until the outputs no longer change"
 
 
 def _order_notes(

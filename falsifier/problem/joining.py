@@ -131,7 +131,9 @@ def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME
 
 def _refuse_interface(changes: ModelChanges, path: Path) -> None:
     if changes.interface == "model-exchange":
-        raise SpecError(f"{path}: the components of a system step by co-simulation; leave --interface out")
+        raise SpecError(
+            f"{path}: the components of a system have interfaces of their own; leave --interface out"
+        )
 
 
 def join_system(

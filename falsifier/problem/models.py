@@ -57,7 +57,7 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
         return replace(package, logging=logging)
     components = {
-        name: Component(_single(path, section.fmu, f"components.{name}.fmu"), section.step)
+        name: Component(_single(path, section.fmu, f"components.{name}.fmu"), section.step, section.interface)
         for name, section in spec.components.items()
     }
     connections = {
@@ -112,7 +112,8 @@ def _check_interface(spec: Spec, layers: Sequence[ModelChanges], file: str) -> N
     stated = [spec.model.interface, *(layer.interface for layer in layers)]
     if "model-exchange" in stated:
         raise SpecError(
-            "the components of a system step by co-simulation; remove this key",
+            "components of a system have interfaces of their own; set components.NAME.interface and remove "
+            "this key",
             file=file,
             key="model.interface",
         )

@@ -132,6 +132,10 @@ class ComponentSection(_Strict):
     step: Seconds | None = Field(
         None, description="Step of its own in s, an integer multiple of the communication step."
     )
+    interface: Interface | None = Field(
+        None,
+        description="co-simulation or model-exchange; default: co-simulation if the FMU offers it.",
+    )
 
 
 class ConnectionSection(_Strict):
@@ -161,17 +165,21 @@ class CouplingSection(_Strict):
     )
     loops: Loops = Field(
         "refuse",
-        description="If outputs and inputs depend directly on each other: refuse the system, or delay the "
-        "connection that closes the loop by one communication step.",
+        description="If outputs and inputs depend directly on each other: refuse the system; delay the "
+        "connection that closes the loop by one communication step; or iterate: repeat the steps in the loop "
+        "until its outputs no longer change.",
     )
     extrapolation: Extrapolation = Field(
         "hold", description="Inputs during a step: hold the last value, or follow the last two linearly."
     )
     tolerance: Seconds = Field(
         1e-9,
-        description="Change of an output, relative above 1, below which the initialisation has converged.",
+        description="Change of an output, relative above 1, below which an initialisation or an iteration "
+        "has converged.",
     )
-    max_rounds: int = Field(100, ge=1, description="Maximum number of rounds of the initialisation.")
+    max_rounds: int = Field(
+        100, ge=1, description="Maximum number of rounds of an initialisation, and of an iterated step."
+    )
 
 
 Components = dict[str, ComponentSection]

@@ -1,6 +1,8 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.archive import this_platform
@@ -105,3 +107,28 @@ def test_an_fmu_without_outputs_can_be_checked_and_searched(tmp_path: Path) -> N
     assert falsifier("init", str(fixture("NoOutputs_2dymola")), "--out", "my.toml", cwd=tmp_path).code == 0
     done = falsifier("run", "my.toml", "--stl", "G[0,10] (y <= 5)", "--budget", "5", "--quiet", cwd=tmp_path)
     assert done.code == 1, done.err
+
+
+def test_info_draws_a_system_as_text_and_as_a_picture(tmp_path: Path) -> None:
+    text = falsifier("info", "SharedFeeder", "--diagram", cwd=tmp_path).out
+    assert "other [A]      <-  right.published  (late)" in text
+    drawn = falsifier("info", "SharedFeeder", "--diagram", "--out", "s.svg", cwd=tmp_path)
+    assert drawn.out == "picture: s.svg\n" and "<svg" in (tmp_path / "s.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("AT", "--diagram"), "AT is a single FMU, which has no connections; --diagram draws systems"),
+        (("SharedFeeder", "--out", "s.svg"), "--out names the picture of --diagram; add --diagram"),
+        (
+            ("SharedFeeder", "--diagram", "--out", "s.txt"),
+            "s.txt: expected a file name that ends in .svg, .png",
+        ),
+        (("SharedFeeder", "--diagram", "--json"), "leave out --json, --check and --all"),
+        (("SharedFeeder", "--diagram", "--out", "no/s.svg"), "no/s.svg cannot be written: No such file"),
+    ],
+)
+def test_info_says_why_it_does_not_draw(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    done = falsifier("info", *arguments, cwd=tmp_path)
+    assert done.code == 2 and said in done.err and done.err.count("\n") == 1

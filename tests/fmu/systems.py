@@ -58,6 +58,11 @@ def sampled_loop(late: int, *, steps: int = 10, step: float = STEP, gain: float 
     return np.array(x)
 
 
+def solved(name: str, step: float | None = None) -> Component:
+    """A component of model exchange."""
+    return Component(Path(path(name)), step, "model-exchange")
+
+
 def component(name: str, step: float) -> Component:
     """A component with a step of its own."""
     return Component(Path(path(name)), step)

@@ -1,12 +1,16 @@
 """Systems against what they are by their equations: the plant's exact response to inputs held over a step."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import Connection, Coupling
-from tests.fmu.systems import LOOP, component, loop, run, sampled_loop, system
+from falsifier.fmu import Component, Connection, Coupling
+from tests.fmu.fixtures import path
+from tests.fmu.systems import LOOP, STEP, component, loop, run, sampled_loop, solved, system
 
 DELAY = Coupling(loops="delay")
 
@@ -99,6 +103,65 @@ def test_a_loop_that_does_not_converge_is_named_with_its_variables() -> None:
     ) as failed:
         run(model, "a.y")
     assert failed.value.time == 0.0
+
+
+def implicit(steps: int, step: float, *, gain: float, direct: float) -> NDArray[np.float64]:
+    """States of a lead whose input u = gain (1 - x - direct u) is held, with x at the step's end; T = 2."""
+    x, decay = [0.0], float(np.exp(-step / 2.0))
+    for _ in range(steps):
+        u = gain * (1.0 - x[-1] * decay) / (1.0 + gain * direct + gain * (1.0 - decay))
+        x.append(u + (x[-1] - u) * decay)
+    return np.array(x)
+
+
+@pytest.mark.parametrize("lead", [path("Lead_2"), path("Lead_3"), solved("Lead_2"), solved("Lead_3")])
+@pytest.mark.parametrize("pi", ["Gain_2", "Gain_3"])
+def test_a_direct_loop_is_iterated_to_its_solution(lead: Path | Component, pi: str) -> None:
+    """Both outputs depend on each other at once; with a delay, they would be those of the step before."""
+    each = lead if isinstance(lead, Component) else Component(lead)
+    model = system({"pi": pi, "plant": each}, LOOP, Coupling(loops="iterate", tolerance=1e-12))
+    assert model.network.loops == ((0, 2),)
+    assert "pi, plant repeat their steps until the outputs no longer change" in model.info.notes[0:2]
+    for _ in range(2):
+        found = run(model, "plant.x", "plant.y", "pi.y", parameters={"pi.k": 1.0})
+        np.testing.assert_allclose(found["plant.x"], implicit(10, STEP, gain=1.0, direct=0.5), atol=1e-8)
+        np.testing.assert_allclose(found["plant.y"], found["plant.x"] + 0.5 * found["pi.y"], atol=1e-8)
+        np.testing.assert_allclose(found["pi.y"], 1.0 - found["plant.y"], atol=1e-8)
+    model.close()
+
+
+def test_components_with_steps_of_their_own_iterate_when_they_meet() -> None:
+    """The controller's value is held for two steps; where both step, they agree."""
+    pi = component("Gain_2", 0.2)
+    model = system({"plant": "Lead_2", "pi": pi}, LOOP, Coupling(loops="iterate"))
+    found = run(model, "plant.x", "plant.y", "pi.y", parameters={"pi.k": 1.0})
+    u = found["pi.y"]
+    np.testing.assert_allclose(u[2::2], (1.0 - found["plant.y"])[2::2], atol=1e-8)
+    assert u[2:10:2].tolist() == u[3:11:2].tolist()
+    decay = float(np.exp(-0.05))
+    np.testing.assert_allclose(
+        found["plant.x"][1:], u[1:] + (found["plant.x"][:-1] - u[1:]) * decay, atol=1e-9
+    )
+
+
+def test_a_step_that_does_not_converge_is_named_with_its_variables() -> None:
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "other": "Plant_2"}, LOOP, Coupling(loops="iterate"))
+    late = {"pi.r": Signal((0.0, 0.3), (0.0, 1.0), "constant")}
+    message = (
+        r"^system: the loop of pi, plant does not converge at t = 0\.3 s: after 100 rounds, these still "
+        r"change: plant\.y \(by .*\), pi\.y \(by .*\); raise .*loops = \"delay\""
+    )
+    with pytest.raises(SimulationError, match=message) as failed:
+        run(model, "plant.y", signals=late, parameters={"pi.k": 4.0})
+    assert failed.value.time == pytest.approx(0.3)
+    assert run(model, "plant.y", signals=late, parameters={"pi.k": 0.5})["plant.y"][-1] > 0.0
+
+
+def test_components_of_a_loop_that_fail_while_they_iterate_are_named() -> None:
+    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, links, Coupling(loops="iterate"))
+    with pytest.raises(SimulationError, match=r"^bad: the step returned error at t = 0\.5 s"):
+        run(model, "plant.y", parameters={"bad.misdeed": 9, "pi.k": 1.0})
 
 
 def test_discrete_inputs_of_fmi_3_change_at_events() -> None:

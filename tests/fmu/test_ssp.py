@@ -217,6 +217,14 @@ WRONG: list[tuple[str, str]] = [
         ),
         "the element IntegerMappingTransformation is not supported",
     ),
+    (
+        structure(system(PLANT.replace("<ssd:Component ", '<ssd:Component implementation="Scheduled" '))),
+        "the implementation of plant is 'Scheduled'; expected one of any, CoSimulation, ModelExchange",
+    ),
+    (
+        structure(system(PLANT.replace("<ssd:Component ", '<ssd:Component implementation="ModelExchange" '))),
+        "components.plant.interface: the FMU offers co-simulation, not model-exchange",
+    ),
 ]
 
 

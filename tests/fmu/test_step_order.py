@@ -47,6 +47,20 @@ def test_a_loop_of_direct_dependencies_is_refused_with_its_variables() -> None:
     assert order(system(gains, loop, Coupling(loops="delay"))) == ["a", "b"]
 
 
+def test_only_the_components_of_a_loop_iterate_and_stand_together() -> None:
+    links = {"a.u": "b.y", "b.u": "a.y", "c.u": "a.y", "d.measured": "d.y", "b2.u": "c.y"}
+    fmus = {"c": "Plant_2", "b": "Lead_2", "b2": "Lead_3", "d": "Gain_2", "a": "Lead_2"}
+    found = system(fmus, links, Coupling(loops="iterate"))
+    assert order(found) == ["c", "b2", "d", "b", "a"]
+    assert found.network.loops == ((2, 3), (3, 5))
+    notes = found.info.notes[:3]
+    assert "c.u uses the values of the previous communication point" in notes[0], "it has no direct output"
+    assert notes[1:] == (
+        "d repeats its steps until the outputs no longer change",
+        "b, a repeat their steps until the outputs no longer change",
+    )
+
+
 def test_an_output_that_feeds_its_own_component_directly_is_a_loop() -> None:
     with pytest.raises(SpecError, match=r"a\.y -> a\.measured -> a\.y: these depend directly"):
         system({"a": "Gain_2"}, {"a.measured": "a.y"})

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.fmu import Connection
-from tests.fmu.systems import LOOP, system
+from falsifier.fmu import Connection, Coupling
+from tests.fmu.systems import LOOP, solved, system
 
 PAIR = {"plant": "Plant_2", "pi": "Gain_2"}
 ECHO = {"a": "Echo_3", "b": "Echo_3"}
@@ -48,10 +48,25 @@ def test_two_connections_to_one_input_are_both_named() -> None:
 
 
 def test_interfaces_and_versions_without_communication_steps_are_refused() -> None:
-    with pytest.raises(SpecError, match=r"components\.a: .*Stiff_2\.fmu: components .* co-simulation"):
-        system({"a": "Stiff_2"}, {})
+    with pytest.raises(SpecError, match=r"components\.a: .*Scheduled_3\.fmu: the FMU offers neither"):
+        system({"a": "Scheduled_3"}, {})
+    with pytest.raises(SpecError, match=r"components\.a\.interface: the FMU offers co-simulation, not model"):
+        system({"a": solved("Gain_2")}, {})
     with pytest.raises(SpecError, match=r"components\.a: .*Lag_1cs\.fmu: an FMU of FMI 1 has no init"):
         system({"a": "Lag_1cs"}, {})
+
+
+def test_components_that_cannot_restore_their_state_do_not_iterate() -> None:
+    iterate = Coupling(loops="iterate")
+    with pytest.raises(
+        SpecError, match=r'coupling\.loops: loops = "iterate" repeats .* plant, pi, but plant cannot'
+    ):
+        system({"plant": "Lag_2", "pi": "Gain_2"}, LOOP, iterate)
+    assert system({"plant": "Lag_2", "pi": "Plant_2"}, {"plant.u": "pi.y"}, iterate).network.loops == ()
+    with pytest.raises(
+        SpecError, match=r'coupling\.loops: with the method "jacobi" every connection has a delay'
+    ):
+        system(PAIR, LOOP, Coupling("jacobi", "iterate"))
 
 
 def test_units_are_converted_and_the_conversion_is_told() -> None:

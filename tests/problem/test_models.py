@@ -94,7 +94,7 @@ WRONG = [
     ),
     (
         COMPONENTS + '[model]\ninterface = "model-exchange"\n' + REST,
-        "components of a system step by co-simulation",
+        "components of a system have interfaces of their own; set components.NAME.interface",
     ),
     (
         COMPONENTS.replace('Gain_2.fmu"', 'Gain_2.fmu"\nstep = 0.03')

@@ -22,6 +22,7 @@ _TYPES: Mapping[str, str] = {
     "string": "String",
 }
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
+_IMPLEMENTATIONS = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
 
 def write_package(system: System, stop_time: float, resources: Mapping[str, Path], path: Path) -> Path:
@@ -46,7 +47,12 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
     _bindings(whole, system, [f"resources/{name}" for name in resources if name.endswith(".ssv")])
     elements = SubElement(whole, f"{_SSD}Elements")
     for member in network.members:
-        attributes = {"name": member.name, "source": sources[member.name], "type": _FMU_TYPE}
+        attributes = {
+            "name": member.name,
+            "source": sources[member.name],
+            "type": _FMU_TYPE,
+            "implementation": _IMPLEMENTATIONS[member.interface],
+        }
         component = SubElement(elements, f"{_SSD}Component", attributes)
         info = member.description.info
         _connectors(component, (*info.inputs, *info.outputs, *info.parameters))

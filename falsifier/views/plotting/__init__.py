@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from falsifier.views.plotting.coverage import plot_coverage
 from falsifier.views.plotting.diagnosis import plot_diagnosis
+from falsifier.views.plotting.diagram import plot_diagram
 from falsifier.views.plotting.evaluation import (
     plot,
     plot_evaluation,
@@ -29,6 +30,7 @@ __all__ = [
     "plot_comparison",
     "plot_coverage",
     "plot_diagnosis",
+    "plot_diagram",
     "plot_evaluation",
     "plot_history",
     "plot_iteration_times",

@@ -10,7 +10,7 @@ from falsifier.counterexamples.export.package import write_package
 from falsifier.counterexamples.export.tables import write_ssv
 from falsifier.fmu import Connection, System, read_package
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
-from tests.fmu.systems import LOOP, run
+from tests.fmu.systems import LOOP, run, solved
 from tests.fmu.systems import system as built
 
 
@@ -44,6 +44,13 @@ def test_inputs_and_values_of_the_whole_stay(tmp_path: Path) -> None:
     model = replace(read_package(write(tmp_path / "a.ssp", ssd, "Plant_2", "Gain_2")), isolate=False)
     found = again(model, tmp_path)
     assert [v.name for v in found.info.inputs] == ["r"] and found.frame.values == model.frame.values
+    np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
+
+
+def test_interfaces_stay(tmp_path: Path) -> None:
+    model = built({"plant": solved("Lag_2"), "pi": "Gain_3"}, LOOP)
+    found = again(model, tmp_path)
+    assert [m.interface for m in found.network.members] == ["model-exchange", "co-simulation"]
     np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
 
 
