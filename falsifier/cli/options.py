@@ -74,6 +74,11 @@ def problem_options(command: Function) -> Function:
             metavar="FORMULA",
             help="Formula to use instead of the spec's requirement.",
         ),
+        click.option(
+            "--template",
+            metavar="'NAME KEY=VALUE ...'",
+            help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
+        ),
         profile_option,
         parameterization_option(),
         click.option(
@@ -136,7 +141,15 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     stated = {
         name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")
     }
-    return ProblemSource(**stated, changes=changes)
+    source = ProblemSource(**stated, changes=changes)
+    template = options.pop("template")
+    if template is None:
+        return source
+    if source.stl is not None:
+        raise click.UsageError("--stl and --template both state the requirement; drop one of them")
+    from falsifier.problem.template_option import formula_of_template
+
+    return source.model_copy(update={"stl": formula_of_template(source, template)})
 
 
 def engine_option(*, multiple: bool = False) -> Decorator:
