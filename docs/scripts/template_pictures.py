@@ -22,7 +22,8 @@ Columns = Mapping[str, NDArray[np.float64]]
 
 
 def _step(at: float, low: float, high: float) -> NDArray[np.float64]:
-    return np.where(at <= TIMES, high, low)
+    steps: NDArray[np.float64] = np.where(at <= TIMES, high, low)
+    return steps
 
 
 def _pulse(start: float, end: float) -> NDArray[np.float64]:
@@ -34,7 +35,7 @@ def _second_order(damping: float, frequency: float, *, at: float = 0.0) -> NDArr
     t = np.maximum(TIMES - at, 0.0)
     wd = frequency * np.sqrt(1 - damping**2)
     decay = np.exp(-damping * frequency * t)
-    return 1 - decay * (np.cos(wd * t) + damping * frequency / wd * np.sin(wd * t))
+    return np.asarray(1 - decay * (np.cos(wd * t) + damping * frequency / wd * np.sin(wd * t)))
 
 
 _TARGET = _step(2.0, 20.0, 80.0)
