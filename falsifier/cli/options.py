@@ -210,8 +210,8 @@ def reply_option(command: Function) -> Function:
     )(command)
 
 
-def asking_options(command: Function) -> Function:
-    """Add how to ask a language model, whichever it is."""
+def connection_options(command: Function) -> Function:
+    """Add how to reach a language model, and what it costs."""
     return _add(
         command,
         api_base_option,
@@ -233,16 +233,31 @@ def asking_options(command: Function) -> Function:
             metavar="SECONDS",
             help="Maximum time to wait for a reply of the language model; default: 600.",
         ),
+        click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
+    )
+
+
+def asking_options(command: Function) -> Function:
+    """Add how to ask a language model for candidates, whichever it is."""
+    return _add(
+        command,
+        connection_options,
         anonymous_option,
         reply_option,
         click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
-        click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
     )
 
 
 def llm_options(command: Function) -> Function:
     """Add which language model to ask, and how."""
     return _add(command, llm_option(), effort_option, variant_option(), asking_options)
+
+
+def connection_settings(options: dict[str, Any]) -> LLMSettings | None:
+    """Take the values of llm, effort and connection_options out of a command's keyword arguments."""
+    unused = {"variant": None, "fallback": None, "anonymous": False, "reply": None}
+    options.update(unused)
+    return llm_settings(options)
 
 
 def llm_settings(options: dict[str, Any]) -> LLMSettings | None:

@@ -50,6 +50,12 @@ def test_bounds_of_single_signals_are_tight(text: str, low: float, high: float) 
         ("G (x == 1 -> y <= 1)", [("G (x == 1 -> y <= 1)", True)]),
         ("F (x > 2.5)", [("F (x > 2.5)", False)]),
         ("G (x <= 1)", []),
+        ("G (b > 0 -> x <= 1)", []),
+        ("G (not (b > 0 and y > 1))", []),
+        ("G (b < 0 or x <= 1)", []),
+        ("G (b < 0 -> x <= 1)", [("G (b < 0 -> x <= 1)", True)]),
+        ("b >= 0 <-> x <= 1", []),
+        ("G (b >= 0 and x <= 1)", [("b >= 0", True)]),
         ("(x <= 1) and (y <= 5)", [("y <= 5", True)]),
     ],
 )
