@@ -76,6 +76,8 @@ def problem_options(command: Function) -> Function:
         ),
         click.option(
             "--template",
+            multiple=True,
+            callback=_only_one,
             metavar="'NAME KEY=VALUE ...'",
             help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
         ),
@@ -125,10 +127,10 @@ def problem_options(command: Function) -> Function:
     )
 
 
-def _only_one(_context: click.Context, _option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
+def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
     if len(formulas) > 1:
         raise click.UsageError(
-            f"--stl: given {len(formulas)} times; run one after the other, or write the formulas to a spec "
+            f"--{option.name}: given {len(formulas)} times; run one after the other, or write them to a spec "
             "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml --all"
         )
     return formulas[0] if formulas else None

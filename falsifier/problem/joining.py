@@ -16,7 +16,15 @@ from falsifier.problem.ranges import fixed_text, fixed_value, input_range, param
 from falsifier.problem.requirement import Requirement, expanded, parse_requirement, spec_formulas
 from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.source import MODEL_FILES
-from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
+from falsifier.problem.spec import (
+    InputSection,
+    ModelChanges,
+    ParameterSection,
+    RequirementSection,
+    Spec,
+    overlay,
+    parse_spec,
+)
 
 _DEFAULT_TIME_LIMIT = 60.0
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
@@ -84,7 +92,8 @@ def join(
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
     is_option = stl is not None or path.suffix in MODEL_FILES
-    key = "--stl" if is_option else f"requirements.{requirement}.formula"
+    stated_by = "formula" if isinstance(section, RequirementSection) else "template"
+    key = "--stl" if is_option else f"requirements.{requirement}.{stated_by}"
     text = expanded(spec, requirement, model.info, experiment, file) if stl is None else stl
     formula = parse_requirement(text, model.info, experiment, file=file, key=key)
     return Joined(

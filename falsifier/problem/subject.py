@@ -143,7 +143,7 @@ def with_requirement(
     table = tomlkit.table()
     table.add("formula", tomlkit.string(formula, literal=formula.isprintable() and "'" not in formula))
     table.add("description", description)
-    requirements.add(name, table)
+    requirements[name] = table
     text = tomlkit.dumps(document)
     parse_spec(tomllib.loads(text), file=str(out))
     return text, name

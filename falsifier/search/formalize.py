@@ -20,7 +20,7 @@ from falsifier.llm.readings import (
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.subject import Subject, subject_of
-from falsifier.problem.unit_check import unit_conflicts
+from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.search.budget import Spent
 from falsifier.search.leaders import open_chat
 from falsifier.search.lint import ranges_of
@@ -224,7 +224,7 @@ def _check_units(reply: ReadingReply, formula: Formula, problem: Problem) -> Non
         assumed = next((u.unit for u in reply.units if u.signal == name), real)
         if real and assumed and assumed != real:
             raise RejectedReplyError(f"{name} is in {real}, not in {assumed}: convert the numbers to {real}")
-    for predicate, text in unit_conflicts(formula, problem.info):
+    for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
         raise RejectedReplyError(f"{predicate}: {text}")
 
 

@@ -17,7 +17,7 @@ from falsifier.fmu.dependencies import inputs_of_outputs
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.unit_check import unit_conflicts
+from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.stl import Formula
 from falsifier.stl.formula import Always, And, Eventually, Or, Until, Window
 from falsifier.stl.implication import implies
@@ -92,7 +92,7 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
     for part, holds in decided(formula, ranges_of(problem)):
         yield _decided(problem, part, holds=holds)
     yield from _windows(problem)
-    for predicate, text in unit_conflicts(formula, problem.info):
+    for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
         yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
     for part in formula.walk():
         if isinstance(part, And | Or):

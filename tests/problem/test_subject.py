@@ -5,6 +5,7 @@ import pytest
 
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_problem
+from falsifier.problem.spec import read_spec
 from falsifier.problem.subject import subject_of, with_requirement
 from tests.problem.support import AT, GOOD, spec
 
@@ -19,6 +20,14 @@ def test_a_requirement_is_added_to_a_spec_and_its_comments_are_kept(folder: Path
     assert str(load_problem(f"{path}:R").requirement.formula) == "G[0,20] (speed <= 120)"
     with pytest.raises(SpecError, match="has a requirement 'R' already"):
         with_requirement(subject_of(str(path)), path, "G (rpm <= 1)", name="R")
+
+
+def test_sections_in_any_order_are_kept(folder: Path) -> None:
+    more = "[profiles.fast]\ninputs.throttle.control_points = 9\n[requirements.S]\nformula = 'G (rpm <= 9)'\n"
+    path = Path(spec(folder, GOOD + more))
+    path.write_text(with_requirement(subject_of(f"{path}:S"), path, "G (rpm <= 1)")[0])
+    assert set(read_spec(path).requirements) == {"R", "S", "R1"}
+    assert set(read_spec(path).profiles) == {"fast"}
 
 
 def test_in_another_folder_the_fmu_is_found(folder: Path) -> None:

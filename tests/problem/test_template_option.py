@@ -10,6 +10,7 @@ from falsifier.problem.template_option import formula_of_template
 from tests.command import falsifier
 from tests.problem.support import AT, GOOD, spec
 
+GRID = "[model]\noutput_interval = 0.01"
 RISE = "rise signal=speed reference=80 time=10"
 
 
@@ -68,5 +69,7 @@ def test_a_spec_with_a_template_is_a_problem_with_its_formula(folder: Path) -> N
     assert str(problem.requirement.formula) == "G[3,50] (abs(speed - 80) <= 1.6)"
     with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.signal: unknown signal 'sped'; did you"):
         load_problem(spec(folder, text.replace('"speed"', '"sped"')))
+    with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.template: .*not a multiple"):
+        load_problem(spec(folder, text.replace("time = 3", "time = 3.005").replace("[model]", GRID)))
     with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.after: needs values up to 60 s"):
         load_problem(spec(folder, text.replace("time = 3", "time = 60")))
