@@ -84,6 +84,8 @@ if TYPE_CHECKING:
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.coverage import Coverage, coverage
     from falsifier.search.events import Event, Listener
+    from falsifier.search.formalize import Difference, Formalized, Reading, formalize
+    from falsifier.search.lint import LintFinding, lint
     from falsifier.search.margin import Margin, margin
     from falsifier.search.request import LLMSettings
     from falsifier.search.result import Result
@@ -108,6 +110,7 @@ _EXPORTS = {
     "Coupling": "falsifier.fmu",
     "Coverage": "falsifier.search.coverage",
     "Diagnosis": "falsifier.stl",
+    "Difference": "falsifier.search.formalize",
     "ENGINES": "falsifier.engines",
     "Engine": "falsifier.engines.protocol",
     "Evaluation": "falsifier.evaluation.evaluate",
@@ -117,12 +120,14 @@ _EXPORTS = {
     "Explanation": "falsifier.counterexamples.explain",
     "FalsifierError": "falsifier.errors",
     "FmuModel": "falsifier.fmu",
+    "Formalized": "falsifier.search.formalize",
     "Formula": "falsifier.stl",
     "Frame": "falsifier.fmu",
     "Freedom": "falsifier.core.space",
     "FunctionModel": "falsifier.core.model",
     "InputRange": "falsifier.core.space",
     "LLMSettings": "falsifier.search.request",
+    "LintFinding": "falsifier.search.lint",
     "Listener": "falsifier.search.events",
     "Margin": "falsifier.search.margin",
     "Method": "falsifier.campaigns",
@@ -132,6 +137,7 @@ _EXPORTS = {
     "ParameterRange": "falsifier.core.space",
     "Problem": "falsifier.problem.problem",
     "ProblemSource": "falsifier.problem.source",
+    "Reading": "falsifier.search.formalize",
     "RecordedChat": "falsifier.llm.replay",
     "Replayed": "falsifier.counterexamples.store",
     "Requirement": "falsifier.problem.requirement",
@@ -158,6 +164,8 @@ _EXPORTS = {
     "evaluate": "falsifier.evaluation.evaluate",
     "explain": "falsifier.counterexamples.explain",
     "falsify": "falsifier.search.run",
+    "formalize": "falsifier.search.formalize",
+    "lint": "falsifier.search.lint",
     "load_counterexample": "falsifier.counterexamples.store:load",
     "load_problem": "falsifier.problem.loading",
     "load_problems": "falsifier.problem.loading",
@@ -202,6 +210,7 @@ __all__ = [
     "Coupling",
     "Coverage",
     "Diagnosis",
+    "Difference",
     "Engine",
     "Evaluation",
     "Event",
@@ -210,12 +219,14 @@ __all__ = [
     "Explanation",
     "FalsifierError",
     "FmuModel",
+    "Formalized",
     "Formula",
     "Frame",
     "Freedom",
     "FunctionModel",
     "InputRange",
     "LLMSettings",
+    "LintFinding",
     "Listener",
     "Margin",
     "Method",
@@ -225,6 +236,7 @@ __all__ = [
     "ParameterRange",
     "Problem",
     "ProblemSource",
+    "Reading",
     "RecordedChat",
     "Replayed",
     "Requirement",
@@ -253,6 +265,8 @@ __all__ = [
     "events",
     "explain",
     "falsify",
+    "formalize",
+    "lint",
     "load_counterexample",
     "load_problem",
     "load_problems",

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from html.parser import HTMLParser
 from inspect import getmembers, isclass
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import click
@@ -21,6 +22,7 @@ from falsifier.cli import cli
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS
 from falsifier.problem.spec import Spec, parse_spec
+from falsifier.problem.templates import TEMPLATES
 from falsifier.search.manifest import Manifest
 from tests.command import ROOT
 
@@ -85,7 +87,7 @@ def test_no_page_loads_anything_from_another_server(site: dict[str, Page]) -> No
 
 def test_the_spec_page_has_every_key_of_every_section(site: dict[str, Page]) -> None:
     schema = Spec.model_json_schema()
-    pages = site["spec/index.html"], site["systems/index.html"]
+    pages = site["spec/index.html"], site["systems/index.html"], site["requirements/index.html"]
     text = "".join(page.text for page in pages)
     anchors = set().union(*(page.anchors for page in pages))
     for section in schema["$defs"].values():
@@ -97,7 +99,9 @@ def test_the_spec_page_has_every_key_of_every_section(site: dict[str, Page]) -> 
 
 def test_marks_are_replaced_by_tables(site: dict[str, Page]) -> None:
     marked = [path for path in WRITTEN if re.search(r"^<!-- \w+", path.read_text(), re.MULTILINE)]
-    assert {path.stem for path in marked} == {"spec", "systems", "commands", "engines", "language-models"}
+    assert {path.stem for path in marked} == {
+        "spec", "systems", "requirements", "commands", "engines", "language-models"
+    }  # fmt: skip
     engines, llms = site["engines/index.html"].text, site["language-models/index.html"].text
     assert [
         name for name, engine in ENGINES.items() if f"{name}" not in engines or engine.summary not in engines
@@ -133,6 +137,12 @@ def test_every_public_name_is_on_an_api_page(site: dict[str, Page]) -> None:
     assert public <= anchors
     raised = [name for name, value in getmembers(errors, isclass) if issubclass(value, Exception)]
     assert {f"falsifier.errors.{name}" for name in raised if name != "FalsifierError"} <= anchors
+
+
+def test_the_pictures_of_templates_are_what_they_say() -> None:
+    found = run_path(str(ROOT / "docs" / "scripts" / "template_pictures.py"))["robustness"]()
+    assert found.keys() == set(TEMPLATES)
+    assert [name for name, (good, bad) in found.items() if not good > 0 > bad] == []
 
 
 # -- examples --------------------------------------------------------------------------------------------

@@ -56,8 +56,11 @@ def _keys(section: str) -> str:
     if section not in sections:
         raise PluginError(f"there is no section {section} in spec files: {', '.join(sections)}")
     properties = sections[section]["properties"]
-    if section in ("RequirementSection", "ProfileSection"):  # these have a table of their own
+    is_template = "template" in properties
+    if is_template or section in ("RequirementSection", "ProfileSection"):  # ModelChanges has its own table
         properties = {k: v for k, v in properties.items() if k not in ModelChanges.model_fields}
+    if is_template:  # these are the same for all
+        properties = {k: v for k, v in properties.items() if k not in ("template", "description")}
     required = sections[section].get("required", ())
     rows = [
         (f"`{key}`", _type(said), "yes" if key in required else "", _meaning(key, said))

@@ -60,6 +60,8 @@ _COMMANDS = {
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
     "build": ("falsifier.cli.inspect", "Compile an FMU's C sources for this platform."),
     "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
+    "lint": ("falsifier.cli.words", "Find requirements that say nothing, or the same as others."),
+    "formalize": ("falsifier.cli.words", "Turn a requirement in words into formulas."),
     "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
     "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model."),
     "llm": ("falsifier.cli.llm", "Check a language model with one short request."),

@@ -74,6 +74,13 @@ def problem_options(command: Function) -> Function:
             metavar="FORMULA",
             help="Formula to use instead of the spec's requirement.",
         ),
+        click.option(
+            "--template",
+            multiple=True,
+            callback=_only_one,
+            metavar="'NAME KEY=VALUE ...'",
+            help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
+        ),
         profile_option,
         parameterization_option(),
         click.option(
@@ -120,10 +127,10 @@ def problem_options(command: Function) -> Function:
     )
 
 
-def _only_one(_context: click.Context, _option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
+def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
     if len(formulas) > 1:
         raise click.UsageError(
-            f"--stl: given {len(formulas)} times; run one after the other, or write the formulas to a spec "
+            f"--{option.name}: given {len(formulas)} times; run one after the other, or write them to a spec "
             "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml --all"
         )
     return formulas[0] if formulas else None
@@ -136,7 +143,15 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     stated = {
         name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")
     }
-    return ProblemSource(**stated, changes=changes)
+    source = ProblemSource(**stated, changes=changes)
+    template = options.pop("template")
+    if template is None:
+        return source
+    if source.stl is not None:
+        raise click.UsageError("--stl and --template both state the requirement; drop one of them")
+    from falsifier.problem.template_option import formula_of_template
+
+    return source.model_copy(update={"stl": formula_of_template(source, template)})
 
 
 def engine_option(*, multiple: bool = False) -> Decorator:
@@ -197,8 +212,8 @@ def reply_option(command: Function) -> Function:
     )(command)
 
 
-def asking_options(command: Function) -> Function:
-    """Add how to ask a language model, whichever it is."""
+def connection_options(command: Function) -> Function:
+    """Add how to reach a language model, and what it costs."""
     return _add(
         command,
         api_base_option,
@@ -220,16 +235,31 @@ def asking_options(command: Function) -> Function:
             metavar="SECONDS",
             help="Maximum time to wait for a reply of the language model; default: 600.",
         ),
+        click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
+    )
+
+
+def asking_options(command: Function) -> Function:
+    """Add how to ask a language model for candidates, whichever it is."""
+    return _add(
+        command,
+        connection_options,
         anonymous_option,
         reply_option,
         click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
-        click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
     )
 
 
 def llm_options(command: Function) -> Function:
     """Add which language model to ask, and how."""
     return _add(command, llm_option(), effort_option, variant_option(), asking_options)
+
+
+def connection_settings(options: dict[str, Any]) -> LLMSettings | None:
+    """Take the values of llm, effort and connection_options out of a command's keyword arguments."""
+    unused = {"variant": None, "fallback": None, "anonymous": False, "reply": None}
+    options.update(unused)
+    return llm_settings(options)
 
 
 def llm_settings(options: dict[str, Any]) -> LLMSettings | None:

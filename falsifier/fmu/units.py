@@ -66,6 +66,11 @@ def conversion(source: str, target: str, known: tuple[Units, Units]) -> tuple[fl
     return a.factor / b.factor, (a.offset - b.offset) / b.factor
 
 
+def is_known(name: str, units: Units) -> bool:
+    """Whether somebody says what a unit is: these definitions, or the usual ones."""
+    return _look_up(name, (units, _COMMON)) is not None
+
+
 def _look_up(name: str, tables: Sequence[Units]) -> Unit | None:
     return next((table[name] for table in tables if name in table), None)
 

@@ -116,7 +116,7 @@ class ReplyForm:
         Raises:
             RejectedReplyError: if the reply contains no candidate, valid or not.
         """
-        text = _without_thoughts(text)
+        text = without_thoughts(text)
         # Reasoning may contain drafts before what is meant, and speak of the tags.
         points = _points(text)[-self.count :] if self.points else _points(text)
         found: Sequence[str | dict[str, Any]] = (
@@ -303,7 +303,7 @@ def _validated(found: dict[str, Any]) -> CandidateReply:
 
 def _candidate_objects(text: str) -> list[dict[str, Any]]:
     """Candidates of the last JSON object that contains any: reasoning may show drafts before it."""
-    for found in reversed(list(_json_objects(text))):
+    for found in reversed(list(json_objects(text))):
         several = found.get("candidates")
         if isinstance(several, list) and several and all(isinstance(c, dict) for c in several):
             return several[:_MOST_CANDIDATES]
@@ -312,7 +312,7 @@ def _candidate_objects(text: str) -> list[dict[str, Any]]:
     return []
 
 
-def _json_objects(text: str) -> Iterator[dict[str, Any]]:
+def json_objects(text: str) -> Iterator[dict[str, Any]]:
     """JSON objects that are not inside of others, in order; the time is proportional to the length."""
     # Python refuses to read integers of thousands of digits; as floats they are inf, which is rejected later.
     decoder = json.JSONDecoder(parse_int=float)
@@ -335,7 +335,7 @@ def _json_objects(text: str) -> Iterator[dict[str, Any]]:
         start = _OBJECT_START.search(text, end)
 
 
-def _without_thoughts(text: str) -> str:
+def without_thoughts(text: str) -> str:
     """The text outside of ``<think> ... </think>``; a thought that does not end stays."""
     kept, start, begun = [], 0, -1
     for tag in _THOUGHT_TAG.finditer(text):

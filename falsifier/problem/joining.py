@@ -1,6 +1,6 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,10 +13,18 @@ from falsifier.problem.freedom import default_freedom
 from falsifier.problem.grid import Grid, choose_grid, formula_times
 from falsifier.problem.models import check_own_steps, make_model
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
-from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.requirement import Requirement, expanded, parse_requirement, spec_formulas
 from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.source import MODEL_FILES
-from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection, Spec, overlay, parse_spec
+from falsifier.problem.spec import (
+    InputSection,
+    ModelChanges,
+    ParameterSection,
+    RequirementSection,
+    Spec,
+    overlay,
+    parse_spec,
+)
 
 _DEFAULT_TIME_LIMIT = 60.0
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
@@ -71,10 +79,12 @@ def join(
         raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}", file=file)
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
     model = model or make_model(spec, layers, path)
-    formulas = [r.formula for r in spec.requirements.values()] if stl is None else [stl]
-    experiment, grid = _experiment(spec, layers, model.info, formulas, file)
+    experiment, grid = _experiment(
+        spec, layers, model.info, lambda stop: spec_formulas(spec, stop) if stl is None else [stl], file
+    )
     check_own_steps(model, experiment, file)
     inputs, parameters = _merged(spec, layers)
+    formulas = spec_formulas(spec, experiment.stop_time) if stl is None else [stl]
     inputs |= _with_points(inputs, changes, formulas, experiment)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
     check_sizes(experiment, space, file)
@@ -82,10 +92,10 @@ def join(
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
     is_option = stl is not None or path.suffix in MODEL_FILES
-    key = "--stl" if is_option else f"requirements.{requirement}.formula"
-    formula = parse_requirement(
-        section.formula if stl is None else stl, model.info, experiment, file=file, key=key
-    )
+    stated_by = "formula" if isinstance(section, RequirementSection) else "template"
+    key = "--stl" if is_option else f"requirements.{requirement}.{stated_by}"
+    text = expanded(spec, requirement, model.info, experiment, file) if stl is None else stl
+    formula = parse_requirement(text, model.info, experiment, file=file, key=key)
     return Joined(
         model,
         Requirement(requirement if stl is None else stl_name, formula, "" if stl else section.description),
@@ -102,8 +112,12 @@ def join(
     )
 
 
-def join_fmu(fmu: Path, stl: str, *, changes: ModelChanges, name: str = STL_NAME) -> Joined:
-    """Join an FMU and a formula, without a spec; the requirement gets the given name.
+def join_fmu(
+    fmu: Path, stl: str | Mapping[str, object], *, changes: ModelChanges, name: str = STL_NAME
+) -> Joined:
+    """Join an FMU and a formula, or the section of a template, without a spec.
+
+    The requirement gets the given name.
 
     If no input or parameter is to be searched, all real inputs with a min and a max are searched.
 
@@ -137,13 +151,18 @@ def _refuse_interface(changes: ModelChanges, path: Path) -> None:
 
 
 def join_system(
-    system: System, stl: str, *, path: Path, changes: ModelChanges, name: str = STL_NAME
+    system: System,
+    stl: str | Mapping[str, object],
+    *,
+    path: Path,
+    changes: ModelChanges,
+    name: str = STL_NAME,
 ) -> Joined:
     """Join a system and a formula, without a spec; otherwise like ``join_fmu``.
 
     Args:
         system: the system.
-        stl: the requirement.
+        stl: the requirement, a formula or the section of a template.
         path: where the system comes from, for error messages.
         changes: overrides for experiment, inputs and parameters.
         name: name of the requirement.
@@ -160,7 +179,7 @@ def join_system(
 def _join_formula(
     sections: Mapping[str, Mapping[str, object]],
     info: ModelInfo,
-    stl: str,
+    stl: str | Mapping[str, object],
     *,
     path: Path,
     changes: ModelChanges,
@@ -176,7 +195,7 @@ def _join_formula(
     data = {
         **sections,
         "model": {**sections.get("model", {}), "stop_time": stop_time},
-        "requirements": {name: {"formula": stl}},
+        "requirements": {name: {"formula": stl} if isinstance(stl, str) else stl},
     }
     spec = parse_spec(data, file=str(path))
     bounded = {} if searched else _bounded_inputs(info)
@@ -197,9 +216,16 @@ def _join_formula(
 
 
 def _experiment(
-    spec: Spec, layers: Iterable[ModelChanges], info: ModelInfo, formulas: Iterable[str], file: str
+    spec: Spec,
+    layers: Iterable[ModelChanges],
+    info: ModelInfo,
+    formulas_of: Callable[[float], Iterable[str]],
+    file: str,
 ) -> tuple[Experiment, Grid | None]:
-    """Return the experiment without outputs, and its grid if nobody stated the interval."""
+    """Return the experiment without outputs, and its grid if nobody stated the interval.
+
+    ``formulas_of`` gives the formulas for a stop time.
+    """
 
     def stated(key: str) -> float | None:
         value: float | None = getattr(spec.model, key)
@@ -214,6 +240,7 @@ def _experiment(
             f"the {info.noun} has no default stop time; add this key", file=file, key="model.stop_time"
         )
     output_interval, step_size = stated("output_interval"), stated("step_size")
+    formulas = formulas_of(stop_time)
     grid = None
     if output_interval is None:
         # All formulas of a spec, so that its requirements can share a search.

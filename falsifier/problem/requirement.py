@@ -1,11 +1,14 @@
 """Requirements: named formulas, checked against a model and an experiment."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from falsifier.core.arguments import instance
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean
 from falsifier.problem.grid import fitting_interval
+from falsifier.problem.spec import Spec
+from falsifier.problem.template_arguments import TemplateError
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.renaming import renamed
 
@@ -48,7 +51,7 @@ def parse_requirement(
         formula = parse(text)
         for name in formula.signals:
             if name not in info:
-                raise FormulaError(f"unknown signal {name!r}; {_similar(name, info)}")
+                raise FormulaError(f"unknown signal {name!r}; {similar(name, info)}")
         # One input has one name, whose values are known at every sample without asking the model.
         formula = renamed(formula, _input_names(info, formula))
     except FormulaError as error:
@@ -62,8 +65,35 @@ def parse_requirement(
     return formula
 
 
-def _similar(name: str, info: ModelInfo) -> str:
-    """Return the end of the message: the most similar variable, and what requirements usually name."""
+def spec_formulas(spec: Spec, stop_time: float) -> list[str]:
+    """Return the formulas of all requirements, for the times in them; templates that do not fit have none."""
+    found = []
+    for section in spec.requirements.values():
+        with suppress(TemplateError):
+            found.append(section.expanded(section.stop_time or stop_time))
+    return found
+
+
+def expanded(spec: Spec, requirement: str, info: ModelInfo, experiment: Experiment, file: str) -> str:
+    """Return the text of a requirement's formula.
+
+    Raises:
+        SpecError: naming the argument of a template that names an unknown signal or does not fit.
+    """
+    section, key = spec.requirements[requirement], f"requirements.{requirement}"
+    for argument, name in section.signals():
+        if name not in info:
+            raise SpecError(
+                f"unknown signal {name!r}; {similar(name, info)}", file=file, key=f"{key}.{argument}"
+            )
+    try:
+        return section.expanded(experiment.stop_time, experiment.output_interval)
+    except TemplateError as error:
+        raise SpecError(str(error), file=file, key=f"{key}.{error.key}") from None
+
+
+def similar(name: str, info: ModelInfo) -> str:
+    """Return the end of a message on an unknown signal: the most similar one, and what is usually named."""
     usual = [v.name for v in (*info.observables, *info.inputs)]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))

@@ -12,13 +12,35 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
-from falsifier.errors import SpecError, did_you_mean, rejected
+from falsifier.errors import SpecError
 from falsifier.fmu.network import Extrapolation, Loops, Method
 from falsifier.fmu.ssp_package import SUFFIXES as PACKAGES
+from falsifier.problem.spec_errors import spec_error
+from falsifier.problem.templates import (
+    TEMPLATES,
+    Dwell,
+    NeverTogether,
+    Order,
+    Overshoot,
+    RampLimit,
+    Response,
+    Rise,
+    Settles,
+    StaysWithin,
+)
 
 Section = TypeVar("Section", bound=BaseModel)
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
@@ -28,8 +50,6 @@ MAX_CONTROL_POINTS = 10_000
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
-# Sections of which there is one, without a name of its own.
-_SINGLE = ("model", "free", "coupling")
 
 
 class _Strict(BaseModel):
@@ -203,8 +223,86 @@ class ModelChanges(_Strict):
 class RequirementSection(ModelChanges):
     """One requirement, and what it overrides."""
 
-    formula: str = Field(description="Formula in Signal Temporal Logic.")
+    formula: str = Field(description="Formula in Signal Temporal Logic; or a template with its arguments.")
     description: str = Field("", description="Its meaning in words.")
+
+    def expanded(self, stop_time: float, step: float = 0.0) -> str:
+        """Return the formula, which is the same for every simulation."""
+        del stop_time, step
+        return self.formula
+
+    def signals(self) -> tuple[tuple[str, str], ...]:
+        """Return nothing: the formula is checked as a whole."""
+        return ()
+
+
+class _TemplateChanges(ModelChanges):
+    """What a requirement by template may override."""
+
+    description: str = Field("", description="Its meaning in words.")
+
+
+class SettlesSection(_TemplateChanges, Settles):
+    """A requirement by the template ``settles``."""
+
+
+class OvershootSection(_TemplateChanges, Overshoot):
+    """A requirement by the template ``overshoot``."""
+
+
+class RiseSection(_TemplateChanges, Rise):
+    """A requirement by the template ``rise``."""
+
+
+class ResponseSection(_TemplateChanges, Response):
+    """A requirement by the template ``response``."""
+
+
+class StaysWithinSection(_TemplateChanges, StaysWithin):
+    """A requirement by the template ``stays_within``."""
+
+
+class NeverTogetherSection(_TemplateChanges, NeverTogether):
+    """A requirement by the template ``never_together``."""
+
+
+class DwellSection(_TemplateChanges, Dwell):
+    """A requirement by the template ``dwell``."""
+
+
+class RampLimitSection(_TemplateChanges, RampLimit):
+    """A requirement by the template ``ramp_limit``."""
+
+
+class OrderSection(_TemplateChanges, Order):
+    """A requirement by the template ``order``."""
+
+
+TemplateSection = (
+    Annotated[SettlesSection, Tag("<settles>")]
+    | Annotated[OvershootSection, Tag("<overshoot>")]
+    | Annotated[RiseSection, Tag("<rise>")]
+    | Annotated[ResponseSection, Tag("<response>")]
+    | Annotated[StaysWithinSection, Tag("<stays_within>")]
+    | Annotated[NeverTogetherSection, Tag("<never_together>")]
+    | Annotated[DwellSection, Tag("<dwell>")]
+    | Annotated[RampLimitSection, Tag("<ramp_limit>")]
+    | Annotated[OrderSection, Tag("<order>")]
+)
+
+
+def _kind_of_requirement(section: object) -> str | None:
+    """Return which section a requirement is; None if there is no such template."""
+    is_table = isinstance(section, Mapping)
+    name = section.get("template") if is_table else getattr(section, "template", None)  # type: ignore[attr-defined]
+    if name is None:
+        return "<formula>"
+    return f"<{name}>" if name in TEMPLATES else None
+
+
+AnyRequirement = Annotated[
+    Annotated[RequirementSection, Tag("<formula>")] | TemplateSection, Discriminator(_kind_of_requirement)
+]
 
 
 class ProfileSection(ModelChanges):
@@ -223,7 +321,7 @@ class Spec(_Strict):
     coupling: CouplingSection = Field(default_factory=CouplingSection)
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
-    requirements: dict[str, RequirementSection] = Field(min_length=1)
+    requirements: dict[str, AnyRequirement] = Field(min_length=1)
     profiles: dict[str, ProfileSection] = Field(default_factory=dict)
 
     def changes(self, requirement: str, profile: str | None) -> list[ModelChanges]:
@@ -234,6 +332,30 @@ class Spec(_Strict):
             if requirement in self.profiles[profile].requirements:
                 layers.append(self.profiles[profile].requirements[requirement])
         return layers
+
+
+# Sections by the key that holds them, or by the tag of a kind of requirement; for hints in error messages.
+_SECTIONS: Mapping[str, type[BaseModel]] = {
+    "model": ModelSection,
+    "components": ComponentSection,
+    "connections": ConnectionSection,
+    "coupling": CouplingSection,
+    "inputs": InputSection,
+    "parameters": ParameterSection,
+    "requirements": ModelChanges,
+    "profiles": ProfileSection,
+    "free": FreeSection,
+    "<formula>": RequirementSection,
+    "<settles>": SettlesSection,
+    "<overshoot>": OvershootSection,
+    "<rise>": RiseSection,
+    "<response>": ResponseSection,
+    "<stays_within>": StaysWithinSection,
+    "<never_together>": NeverTogetherSection,
+    "<dwell>": DwellSection,
+    "<ramp_limit>": RampLimitSection,
+    "<order>": OrderSection,
+}
 
 
 def read_spec(path: Path) -> Spec:
@@ -278,7 +400,7 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
     try:
         spec = Spec.model_validate(data)
     except ValidationError as error:
-        raise _spec_error(error, file) from None
+        raise spec_error(error, file, Spec, _SECTIONS) from None
     _check_model(spec, file)
     return spec
 
@@ -315,66 +437,3 @@ def overlay(base: Section | None, changes: Section) -> Section:
     if isinstance(base, ParameterSection):
         return changes
     return base.model_copy(update=stated)
-
-
-def _spec_error(error: ValidationError, file: str) -> SpecError:
-    first = error.errors()[0]
-    location = [str(part) for part in first["loc"] if part not in ("tuple", "function-before")]
-    key = ".".join(location)
-    kind = first["type"]
-    if kind in ("extra_forbidden", "missing") and (quoted := _unquoted(error)):
-        return SpecError(
-            f"names with dots are written in quotes: {quoted}", file=file, key=".".join(location[:2])
-        )
-    if kind == "extra_forbidden":
-        return SpecError(
-            f"unknown key; {did_you_mean(location[-1], _known_keys(location[:-1]))}", file=file, key=key
-        )
-    if kind == "missing":
-        field = _fields(location[:-1]).get(location[-1])
-        meaning = f" ({field.description})" if field is not None and field.description else ""
-        return SpecError(f"this key is missing{meaning}", file=file, key=key)
-    return SpecError(rejected(first["msg"], first["input"]), file=file, key=key)
-
-
-def _unquoted(error: ValidationError) -> str:
-    """Return how to write a dotted name that TOML has read as nested tables; empty if there is none."""
-    for each in error.errors():
-        location = [str(part) for part in each["loc"]]
-        if each["type"] != "extra_forbidden" or len(location) < 3:
-            continue
-        section, *names = location[-3:]
-        name = f'"{".".join(names)}"'
-        if section in ("inputs", "parameters") and isinstance(each["input"], dict):
-            return f"[{section}.{name}]"
-        is_quoted = "." in names[0]
-        if section == "parameters" or (section == "connections" and not is_quoted):
-            return f"{name} = ..."
-    return ""
-
-
-def _fields(location: list[str]) -> dict[str, Any]:
-    """Return the fields of the section at this location in a spec, for hints in error messages."""
-    fields = dict(Spec.model_fields)
-    sections: dict[str, type[BaseModel]] = {
-        "model": ModelSection,
-        "components": ComponentSection,
-        "connections": ConnectionSection,
-        "coupling": CouplingSection,
-        "inputs": InputSection,
-        "parameters": ParameterSection,
-        "requirements": RequirementSection,
-        "profiles": ProfileSection,
-        "free": FreeSection,
-    }
-    for i, part in enumerate(location):
-        if part in _SINGLE:
-            fields = dict(sections[part].model_fields)
-        elif i > 0 and location[i - 1] in sections and location[i - 1] not in _SINGLE:
-            nested = location[i - 1] == "requirements" and "profiles" in location[:i]
-            fields = dict((ModelChanges if nested else sections[location[i - 1]]).model_fields)
-    return fields
-
-
-def _known_keys(location: list[str]) -> list[str]:
-    return sorted(_fields(location))

@@ -42,7 +42,7 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
     if request.llm is None:
         engine = request.engine or DEFAULT_ENGINE
         return [_numerical(engine, p, request.seed + i * _SEED_STRIDE) for i, p in enumerate(problems)]
-    chat = chat or _open_chat(request, request.llm)
+    chat = chat or open_chat(request.llm, max_cost=request.budget.cost)
     return [_led_by_llm(request, request.llm, problem, chat) for problem in problems]
 
 
@@ -76,8 +76,13 @@ def check_names(request: RunRequest) -> None:
     check_engine(llm.fallback or DEFAULT_ENGINE)
 
 
-def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
-    """Make the chat with a request's language model; nothing is sent."""
+def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
+    """Make the chat with a language model; nothing is sent.
+
+    Raises:
+        SpecError: if the cost is limited although the price is unknown.
+        ChatError: for an unknown provider or a missing key.
+    """
     from falsifier.llm.cache import default_cache_directory
     from falsifier.llm.client import DEFAULT_TIMEOUT
     from falsifier.llm.connect import connect, preflight
@@ -85,7 +90,7 @@ def _open_chat(request: RunRequest, llm: LLMSettings) -> Chat:
 
     preflight(llm.name, api_base=llm.api_base)
     price = Price(*llm.price) if llm.price else None
-    if request.budget.cost is not None and price_of(llm) is None:
+    if max_cost is not None and price_of(llm) is None:
         raise SpecError(
             f"the price of {llm.name} is unknown, so --max-cost cannot be enforced: add "
             "--price SENT:RECEIVED, or use --max-tokens instead"

@@ -40,7 +40,7 @@ def result_text(result: Result) -> str:
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     lines += [f"  fallback       {remark}" for remark in result.remarks]
     if result.spent.calls:
-        lines.append(f"  language model {_llm_use(result.spent)}")
+        lines.append(f"  language model {llm_use(result.spent)}")
     if result.directory is not None:
         lines.append(f"  files          {result.directory}")
         if result.counterexample is not None:
@@ -214,7 +214,8 @@ def _picture(result: Result) -> Path:
     return (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
 
 
-def _llm_use(spent: Spent) -> str:
+def llm_use(spent: Spent) -> str:
+    """Calls, tokens and cost of the language model."""
     cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
     reasoning = f" ({spent.reasoning_tokens} for reasoning)" if spent.reasoning_tokens else ""
     return f"{counted(spent.calls, 'call')}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"

@@ -1,0 +1,158 @@
+"""``falsifier lint`` and ``falsifier formalize``: what requirements say, before anything is searched."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from falsifier.cli.options import (
+    connection_options,
+    connection_settings,
+    effort_option,
+    json_option,
+    llm_option,
+    out_option,
+    profile_option,
+)
+from falsifier.cli.output import conclude, say
+from falsifier.core.files import write_whole
+from falsifier.core.literals import one_line
+from falsifier.core.words import counted
+from falsifier.errors import SpecError
+from falsifier.problem.subject import Subject, subject_of, with_requirement
+from falsifier.search.lint import SIMULATIONS, LintFinding
+from falsifier.search.lint import lint as find
+
+if TYPE_CHECKING:
+    from falsifier.search.formalize import Formalized
+
+
+@click.command()
+@click.argument("target")
+@profile_option
+@click.option(
+    "--simulations",
+    type=click.IntRange(min=0),
+    default=SIMULATIONS,
+    show_default=True,
+    help="Simulations that measure whether inputs move a requirement; 0: only what the FMU declares.",
+)
+@json_option
+def lint(*, target: str, profile: str | None, simulations: int, as_json: bool) -> None:
+    """Find requirements that say nothing: nothing moves them, or they cannot fail or hold.
+
+    Also windows and parts that do not matter, units that do not fit, and requirements that repeat others. The
+    exit code is 1 if something was found.
+    """
+    findings = find(target, profile=profile, simulations=simulations)
+    code = 1 if findings else 0
+    if as_json:
+        conclude(json.dumps([finding.as_json() for finding in findings], indent=2), code)
+    lines = [line for finding in findings for line in _lines(finding)]
+    lines.append(f"{counted(len(findings), 'finding')}" if findings else "nothing found")
+    conclude("\n".join(lines), code)
+
+
+def _lines(finding: LintFinding) -> list[str]:
+    head = f"{finding.requirement}: {finding.kind}: {one_line(finding.text)}"
+    place = [f"  in      {finding.place}"] if finding.place else []
+    return [head, *place, f"  to do   {finding.advice}"]
+
+
+@click.command()
+@click.argument("target", metavar="MODEL")
+@click.argument("sentence")
+@llm_option()
+@effort_option
+@connection_options
+@click.option(
+    "--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec, without asking."
+)
+@click.option(
+    "--name", help="Name of the requirement in the spec; default: the first free one of R1, R2, ..."
+)
+@out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
+@json_option
+def formalize(
+    *,
+    target: str,
+    sentence: str,
+    choose: int | None,
+    name: str | None,
+    out: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Turn a requirement in words into formulas, and write the chosen one into a spec.
+
+    MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
+    checked, said back in words, told apart from the others by an example and judged on one simulation.
+    Without --llm, templates that may fit are shown.
+    """
+    from falsifier.views.readings_text import advice_text, formalized_json, formalized_text
+
+    settings = connection_settings(options)
+    if settings is None:
+        if choose is not None:
+            raise click.UsageError("--choose: there are readings only with --llm NAME")
+        from falsifier.problem.template_advice import advised_templates
+
+        say(advice_text(advised_templates(sentence, subject_of(target).problem.info)))
+        return
+    from falsifier.search.formalize import formalize as ask
+
+    found = ask(target, sentence, settings)
+    written = None
+    if as_json:
+        written = None if choose is None else _write(found, choose, name, out)
+        say(json.dumps(formalized_json(found) | {"written": written and list(written)}, indent=2))
+        return
+    say(formalized_text(found))
+    if choose is None and sys.stdin.isatty():
+        choose = _asked(len(found.readings))
+    if choose is None:
+        say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
+    else:
+        file, given = _write(found, choose, name, out)
+        say(f"{file}: [requirements.{given}] written; to search: falsifier run {file}:{given}")
+
+
+def _asked(count: int) -> int | None:
+    """Ask which reading to write."""
+    number: int = click.prompt(
+        f"Which one to write into the spec (1 to {count}, 0 for none)",
+        type=click.IntRange(0, count),
+        default=0,
+    )
+    return number or None
+
+
+def _write(found: "Formalized", number: int, name: str | None, out: Path | None) -> tuple[str, str]:
+    """Write a reading into the spec; return the file and the requirement's name."""
+    if number > len(found.readings):
+        raise SpecError(f"--choose {number}: there {_are(len(found.readings))} only")
+    file = _file(found.subject, out)
+    text, given = with_requirement(
+        found.subject,
+        file,
+        str(found.readings[number - 1].formula),
+        name=name,
+        description=found.sentence,
+    )
+    write_whole(file, text)
+    return str(file), given
+
+
+def _file(subject: Subject, out: Path | None) -> Path:
+    if out is None and subject.spec is None:
+        raise SpecError("a bundled spec stays as it is: give another file with --out")
+    file = out or subject.spec or Path()
+    if file != subject.spec and file.exists():
+        raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
+    return file
+
+
+def _are(count: int) -> str:
+    return f"{'is' if count == 1 else 'are'} {counted(count, 'reading')}"

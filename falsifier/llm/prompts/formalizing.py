@@ -1,0 +1,100 @@
+"""The question of what a requirement in words means: signals, the language of formulas, the answer."""
+
+from collections.abc import Iterator
+
+from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.llm.messages import Message
+from falsifier.llm.prompts.numbers import number
+from falsifier.problem.templates import TEMPLATES
+
+# Maximum number of variables that are listed; inputs and outputs come first.
+_MOST_VARIABLES = 120
+
+_LANGUAGE = """Formulas are Signal Temporal Logic over the signals below, judged from time 0 on samples.
+- Comparisons: < <= > >= ; 1 <= x <= 3 is allowed. A Boolean signal b may stand alone.
+- not, and, or, -> (implies), <-> ; put the scope of temporal operators in parentheses.
+- G[a,b] (f): f holds throughout from a to b seconds later. F[a,b] (f): f holds at some time then.
+- f U[a,b] g: g holds at some time from a to b seconds later, and f until then.
+- X (f): f holds at the next sample.
+- Arithmetic: + - * / ^ abs sqrt exp log sin cos min max. There are no derivatives and no earlier values.
+- "Becomes true" is: (not (c) and X (c)) -> X (...).
+- Windows are closed, in seconds, look forward, and nested ones add up. The sum must not exceed the stop time.
+- Do not use == or != on numbers that are not whole; write abs(x - 3) <= 0.5 for a whole number.
+- Names are written exactly as listed; names with unusual characters stand in double quotes."""
+
+_ANSWER = """Answer with one JSON object: {"readings": [...]}. Give one reading if the sentence is clear, and
+two or three, the most probable first, if engineers could understand it differently. Each reading has
+- formula: the formula.
+- meaning: one sentence that says what it requires, and how it differs from the other readings.
+- units: for each signal in the formula the unit in which you wrote its numbers, "" if it has none.
+- satisfied: a small example that meets the sentence as you understand it: each signal of the formula with
+  times (s) and values, linear between them.
+- violated: the same for an example that does not meet it.
+The formula is checked on both examples, so choose values clearly on one side of every threshold."""
+
+
+def formalizing_messages(sentence: str, info: ModelInfo, experiment: Experiment) -> tuple[Message, ...]:
+    """Return the messages that ask for formulas of a requirement in words.
+
+    Args:
+        sentence: the requirement.
+        info: the model's signals.
+        experiment: stop time and output interval.
+    """
+    system = (
+        "You translate requirements on simulated systems from plain words into formulas. Be exact about "
+        "what the sentence says and do not add conditions that it does not contain."
+    )
+    parts = [
+        _LANGUAGE,
+        "\n".join(["Usual kinds of requirements:", *_usual()]),
+        "\n".join(_model(info, experiment)),
+        f"The requirement:\n{sentence.strip()}",
+        _ANSWER,
+    ]
+    return Message(role="system", content=system), Message(role="user", content="\n\n".join(parts))
+
+
+_PATTERNS = {
+    "settles": "G[t,T] (abs(x - r) <= 0.02*abs(r))",
+    "overshoot": "G[0,T] (x - r <= 0.1*abs(r))",
+    "rise": "F[0,t] (x >= 0.9*r)",
+    "response": "G[0,T-t] (when -> F[0,t] then)",
+    "stays_within": "G[0,T] (low <= x and x <= high)",
+    "never_together": "G[0,T] not (a and b)",
+    "dwell": "G[0,T-t-h] ((not c and X c) -> X G[0,t] c), h one sampling step",
+    "ramp_limit": "G[0,T] (abs(rate) <= limit), if a signal is the rate",
+    "order": "G[0,T] not later or (not later or first) U[0,T] first",
+}
+
+
+def _usual() -> Iterator[str]:
+    for name, template in TEMPLATES.items():
+        yield f"- {name}: {template.summary}; {_PATTERNS[name]}"
+
+
+def _model(info: ModelInfo, experiment: Experiment) -> Iterator[str]:
+    described = f": {info.description}" if info.description else ""
+    yield f"The model {info.name}{described}"
+    yield (
+        f"It is simulated from 0 to T = {number(experiment.stop_time)} s and sampled every "
+        f"{number(experiment.output_interval)} s; bounds of windows are multiples of that."
+    )
+    yield "Signals:"
+    listed = [v for v in (*info.inputs, *info.outputs) if v.kind != "string"]
+    others = [v for v in info.with_causality("local") if v.kind != "string"]
+    shown = [*listed, *others][:_MOST_VARIABLES]
+    yield from map(_variable, shown)
+    if hidden := len(listed) + len(others) - len(shown):
+        yield f"and {hidden} more internal variables"
+
+
+def _variable(v: Variable) -> str:
+    low, high = v.limits
+    facts = [v.causality if v.causality in ("input", "output") else "internal", v.kind]
+    facts += [f"in {v.unit}"] if v.unit else []
+    facts += [f"at least {number(low)}"] if low is not None else []
+    facts += [f"at most {number(high)}"] if high is not None else []
+    items = ", ".join(f"{n} = {item}" for item, n in v.literals.items())
+    facts += [items] if items else []
+    return f"- {v.name} ({', '.join(facts)})" + (f": {v.description}" if v.description else "")

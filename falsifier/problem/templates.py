@@ -1,0 +1,377 @@
+"""Templates: usual kinds of requirements with typed arguments, each of which stands for one STL formula.
+
+::
+
+    [requirements.R]
+    template = "settles"
+    signal = "speed"
+    reference = 80
+    within = "2%"
+    time = 3
+
+Terms are written as in formulas, so that ``y5 - y4`` is a signal, too; conditions are formulas. Formulas look
+forward only and know no value of another sample. So a condition *becomes* true between two samples: false at
+one, true at the next; a condition that is true at time 0 does not become true there.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import reduce
+from itertools import combinations, pairwise
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from falsifier.problem.template_arguments import (
+    Condition,
+    Duration,
+    Finite,
+    Grid,
+    Margin,
+    Moment,
+    Template,
+    TemplateError,
+    Term,
+    after_moment,
+    each_time,
+    near,
+    scaled,
+    share_of,
+    size_of,
+    span,
+    term,
+    tidy,
+    window_of,
+)
+from falsifier.stl import Formula, parse
+from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Number
+from falsifier.stl.formula import Always, And, Comparison, Eventually, Implies, Not, Or, Predicate, Until
+
+# Maximum number of levels at which ramp_limit compares a signal with itself some time later.
+_MOST_LEVELS = 30
+
+_SIGNAL = Field(description="Signal, or an expression of signals.")
+_REFERENCE = Field(description="What it is compared with: a number, a signal or an expression.")
+_AFTER = Field(
+    0.0, description="Time in s, or a condition: then it applies each time when the condition becomes true."
+)
+_DURING = Field(None, description="[start, end] in s; default: as long as the simulation allows.")
+
+
+class Settles(Template):
+    """Stays within a margin of the reference, at the latest some time after a moment."""
+
+    summary: ClassVar[str] = "it is near a reference at the latest some time after a moment, and stays there"
+    terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
+    conditions_in: ClassVar[tuple[str, ...]] = ("after",)
+
+    template: Literal["settles"]
+    signal: Term = _SIGNAL
+    reference: Term = _REFERENCE
+    within: Margin = Field(description="Number in the signal's unit, or a percentage of the reference, '2%'.")
+    time: Duration = Field(description="Time in s after which it has settled.")
+    after: Moment = _AFTER
+    stays: Duration | None = Field(
+        None, description="How long it stays there in s; default after a time: to the end of the simulation."
+    )
+    during: tuple[Finite, Finite] | None = _DURING
+
+    def _formula(self, grid: Grid) -> Formula:
+        inside = near(self.signal, self.reference, self.within)
+        if isinstance(self.after, str) and self.stays is None:
+            raise TemplateError(
+                "stays", "this key is missing: after a condition, say how long it stays there"
+            )
+        stays = None if self.stays is None else self.time + self.stays
+
+        def settled(start: float, end: float) -> Formula:
+            return Always(inside, window_of(start + self.time, end))
+
+        return after_moment(self, grid, self.after, settled, lasts=stays, during=self.during)
+
+
+class Overshoot(Template):
+    """Never exceeds the reference by more than a margin after a moment."""
+
+    summary: ClassVar[str] = "it exceeds a reference by at most a margin after a moment"
+    terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
+    conditions_in: ClassVar[tuple[str, ...]] = ("after",)
+
+    template: Literal["overshoot"]
+    signal: Term = _SIGNAL
+    reference: Term = _REFERENCE
+    at_most: Margin = Field(description="Number in the signal's unit, or a percentage of the reference.")
+    direction: Literal["up", "down"] = Field("up", description="down: falls below the reference by at most.")
+    after: Moment = _AFTER
+    duration: Duration | None = Field(
+        None, description="How long it applies in s; default after a time: to the end of the simulation."
+    )
+    during: tuple[Finite, Finite] | None = _DURING
+
+    def _formula(self, grid: Grid) -> Formula:
+        if isinstance(self.after, str) and self.duration is None:
+            raise TemplateError(
+                "duration", "this key is missing: after a condition, say for how long it applies"
+            )
+        signal, reference = term(self.signal), term(self.reference)
+        sides = (signal, reference) if self.direction == "up" else (reference, signal)
+        bounded = Predicate("<=", Arithmetic("-", *sides), size_of(self.at_most, reference, "at_most"))
+        return after_moment(
+            self,
+            grid,
+            self.after,
+            lambda start, end: Always(bounded, window_of(start, end)),
+            lasts=self.duration,
+            during=self.during,
+        )
+
+
+class Rise(Template):
+    """Reaches a share of the reference some time after a moment at the latest."""
+
+    summary: ClassVar[str] = (
+        "it reaches a reference, or a share of it, at the latest some time after a moment"
+    )
+    terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
+    conditions_in: ClassVar[tuple[str, ...]] = ("after",)
+
+    template: Literal["rise"]
+    signal: Term = _SIGNAL
+    reference: Term = _REFERENCE
+    reaches: Margin = Field("90%", description="Share of the reference that is reached, as a percentage.")
+    time: Duration = Field(description="Time in s until then, at most.")
+    direction: Literal["up", "down"] = Field("up", description="down: it falls to that share.")
+    after: Moment = _AFTER
+    during: tuple[Finite, Finite] | None = _DURING
+
+    @model_validator(mode="after")
+    def _is_percentage(self) -> "Rise":
+        if share_of(self.reaches) is None:
+            raise ValueError(f"reaches is a percentage of the reference such as '90%', got {self.reaches!r}")
+        return self
+
+    def _formula(self, grid: Grid) -> Formula:
+        operator: Comparison = ">=" if self.direction == "up" else "<="
+        level = scaled(share_of(self.reaches) or 0.0, term(self.reference))
+        reached = Predicate(operator, term(self.signal), level)
+        return after_moment(
+            self,
+            grid,
+            self.after,
+            lambda start, _end: Eventually(reached, window_of(start, start + self.time)),
+            lasts=self.time,
+            during=self.during,
+        )
+
+
+class Response(Template):
+    """Whenever one condition holds, another one follows within some time."""
+
+    summary: ClassVar[str] = "whenever one condition holds, another one follows within some time"
+    conditions_in: ClassVar[tuple[str, ...]] = ("when", "then")
+
+    template: Literal["response"]
+    when: Condition = Field(description="Condition.")
+    then: Condition = Field(description="Condition that must follow.")
+    time: Duration = Field(description="Time in s within which it follows.")
+    stays: Duration = Field(0.0, description="How long it then holds in s.")
+    on: Literal["true", "rising"] = Field(
+        "true", description="true: at each time when the condition holds; rising: only when it becomes true."
+    )
+    during: tuple[Finite, Finite] | None = _DURING
+
+    def _formula(self, grid: Grid) -> Formula:
+        then: Formula = parse(self.then)
+        if self.stays:
+            then = Always(then, window_of(0.0, self.stays))
+        answer = Eventually(then, window_of(0.0, self.time))
+        reach = self.time + self.stays
+        when = parse(self.when)
+        if self.on == "true":
+            return Always(Implies(when, answer), span(self, grid, reach, self.during))
+        return each_time(self, grid, when, answer, reach, self.during)
+
+
+class StaysWithin(Template):
+    """Stays between two limits, or near a reference."""
+
+    summary: ClassVar[str] = "it stays between limits, or near a reference"
+    terms: ClassVar[tuple[str, ...]] = ("signal", "low", "high", "reference")
+
+    template: Literal["stays_within"]
+    signal: Term = _SIGNAL
+    low: Term | None = Field(None, description="Lower limit: a number, a signal or an expression.")
+    high: Term | None = Field(None, description="Upper limit.")
+    reference: Term | None = Field(None, description="In place of limits: what it stays near.")
+    within: Margin | None = Field(None, description="With reference: a number, or a percentage of it.")
+    during: tuple[Finite, Finite] | None = _DURING
+
+    @model_validator(mode="after")
+    def _limits_or_reference(self) -> "StaysWithin":
+        limited = self.low is not None or self.high is not None
+        is_near = self.reference is not None and self.within is not None
+        if limited == is_near or (self.reference is None) != (self.within is None):
+            raise ValueError("expected low, high or both; or reference and within")
+        return self
+
+    def _formula(self, grid: Grid) -> Formula:
+        window = span(self, grid, 0.0, self.during)
+        if self.reference is not None and self.within is not None:
+            return Always(near(self.signal, self.reference, self.within), window)
+        signal = term(self.signal)
+        parts: list[Formula] = []
+        if self.low is not None:
+            parts.append(Predicate("<=", term(self.low), signal))
+        if self.high is not None:
+            parts.append(Predicate("<=", signal, term(self.high)))
+        return Always(reduce(And, parts), window)
+
+
+class NeverTogether(Template):
+    """No two of the conditions hold at the same time."""
+
+    summary: ClassVar[str] = "no two conditions hold at the same time"
+    conditions_in: ClassVar[tuple[str, ...]] = ("conditions",)
+
+    template: Literal["never_together"]
+    conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions.")
+    during: tuple[Finite, Finite] | None = _DURING
+
+    def _formula(self, grid: Grid) -> Formula:
+        pairs: list[Formula] = [Not(And(a, b)) for a, b in combinations(map(parse, self.conditions), 2)]
+        return Always(reduce(And, pairs), span(self, grid, 0.0, self.during))
+
+
+class Dwell(Template):
+    """A condition that becomes true stays true for a time between two limits."""
+
+    summary: ClassVar[str] = "a condition that becomes true holds for at least or at most some time"
+    conditions_in: ClassVar[tuple[str, ...]] = ("condition",)
+
+    template: Literal["dwell"]
+    condition: Condition = Field(description="Condition.")
+    at_least: Duration | None = Field(None, description="How long it holds in s, at least.")
+    at_most: Duration | None = Field(None, description="How long it holds in s, at most.")
+    during: tuple[Finite, Finite] | None = _DURING
+
+    @model_validator(mode="after")
+    def _limited(self) -> "Dwell":
+        if self.at_least is None and self.at_most is None:
+            raise ValueError("expected at_least, at_most or both, in s")
+        if self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
+            raise ValueError("at_least is more than at_most")
+        return self
+
+    def _formula(self, grid: Grid) -> Formula:
+        condition = parse(self.condition)
+        parts: list[Formula] = []
+        if self.at_least is not None:
+            parts.append(Always(condition, window_of(0.0, self.at_least)))
+        if self.at_most is not None:
+            parts.append(Eventually(Not(condition), window_of(0.0, self.at_most)))
+        reach = max(self.at_least or 0.0, self.at_most or 0.0)
+        return each_time(self, grid, condition, reduce(And, parts), reach, self.during)
+
+
+class RampLimit(Template):
+    """Changes by at most so much per second.
+
+    Formulas cannot compare values of two samples. Either the model has the rate as a signal, or the signal is
+    compared at levels: if it is below a level, it is at most ``limit * over`` above that level for the next
+    ``over`` seconds. A change that is too fast is then found for certain if it exceeds that by the distance
+    of two levels, and no change that is slow enough is ever called too fast.
+    """
+
+    summary: ClassVar[str] = "it changes by at most so much per second"
+    terms: ClassVar[tuple[str, ...]] = ("signal", "rate")
+
+    template: Literal["ramp_limit"]
+    signal: Term = _SIGNAL
+    limit: Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
+        description="Largest change per second, in the signal's unit."
+    )
+    rate: Term | None = Field(
+        None, description="Signal that is its rate of change; default: der(signal), unless over is given."
+    )
+    over: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = Field(
+        None, description="Without a rate: time in s over which changes are judged, with range and levels."
+    )
+    range: tuple[Finite, Finite] | None = Field(None, description="With over: [low, high] of the signal.")
+    levels: int = Field(20, ge=1, le=_MOST_LEVELS, description="With over: number of levels in the range.")
+    during: tuple[Finite, Finite] | None = _DURING
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "RampLimit":
+        if (self.over is None) != (self.range is None) or (self.over is not None and self.rate is not None):
+            raise ValueError("expected rate alone, or over and range together")
+        if self.range is not None and not self.range[0] < self.range[1]:
+            raise ValueError("range: expected [low, high] with low < high")
+        if self.over is None and self.rate is None and not isinstance(term(self.signal), Name):
+            raise ValueError("an expression has no der(...): give rate, or over and range")
+        return self
+
+    def signals(self) -> Iterator[tuple[str, str]]:
+        """Yield the argument and the name of each signal, also of the default rate."""
+        yield from super().signals()
+        if self.over is None and self.rate is None:
+            yield from (("rate", name) for name in self._rate().signals)
+
+    def _rate(self) -> Expression:
+        if self.rate is not None:
+            return term(self.rate)
+        return Name(f"der({term(self.signal).signals[0]})")
+
+    def _formula(self, grid: Grid) -> Formula:
+        if self.over is None or self.range is None:
+            slow = Predicate("<=", Call("abs", (self._rate(),)), Number(self.limit))
+            return Always(slow, span(self, grid, 0.0, self.during))
+        change, signal = self.limit * self.over, term(self.signal)
+        low, high = self.range
+        parts: list[Formula] = []
+        for k in range(self.levels):
+            level = low + (high - low) * (k + 0.5) / self.levels
+            for operator, bound in (("<=", level + change), (">=", level - change)):
+                here = Predicate(operator, signal, Number(tidy(level)))  # type: ignore[arg-type]
+                later = Predicate(operator, signal, Number(tidy(bound)))  # type: ignore[arg-type]
+                parts.append(Implies(here, Always(later, window_of(0.0, self.over))))
+        return Always(_balanced(parts), span(self, grid, self.over, self.during))
+
+
+class Order(Template):
+    """Each condition holds only once the one before it has held."""
+
+    summary: ClassVar[str] = "each condition holds only once the one before it has held"
+    conditions_in: ClassVar[tuple[str, ...]] = ("conditions",)
+
+    template: Literal["order"]
+    conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions, in order.")
+    during: tuple[Finite, Finite] | None = _DURING
+
+    def _formula(self, grid: Grid) -> Formula:
+        window = span(self, grid, 0.0, self.during)
+        rest = window_of(0.0, window.end - window.start)
+        parts: list[Formula] = []
+        for first, later in pairwise(map(parse, self.conditions)):
+            parts.append(Or(Always(Not(later), rest), Until(Or(Not(later), first), first, rest)))
+        every = reduce(And, parts)
+        return every if window.start == 0 else Always(every, window_of(window.start, window.start))
+
+
+TEMPLATES: Mapping[str, type[Template]] = {
+    "settles": Settles,
+    "overshoot": Overshoot,
+    "rise": Rise,
+    "response": Response,
+    "stays_within": StaysWithin,
+    "never_together": NeverTogether,
+    "dwell": Dwell,
+    "ramp_limit": RampLimit,
+    "order": Order,
+}
+
+
+def _balanced(parts: list[Formula]) -> Formula:
+    """Return the conjunction of many parts without many levels."""
+    if len(parts) == 1:
+        return parts[0]
+    half = len(parts) // 2
+    return And(_balanced(parts[:half]), _balanced(parts[half:]))

@@ -1,0 +1,168 @@
+"""What formulas can be worth if each signal keeps to a range: interval arithmetic.
+
+The bounds are safe and not always tight: each occurrence of a signal is taken for a signal of its own.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
+from falsifier.stl.formula import And, Formula, Iff, Implies, Not, Or, Predicate, Until
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """All numbers from low to high.
+
+    Attributes:
+        low: smallest number; may be -inf.
+        high: largest number; may be inf.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+
+    def __neg__(self) -> "Interval":
+        return Interval(-self.high, -self.low)
+
+    def __add__(self, other: "Interval") -> "Interval":
+        low, high = self.low + other.low, self.high + other.high
+        return Interval(-math.inf if math.isnan(low) else low, math.inf if math.isnan(high) else high)
+
+    def __sub__(self, other: "Interval") -> "Interval":
+        return self + -other
+
+
+_ANY = Interval()
+_MONOTONE = {"exp": math.exp, "sqrt": math.sqrt, "log": math.log}
+
+
+def values(expression: Expression, ranges: Mapping[str, Interval]) -> Interval:
+    """Return bounds of an expression; signals without a range may have any value."""
+    match expression:
+        case Number(value):
+            return Interval(value, value)
+        case Name(name):
+            return ranges.get(name, _ANY)
+        case Negative(operand):
+            return -values(operand, ranges)
+        case Arithmetic(operator, left, right):
+            return _arithmetic(operator, values(left, ranges), values(right, ranges))
+        case Call(function, operands):
+            return _call(function, [values(operand, ranges) for operand in operands])
+    return _ANY
+
+
+def margins(formula: Formula, ranges: Mapping[str, Interval]) -> Interval:
+    """Return bounds of a formula's robustness at any time."""
+    if isinstance(formula, Predicate):
+        return _margin(formula, values(formula.left, ranges) - values(formula.right, ranges))
+    parts = [margins(child, ranges) for child in formula.children]
+    if isinstance(formula, Not):
+        return -parts[0]
+    if isinstance(formula, And | Until):
+        return _smallest(parts)
+    if isinstance(formula, Or):
+        return _largest(parts)
+    if isinstance(formula, Implies):
+        return _largest([-parts[0], parts[1]])
+    if isinstance(formula, Iff):
+        left, right = parts
+        return _smallest([_largest([-left, right]), _largest([-right, left])])
+    return parts[0]
+
+
+def decided(
+    formula: Formula, ranges: Mapping[str, Interval], *, polarity: int = 1
+) -> Iterator[tuple[Formula, bool]]:
+    """Yield the largest parts that hold for all trajectories in range, or for none, and which of the two.
+
+    Exactly 0 is no violation of the whole formula. So a part at 0 counts as held where it must hold and as
+    failed where it is a condition: ``brake > 0`` with brakes from 0 on is a condition that may fail.
+
+    Args:
+        formula: the formula.
+        ranges: range of each signal.
+        polarity: 1 where the formula must hold, -1 under a negation or as a condition, 0 for both.
+    """
+    found = margins(formula, ranges)
+    if found.low > 0 or (found.low == 0 and polarity == 1):
+        yield formula, True
+    elif found.high < 0 or (found.high == 0 and polarity == -1):
+        yield formula, False
+    else:
+        for child, sign in zip(formula.children, _signs(formula), strict=True):
+            yield from decided(child, ranges, polarity=sign * polarity)
+
+
+def _signs(formula: Formula) -> tuple[int, ...]:
+    """Return how the truth of each operand acts on the formula's."""
+    if isinstance(formula, Not):
+        return (-1,)
+    if isinstance(formula, Implies):
+        return -1, 1
+    return (0 if isinstance(formula, Iff) else 1,) * len(formula.children)
+
+
+def _margin(predicate: Predicate, difference: Interval) -> Interval:
+    if predicate.operator in ("<", "<="):
+        return -difference
+    if predicate.operator in (">", ">="):
+        return difference
+    distance = _absolute(difference)
+    return -distance if predicate.operator == "==" else distance
+
+
+def _smallest(parts: list[Interval]) -> Interval:
+    return Interval(min(p.low for p in parts), min(p.high for p in parts))
+
+
+def _largest(parts: list[Interval]) -> Interval:
+    return Interval(max(p.low for p in parts), max(p.high for p in parts))
+
+
+def _absolute(x: Interval) -> Interval:
+    if x.low >= 0:
+        return x
+    return -x if x.high <= 0 else Interval(0.0, max(-x.low, x.high))
+
+
+def _arithmetic(operator: str, left: Interval, right: Interval) -> Interval:
+    if operator == "+":
+        return left + right
+    if operator == "-":
+        return left - right
+    if operator == "*":
+        return _corners(left, right)
+    if operator == "/" and (right.low > 0 or right.high < 0):
+        return _corners(left, Interval(1 / right.high, 1 / right.low))
+    if operator == "^" and right == Interval(2.0, 2.0):
+        size = _absolute(left)
+        return _corners(size, size)
+    return _ANY
+
+
+def _corners(left: Interval, right: Interval) -> Interval:
+    pairs = product((left.low, left.high), (right.low, right.high))
+    found = [0.0 if 0.0 in pair else pair[0] * pair[1] for pair in pairs]
+    return Interval(min(found), max(found))
+
+
+def _call(function: str, operands: list[Interval]) -> Interval:
+    first = operands[0]
+    if function == "abs":
+        return _absolute(first)
+    if function == "min":
+        return _smallest(operands)
+    if function == "max":
+        return _largest(operands)
+    if function in ("sin", "cos"):
+        return Interval(-1.0, 1.0)
+    if math.isinf(first.low) or math.isinf(first.high):
+        return _ANY
+    try:
+        return Interval(_MONOTONE[function](first.low), _MONOTONE[function](first.high))
+    except (ValueError, OverflowError):
+        return _ANY

@@ -1,0 +1,99 @@
+"""Trajectories that tell two formulas apart: one of them satisfies a formula and violates the other."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.stl.expression import Number
+from falsifier.stl.formula import Formula
+from falsifier.stl.intervals import Interval
+from falsifier.stl.monitor import Monitor
+
+Floats = NDArray[np.float64]
+# Random trajectories per round, and rounds with one more step each.
+_PER_ROUND, _ROUNDS = 300, 5
+# Share of the spread of all levels by which a level is above or below a threshold.
+_BESIDE = 0.1
+
+
+def tell_apart(
+    satisfied: Formula,
+    violated: Formula,
+    *,
+    step: float,
+    samples: int,
+    ranges: Mapping[str, Interval],
+    seed: int = 0,
+) -> Trajectory | None:
+    """Return a trajectory of few steps that satisfies one formula and violates the other; None: none found.
+
+    Args:
+        satisfied: formula to satisfy.
+        violated: formula to violate.
+        step: step of the time grid in s.
+        samples: number of samples.
+        ranges: range of each signal; signals without one may have any value.
+        seed: seed of the random trajectories.
+
+    Raises:
+        FormulaError: if a formula does not fit the time grid.
+    """
+    formulas = (satisfied, violated)
+    names = list(dict.fromkeys(name for f in formulas for name in f.signals))
+    wanted, unwanted = (Monitor(f, step, samples) for f in formulas)
+    levels = {name: _levels(formulas, ranges.get(name, Interval())) for name in names}
+    moments = _moments(formulas, step, samples)
+    rng = np.random.default_rng(seed)
+    for switches in range(_ROUNDS):
+        cuts = {n: rng.choice(moments, size=(_PER_ROUND, switches)) for n in names}
+        columns = {n: _steps(rng, levels[n], cuts[n], samples) for n in names}
+        kept, broken = wanted.batch(columns), -unwanted.batch(columns)
+        valid = np.flatnonzero((kept >= 0) & (broken > 0))
+        if len(valid):
+            # Long pieces first: a spike of one sample tells readers little.
+            shortest = np.min([_shortest(cuts[n][valid], samples) for n in names], axis=0)
+            margin = np.minimum(kept, broken)[valid]
+            best = int(valid[np.lexsort((margin, shortest, margin > 0))[-1]])
+            times = np.linspace(0.0, step * (samples - 1), samples)
+            return Trajectory(times, {n: column[best].copy() for n, column in columns.items()})
+    return None
+
+
+def _levels(formulas: tuple[Formula, ...], allowed: Interval) -> Floats:
+    """Return values on both sides of each number in the formulas, within the range of the signal."""
+    sides = [side for f in formulas for p in f.predicates for side in (p.left, p.right)]
+    numbers = [e.value for side in sides for e in side.walk() if isinstance(e, Number)]
+    ends = [e for e in (allowed.low, allowed.high) if np.isfinite(e)]
+    known = np.array(sorted({0.0, *numbers, *ends}))
+    beside = _BESIDE * (known[-1] - known[0] or 1.0)
+    between = (known[1:] + known[:-1]) / 2
+    spread = np.concatenate([known - beside, known, between, known + beside])
+    kept = spread[(spread >= allowed.low) & (spread <= allowed.high)]
+    return np.asarray(kept if len(kept) else np.array(ends), dtype=np.float64)
+
+
+def _moments(formulas: tuple[Formula, ...], step: float, samples: int) -> NDArray[np.int64]:
+    """Return samples at, beside and in the middle of the bounds of windows."""
+    windows = [w for f in formulas for part in f.walk() if (w := getattr(part, "window", None)) is not None]
+    bounds = {round(t / step) for w in windows for t in (w.start, w.end)}
+    sums = {a + b for a in bounds for b in bounds}
+    middle = {(a + b) // 2 for a in bounds for b in bounds}
+    found = {k + d for k in bounds | sums for d in (-1, 0, 1)} | middle | {samples // 4, samples // 2}
+    return np.array(sorted(k for k in found if 0 < k < samples) or [samples - 1], dtype=np.int64)
+
+
+def _steps(rng: np.random.Generator, levels: Floats, cuts: NDArray[np.int64], samples: int) -> Floats:
+    """Return random piecewise constant signals that change at given samples, shape (m, samples)."""
+    values = rng.choice(levels, size=(cuts.shape[0], cuts.shape[1] + 1))
+    piece = (cuts[:, :, None] <= np.arange(samples)).sum(axis=1)
+    return np.take_along_axis(values, piece, axis=1)
+
+
+def _shortest(cuts: NDArray[np.int64], samples: int) -> NDArray[np.int64]:
+    """Return the length of the shortest piece of each signal, in samples."""
+    count = len(cuts)
+    ends = np.hstack([np.zeros((count, 1)), np.sort(cuts, axis=1), np.full((count, 1), samples)])
+    shortest: NDArray[np.int64] = np.diff(ends, axis=1).min(axis=1).astype(np.int64)
+    return shortest

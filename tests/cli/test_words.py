@@ -1,0 +1,98 @@
+import json
+import shutil
+from pathlib import Path
+
+from falsifier.problem.loading import load_problem
+from tests.cli.support import ENV
+from tests.command import falsifier
+from tests.llm.server import Server, Step, serving
+from tests.problem.support import AT, spec
+from tests.search.test_lint import SPEC
+
+WIDE = SPEC + "[requirements.R]\nformula = 'G[0,20] (throttle <= 100)'\n"
+
+
+def test_lint_prints_requirement_place_and_what_to_do(tmp_path: Path) -> None:
+    done = falsifier("lint", spec(tmp_path, WIDE), cwd=tmp_path)
+    assert done.code == 1, done.err
+    assert "R: always: no trajectory in range violates it" in done.out
+    assert "  in      G[0,20] (throttle <= 100)" in done.out
+    assert "  to do   check threshold" in done.out
+    found = falsifier("lint", "my.toml", "--json", cwd=tmp_path)
+    assert found.code == 1
+    assert [f["kind"] for f in found.json] == ["always"]  # type: ignore[index]
+
+
+def test_lint_finds_nothing_in_a_bundled_spec(tmp_path: Path) -> None:
+    done = falsifier("lint", "CC1", "--simulations", "0", cwd=tmp_path)
+    assert (done.code, done.out) == (0, "nothing found\n")
+
+
+GOOD = {
+    "formula": "G[0,20] (speed <= 120)",
+    "meaning": "never fast",
+    "units": [{"signal": "speed", "unit": "mph"}],
+    "satisfied": [{"name": "speed", "times": [0, 50], "values": [0, 0]}],
+    "violated": [{"name": "speed", "times": [0, 50], "values": [300, 300]}],
+}
+REPLY = Step(json.dumps({"readings": [GOOD]}))
+SENTENCE = "The speed stays below 120 mph for 20 s."
+
+
+def asked(server: Server, model: str) -> list[str]:
+    return [
+        "formalize",
+        model,
+        SENTENCE,
+        "--llm",
+        "openai/gpt-5-mini",
+        "--api-base",
+        server.url,
+        "--price",
+        "1:2",
+    ]
+
+
+def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:
+    spec(tmp_path, WIDE)
+    with serving(REPLY) as server:
+        shown = falsifier(*asked(server, "my.toml"), cwd=tmp_path, env=ENV)
+        done = falsifier(*asked(server, "my.toml"), "--choose", "1", "--name", "slow", cwd=tmp_path, env=ENV)
+        assert len(server.received) == 1  # the second time from the cache
+    assert shown.code == 0, shown.err
+    assert (
+        "1. G[0,20] (speed <= 120)\n   in words   At all times from 0 to 20 s, speed is at most 120."
+        in shown.out
+    )
+    assert "nominal    robustness +" in shown.out
+    assert "language model: 1 call, 120 tokens (12 for reasoning), 0.0001 US dollars" in shown.out
+    assert "--choose N" in shown.out
+    assert done.code == 0, done.err
+    assert "my.toml: [requirements.slow] written" in done.out
+    problem = load_problem(str(tmp_path / "my.toml:slow"))
+    assert (str(problem.requirement.formula), problem.requirement.description) == (GOOD["formula"], SENTENCE)
+
+
+def test_an_fmu_gets_a_spec_and_json_says_where(tmp_path: Path) -> None:
+    shutil.copy(AT, tmp_path / "car.fmu")
+    with serving(REPLY) as server:
+        done = falsifier(*asked(server, "car.fmu"), "--choose", "1", "--json", cwd=tmp_path, env=ENV)
+    assert done.code == 0, done.err
+    assert done.json["written"] == ["car.toml", "R1"]
+    assert str(load_problem(str(tmp_path / "car.toml")).requirement.formula) == GOOD["formula"]
+
+
+def test_wrong_choices_are_errors(tmp_path: Path) -> None:
+    with serving(REPLY) as server:
+        bundled = falsifier(*asked(server, "AT1"), "--choose", "1", cwd=tmp_path, env=ENV)
+        second = falsifier(*asked(server, "AT1"), "--choose", "2", cwd=tmp_path, env=ENV)
+    assert (bundled.code, second.code) == (2, 2)
+    assert "--out" in bundled.err
+    assert "--choose 2: there is 1 reading only" in second.err
+
+
+def test_without_a_language_model_a_template_is_proposed(tmp_path: Path) -> None:
+    done = falsifier("formalize", "AT1", "The speed reaches 80 in 10 s.", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert 'template = "rise"\n  signal = "speed"' in done.out
+    assert falsifier("formalize", "AT1", "x", "--choose", "1", cwd=tmp_path).code == 2

@@ -1,0 +1,52 @@
+import json
+
+import numpy as np
+import pytest
+
+from falsifier.llm.conversation import RejectedReplyError
+from falsifier.llm.readings import ExampleSignal, example_trajectory, read_readings, readings_schema
+
+TIMES = np.linspace(0.0, 2.0, 5)
+
+
+def test_the_last_object_counts_and_thoughts_do_not() -> None:
+    draft, final = ({"readings": [{"formula": f}]} for f in ("x > 1", "x > 2"))
+    text = f"<think>{json.dumps(draft)}</think> First {json.dumps(draft)}, better {json.dumps(final)}"
+    assert [r.formula for r in read_readings(text)] == ["x > 2"]
+
+
+def test_what_is_missing_but_the_formula_is_empty() -> None:
+    (reading,) = read_readings('{"readings": [{"formula": "x", "more": 1}]}')
+    assert (reading.meaning, reading.units, reading.satisfied) == ("", [], [])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{}", '{"readings": 3}', '{"readings": [{"formula": "x", "units": 3}]}']
+)
+def test_other_forms_are_rejected(text: str) -> None:
+    with pytest.raises(RejectedReplyError):
+        read_readings(text)
+
+
+def test_the_schema_is_strict_throughout() -> None:
+    def objects(node: object) -> list[dict[str, object]]:
+        if isinstance(node, list):
+            return [o for each in node for o in objects(each)]
+        if not isinstance(node, dict):
+            return []
+        return [node] * (node.get("type") == "object") + [o for each in node.values() for o in objects(each)]
+
+    found = objects(readings_schema())
+    assert len(found) == 5
+    assert all(o["additionalProperties"] is False and o["required"] == list(o["properties"]) for o in found)  # type: ignore[call-overload]
+
+
+def test_examples_are_straight_lines_between_points() -> None:
+    signals = [ExampleSignal(name="x", times=[0, 1, 1, 2], values=[0, 2, 5, 5])]
+    found = example_trajectory(signals, ["x"], TIMES)
+    assert found["x"][1] == 1
+    assert found["x"][3:].tolist() == [5, 5]
+    with pytest.raises(RejectedReplyError, match="lacks the signal 'y'"):
+        example_trajectory(signals, ["x", "y"], TIMES)
+    with pytest.raises(RejectedReplyError, match="as many times as values"):
+        example_trajectory([ExampleSignal(name="x", times=[0], values=[0, 2])], ["x"], TIMES)

@@ -1,0 +1,52 @@
+import pytest
+
+from falsifier.errors import FormulaError, SpecError
+from falsifier.problem.spec import parse_spec
+from falsifier.problem.template_arguments import template_arguments, term
+
+
+def test_arguments_are_read_as_in_toml_or_as_text() -> None:
+    text = "settles signal=y2-y1 reference=80 within=2% after='brake > 0.5' during=[0,5] stays=\"1\""
+    assert template_arguments(text) == {
+        "template": "settles",
+        "signal": "y2-y1",
+        "reference": 80,
+        "within": "2%",
+        "after": "brake > 0.5",
+        "during": [0, 5],
+        "stays": 1,
+    }
+
+
+@pytest.mark.parametrize("text", ["", "settles signal", "rise time=1 time=2", "rise signal='x"])
+def test_what_is_no_template_says_how_to_write_one(text: str) -> None:
+    with pytest.raises(FormulaError, match=r"--template: .*(key=value|write a template)"):
+        template_arguments(text)
+
+
+def test_a_term_is_an_expression_or_a_number() -> None:
+    assert str(term("y2 - y1")) == "y2 - y1"
+    assert str(term(3)) == "3"
+    with pytest.raises(FormulaError, match="got the formula"):
+        term("x) <= 1 and (y")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("signal", "speed +", "position"),
+        ("within", "x", "percentage such as"),
+        ("within", -1, "at least 0"),
+        ("within", "nan%", "at least 0"),
+        ("time", -1, "greater than or equal to 0"),
+        ("after", -1, "time of at least 0"),
+        ("after", "x >", "position"),
+        ("signal", float("inf"), "finite"),
+    ],
+)
+def test_each_argument_is_checked_where_it_stands(key: str, value: object, message: str) -> None:
+    good = {"template": "settles", "signal": "x", "reference": 1, "within": 1, "time": 1}
+    data = {"model": {"fmu": "a.fmu"}, "requirements": {"R": good | {key: value}}}
+    with pytest.raises(SpecError, match=message) as raised:
+        parse_spec(data, file="my.toml")
+    assert raised.value.key == f"requirements.R.{key}"

@@ -1,0 +1,76 @@
+import pytest
+
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.fmu import FmuModel
+from falsifier.fmu.units import Unit
+from falsifier.problem.unit_check import defined_units, unit_conflicts, unit_of
+from falsifier.stl import parse
+from falsifier.testing import lag_problem
+from tests.problem.support import AT
+
+INFO = ModelInfo(
+    "car",
+    variables=tuple(
+        Variable(name, unit=unit)
+        for name, unit in [
+            ("v", "km/h"),
+            ("w", "mph"),
+            ("s", "m"),
+            ("t", "m"),
+            ("n", "1"),
+            ("q", "zork"),
+            ("z", "span"),
+        ]
+    ),
+)
+
+# As the FMU defines it: ten metres.
+UNITS = {"span": Unit((0, 1, 0, 0, 0, 0, 0, 0), 10.0)}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("G (v <= w)", "w in mph; convert one of them: w in km/h is 1.60934 times it"),
+        ("G (v + s <= 3)", "v is in km/h, s in m; compare or add"),
+        ("G (abs(v - s) <= 3)", "v is in km/h, s in m"),
+        ("G (min(v, s) <= 3)", "v is in km/h, s in m"),
+        ("G (v <= -s)", "-s in m"),
+        ("G (z <= s)", "convert one of them: s in span is 0.1 times it"),
+    ],
+)
+def test_units_that_do_not_fit_are_named(text: str, message: str) -> None:
+    found = list(unit_conflicts(parse(text), INFO, UNITS))
+    assert len(found) == 1
+    assert message in found[0][1]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "v <= 3",
+        "s - t <= 3",
+        "n <= v",
+        "3.6*s <= v",
+        "v/s <= w",
+        "v^2 <= s",
+        "v == v",
+        "unknown <= v",
+        "q <= s",
+    ],
+)
+def test_what_may_fit_is_no_conflict(text: str) -> None:
+    assert not list(unit_conflicts(parse(text), INFO, UNITS))
+
+
+def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
+    units = {
+        text: unit_of(parse(f"{text} <= 0").predicates[0].left, INFO)
+        for text in ("abs(s - t)", "3 + v", "s*t")
+    }
+    assert units == {"abs(s - t)": "m", "3 + v": "km/h", "s*t": ""}
+
+
+def test_fmus_define_units_and_other_models_do_not() -> None:
+    assert "mph" in defined_units(FmuModel(AT))
+    assert defined_units(lag_problem().model) == {}

@@ -1,0 +1,117 @@
+"""Findings on requirements that say nothing, and none on the bundled specs."""
+
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.files import bundled
+from falsifier.errors import SpecError
+from falsifier.search.lint import lint, static_findings
+from falsifier.testing import lag_problem
+from tests.problem.support import AT, spec
+
+SPEC = f"""
+[model]
+fmu = "{AT.as_posix()}"
+interface = "co-simulation"
+stop_time = 50.0
+output_interval = 0.01
+[inputs.throttle]
+range = [0, 100]
+control_points = 3
+[inputs.brake]
+value = 0
+"""
+# Specs whose simulations take milliseconds; those with hidden faults are among them.
+CHEAP = ("AT", "CC", "ChargerHandshake", "HeaterLimpHome", "NN", "PulseMeter")
+# By bundled spec: what is found, all of it true.
+BUNDLED = {"AT": [("AT6a", "implied"), ("AT6b", "implied"), ("AT6c", "implied")]}
+
+
+@pytest.mark.parametrize(
+    "name", sorted(p.stem for p in bundled("specs").glob("*.toml") if p.stem != "published")
+)
+def test_bundled_specs_raise_no_false_alarm(name: str) -> None:
+    found = lint(name, simulations=2 if name in CHEAP else 0)
+    assert [(f.requirement, f.kind) for f in found] == BUNDLED.get(name, [])
+    assert all("AT6abc implies it" in f.text for f in found)
+
+
+FOUND = [
+    ("G[0,20] (throttle <= 100)", "always", "G[0,20] (throttle <= 100)", "throttle in [0, 100]"),
+    ("F[0,20] (throttle > 100.5)", "never", "F[0,20] (throttle > 100.5)", "every trajectory"),
+    ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search is"),
+    ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake in [0, 0]"),
+    ("G[0,0] (speed <= 120)", "window", "G[0,0] (speed <= 120)", "leave it out: speed <= 120"),
+    ("F[0,3] (throttle <= 3*speed)", "", "", ""),
+    ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
+    ("G[0,20] (speed <= 120 and speed <= 130)", "implied", "speed <= 130", "which implies it"),
+    ("F[0,9] (speed >= 90) or F[0,5] (speed >= 90)", "window", "F[0,5] (speed >= 90)", "which it implies"),
+    ("G[0,20] (speed - rpm <= 5)", "units", "speed - rpm <= 5", "speed is in mph, rpm in "),
+    ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),
+    ("G[0,20] (sped <= 5)", "invalid", "", "did you mean 'speed'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("formula", "kind", "place", "words"), FOUND)
+def test_what_says_nothing_is_found_with_its_place(
+    tmp_path: Path, formula: str, kind: str, place: str, words: str
+) -> None:
+    text = f"{SPEC}[requirements.R]\nformula = '{formula}'\n"
+    found = lint(spec(tmp_path, text), simulations=0)
+    assert [(f.requirement, f.kind, f.place) for f in found] == ([("R", kind, place)] if kind else [])
+    assert all(words in f"{f.text} {f.advice}" for f in found)
+
+
+def test_a_searched_parameter_does_not_change_over_time() -> None:
+    from dataclasses import replace
+
+    from falsifier.problem.requirement import Requirement
+    from falsifier.stl import parse
+
+    problem = lag_problem()
+    fixed = replace(problem, parameters={"u": 1.0}, space=problem.space)
+    assert not list(static_findings(problem))
+    with_input = replace(fixed, requirement=Requirement("R", parse("G[0,3] (u <= 2)")))
+    assert [f.kind for f in static_findings(with_input)] == ["always", "window"]
+
+
+def test_requirements_that_repeat_others_are_found(tmp_path: Path) -> None:
+    formulas = {
+        "A": "G[0,20] (speed <= 120)",
+        "B": "G[0,20] (120 >= speed)",
+        "C": "G[5,10] (speed <= 130)",
+        "D": "G[0,20] (rpm <= 4750)",
+    }
+    text = SPEC + "".join(f"[requirements.{n}]\nformula = '{f}'\n" for n, f in formulas.items())
+    found = lint(spec(tmp_path, text), simulations=0)
+    assert [(f.requirement, f.kind) for f in found] == [
+        ("B", "duplicate"), ("C", "implied"), ("C", "implied")
+    ]  # fmt: skip
+    # With another input range the same formula is another requirement.
+    other = text.replace("[requirements.C]", "[requirements.C]\ninputs.throttle.range = [0, 50]")
+    assert [f.requirement for f in lint(spec(tmp_path, other), simulations=0)] == ["B"]
+
+
+def test_what_no_input_moves_is_measured_and_says_so(tmp_path: Path) -> None:
+    still = SPEC.replace(
+        "[inputs.throttle]\nrange = [0, 100]\ncontrol_points = 3", "[inputs.throttle]\nvalue = 0"
+    )
+    still += (
+        "[parameters]\nfinalDrive.range = [3.0, 3.1]\n[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"
+    )
+    found = lint(spec(tmp_path, still), simulations=3)
+    moving = lint(
+        spec(tmp_path, SPEC + "[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"), simulations=3
+    )
+    assert moving == []
+    assert all(f.text.startswith("measured: ") for f in found)
+
+
+def test_a_spec_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="low < high"):
+        lint(
+            spec(
+                tmp_path, SPEC.replace("[0, 100]", "[100, 0]") + "[requirements.R]\nformula = 'speed <= 1'\n"
+            )
+        )

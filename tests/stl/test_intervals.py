@@ -1,0 +1,63 @@
+"""Bounds against what random trajectories in range are worth."""
+
+import numpy as np
+import pytest
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.stl import Monitor, parse
+from falsifier.stl.intervals import Interval, decided, margins
+
+RANGES = {"x": Interval(-1, 2), "y": Interval(0.5, 3), "b": Interval(0, 1)}
+FORMULAS = [
+    "x <= 1", "x >= y", "x == 1", "x != 1", "abs(x - y) <= 1", "x*y > 0", "x/y <= 4", "x^2 <= 4", "-x <= y",
+    "min(x, y) >= -1", "max(x, y, 0) <= 3", "sqrt(y) <= 2", "exp(x) >= 0", "sin(x) + cos(y) <= 2", "y^x >= 0",
+    "G (x <= 1)", "F (x <= 1 and y >= 1)", "x <= 1 or y <= 1", "x <= 0 -> y <= 2", "b <-> (x > 0)",
+    "not (x > 3)", "(x <= 1) U (y >= 2)", "X (x <= 2)", "log(y) >= -1", "log(x) >= -1", "x/x <= 2",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_trajectory_in_range_is_outside_the_bounds(text: str) -> None:
+    formula, rng = parse(text), np.random.default_rng(3)
+    bounds = margins(formula, RANGES)
+    assert bounds.low <= bounds.high
+    if text in ("log(x) >= -1", "x/x <= 2"):  # no value everywhere: nothing is known
+        assert bounds == Interval()
+        return
+    monitor = Monitor(formula, 0.5, 5)
+    for _ in range(40):
+        columns = {
+            n: np.where(rng.random(5) < 0.3, r.low, rng.uniform(r.low, r.high, 5)) for n, r in RANGES.items()
+        }
+        found = monitor.evaluate(Trajectory(np.linspace(0, 2, 5), columns)).robustness
+        assert bounds.low - 1e-9 <= found <= bounds.high + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("text", "low", "high"),
+    [("x <= 1", -1, 2), ("abs(x) <= 5", 3, 5), ("x == 4", -5, -2), ("z <= 1", -np.inf, np.inf),
+     ("z - z <= 1", -np.inf, np.inf)],
+)  # fmt: skip
+def test_bounds_of_single_signals_are_tight(text: str, low: float, high: float) -> None:
+    assert margins(parse(text), RANGES) == Interval(low, high)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("G (x <= 2)", [("G (x <= 2)", True)]),
+        ("G (x <= 1 -> y > 4)", [("y > 4", False)]),
+        ("G (x == 1 -> y <= 1)", [("G (x == 1 -> y <= 1)", True)]),
+        ("F (x > 2.5)", [("F (x > 2.5)", False)]),
+        ("G (x <= 1)", []),
+        ("G (b > 0 -> x <= 1)", []),
+        ("G (not (b > 0 and y > 1))", []),
+        ("G (b < 0 or x <= 1)", []),
+        ("G (b < 0 -> x <= 1)", [("G (b < 0 -> x <= 1)", True)]),
+        ("b >= 0 <-> x <= 1", []),
+        ("G (b >= 0 and x <= 1)", [("b >= 0", True)]),
+        ("(x <= 1) and (y <= 5)", [("y <= 5", True)]),
+    ],
+)
+def test_the_largest_parts_that_are_decided_are_named(text: str, parts: list[tuple[str, bool]]) -> None:
+    assert [(str(part), holds) for part, holds in decided(parse(text), RANGES)] == parts

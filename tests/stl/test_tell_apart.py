@@ -1,0 +1,40 @@
+import pytest
+
+from falsifier.stl import Monitor, parse
+from falsifier.stl.intervals import Interval
+from falsifier.stl.tell_apart import tell_apart
+
+RANGES = {"b": Interval(0, 1), "x": Interval(-10, 10)}
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("F[0,5] (x >= 3)", "G[5,5] (x >= 3)"),
+        ("F[0,5] (x >= 3)", "G[0,5] (x >= 3)"),
+        ("G[0,5] (x <= 3)", "G[0,10] (x <= 3)"),
+        ("G[0,5] (x <= 3)", "G[0,5] (x <= 2)"),
+        ("G[0,8] (b -> F[0,2] (x >= 3))", "G[0,8] (b -> G[2,2] (x >= 3))"),
+        ("G[0,10] (x >= 3)", "G[0,10] (x <= 3)"),
+    ],
+)
+def test_an_example_satisfies_only_one(one: str, other: str) -> None:
+    a, b = parse(one), parse(other)
+    found = tell_apart(a, b, step=0.5, samples=21, ranges=RANGES)
+    assert found is not None
+    assert Monitor(a, 0.5, 21).evaluate(found).robustness > 0
+    assert Monitor(b, 0.5, 21).evaluate(found).violated
+    assert all(RANGES[n].low <= c.min() and c.max() <= RANGES[n].high for n, c in found.columns.items())
+
+
+def test_what_one_implies_has_no_example() -> None:
+    narrow, wide = parse("G[0,10] (x <= 3)"), parse("G[0,5] (x <= 3)")
+    assert tell_apart(narrow, wide, step=0.5, samples=21, ranges=RANGES) is None
+
+
+def test_examples_are_repeatable_and_have_few_steps() -> None:
+    a, b = parse("F[0,5] (x >= 3)"), parse("G[0,5] (x >= 3)")
+    first, again = (tell_apart(a, b, step=0.5, samples=21, ranges={}) for _ in range(2))
+    assert first is not None and again is not None
+    assert (first["x"] == again["x"]).all()
+    assert (first["x"][1:] != first["x"][:-1]).sum() == 1
