@@ -6,10 +6,10 @@ from time import perf_counter
 from typing import Any
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
-from falsifier.llm.failures import classify
+from falsifier.llm.failures import UnreadableReplyError, classify
 from falsifier.llm.incoming import cleaned
 from falsifier.llm.litellm_import import dropped_parameters, listed_price, load_litellm
-from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode
+from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, Usage
 from falsifier.llm.providers import find_key, known
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
@@ -50,6 +50,10 @@ class LiteLLMChat:
     def complete(self, request: ChatRequest) -> ChatReply:
         """Send one request.
 
+        Returns:
+            The reply; one without text, and with the finish reason ``UNREADABLE``, if the server could not
+            parse what the LLM wrote.
+
         Raises:
             TransientChatError: if a retry may succeed.
             FormatUnsupportedError: if the server rejects this way of asking for JSON.
@@ -86,13 +90,24 @@ class LiteLLMChat:
                 secrets=secrets,
                 offers_tools=bool(request.tools),
             )
+            if isinstance(failure, UnreadableReplyError):
+                return ChatReply(
+                    text="",
+                    finish_reason=UNREADABLE,
+                    usage=self._lost(request, timed_out=0),
+                    seconds=perf_counter() - started,
+                    parameters=self._effective(arguments),
+                )
             if isinstance(error, TimeoutError) or type(error).__name__ == "Timeout":
-                price = self.price or listed_price(self.llm, api_base=self.api_base)
-                failure.lost = lost_usage(request, llm=self.llm, price=price)
+                failure.lost = self._lost(request, timed_out=1)
             raise failure from None
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Do nothing; storing replies is CachedChat's concern."""
+
+    def _lost(self, request: ChatRequest, *, timed_out: int) -> Usage:
+        price = self.price or listed_price(self.llm, api_base=self.api_base)
+        return lost_usage(request, llm=self.llm, price=price, timed_out=timed_out)
 
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}

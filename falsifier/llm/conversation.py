@@ -6,8 +6,9 @@ from typing import TypeVar
 from falsifier.core.printable import printable
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError
+from falsifier.llm.failures import ContextExceededError
 from falsifier.llm.incoming import LONGEST_REPLY, cleaned
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Message, ToolCall
+from falsifier.llm.messages import UNREADABLE, Chat, ChatReply, ChatRequest, Exchange, Message, ToolCall
 
 T = TypeVar("T")
 OnExchange = Callable[[Exchange], None]
@@ -59,7 +60,14 @@ def converse(
     """
     problems: list[str] = []
     while len(problems) <= reasks:
-        reply = cleaned(chat.complete(request))
+        try:
+            reply = cleaned(chat.complete(request))
+        except ContextExceededError as error:
+            # The question itself had room; with the rejected replies it has none.
+            if not problems:
+                raise
+            problems.append(str(error))
+            break
         values: list[T] = []
         problem = None
         try:
@@ -84,7 +92,7 @@ def converse(
             problems.append(problem)
         request = following
     raise NoValidReplyError(
-        f"{chat.llm} gave no valid reply in {counted(reasks + 1, 'attempt')}; rejected because: "
+        f"{chat.llm} gave no valid reply in {counted(len(problems), 'attempt')}; rejected because: "
         f"{' | '.join(dict.fromkeys(problems))}"
     )
 
@@ -126,6 +134,8 @@ def _called(request: ChatRequest, reply: ChatReply, respond: Respond) -> tuple[C
 def _usable_text(reply: ChatReply) -> str:
     if reply.finish_reason == "content_filter":
         raise RejectedReplyError("the provider's content filter withheld the reply")
+    if reply.finish_reason == UNREADABLE:
+        raise RejectedReplyError("the server could not parse it; write nothing before or after the answer")
     if reply.finish_reason == "refusal":
         raise RejectedReplyError(f"the reply refuses the task: {reply.text[:200]}")
     if not reply.text.strip():

@@ -1,5 +1,7 @@
 """Failures of requests to a language model, classified by what can be done about them."""
 
+import json
+import re
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
@@ -24,10 +26,26 @@ _FORMAT_WORDS = (
     "schema",
     "json mode",
     "response mime type",
+    "failed to initialize samplers",  # llama.cpp, if it cannot constrain this LLM in this way
 )
 _TOOL_WORDS = ("tool", "function call", "function_call")
+# Some servers parse what the LLM wrote, and fail if it does not have the required form: two versions of
+# llama.cpp, and Groq.
+_UNREADABLE_WORDS = (
+    "the model produced output that does not match",
+    "failed to parse input at pos",
+    "failed to generate json",
+    "failed to validate json",
+    "failed to call a function",
+)
+_CONTEXT_WORDS = ("contextwindow", "context_length", "maximum context", "context size", "exceed_context")
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
 _LONGEST_DETAIL = 600
+# What the client library puts before the server's own words, several times over.
+_CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")
+_LONGER = (
+    "start its server with a longer context (llama.cpp: --ctx-size 32768; vLLM: --max-model-len 32768), or "
+)
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
 
@@ -63,6 +81,14 @@ class ToolsUnsupportedError(ChatError):
     """The server, or the LLM behind it, does not support tools."""
 
 
+class ContextExceededError(ChatError):
+    """The prompt has more tokens than the LLM, or its server as it was started, takes."""
+
+
+class UnreadableReplyError(ChatError):
+    """The LLM answered, but its server could not parse that in the form that was asked for."""
+
+
 def classify(
     error: Exception,
     *,
@@ -86,8 +112,9 @@ def classify(
         at = f" at {redact(api_base, secrets)}" if api_base else ""
         return ChatError(f"{llm}{at}: {redact(printable(str(error)), secrets)}")
     status = _status(error)
-    detail = _first_lines(redact(printable(f"{type(error).__name__}: {error}"), secrets))
-    lowered = detail.lower()
+    text = redact(printable(f"{type(error).__name__}: {error}"), secrets)
+    lowered = _first_lines(text).lower()
+    detail = _first_lines(_own_words(text))
     where = f" at {redact(api_base, secrets)}" if api_base else ""
     keys = " or ".join(key_variables) or "the API key"
     address = server_address(llm, api_base)
@@ -101,6 +128,8 @@ def classify(
         )
     if status in (401, 403):
         return ChatError(f"{llm}{where}: the provider rejected the key; check {keys}. {detail}")
+    if status in (400, 422, 500) and any(word in lowered for word in _UNREADABLE_WORDS):
+        return UnreadableReplyError(f"{llm}{where}: {detail}")
     speaks_of_format = any(word in lowered for word in _FORMAT_WORDS)
     # Some servers report this as 404 (no route with tools) or 500 (started without tool support).
     if (
@@ -120,10 +149,11 @@ def classify(
             f"{llm}{where}: the provider's content filter rejected the prompt; try another LLM or "
             f"--anonymous. {detail}"
         )
-    if "contextwindow" in lowered or "context_length" in lowered or "maximum context" in lowered:
-        return ChatError(
-            f"{llm}{where}: the prompt is too long for this LLM; use a plainer prompt variant (--variant) or "
-            f"another LLM. {detail}"
+    if any(word in lowered for word in _CONTEXT_WORDS):
+        is_own = api_base is not None or known(llm).local
+        return ContextExceededError(
+            f"{llm}{where}: the prompt is too long for this LLM; {_LONGER if is_own else ''}use a plainer "
+            f"prompt variant (--variant) or another LLM. The server says: {detail}"
         )
     if status == 429 and any(word in lowered for word in _QUOTA_WORDS):
         return ChatError(f"{llm}{where}: the account behind {keys} has no quota left. {detail}")
@@ -134,6 +164,16 @@ def classify(
             f"{llm}{where}: {detail}", retry_after=_retry_after(error), for_all=status == 429
         )
     return ChatError(f"{llm}{where}: {detail}")
+
+
+def _own_words(text: str) -> str:
+    """What the server said, without the classes of the client library's errors, and out of its JSON."""
+    said = _CLASSES.sub("", text, count=1).strip() if _CLASSES.match(text) else text
+    try:
+        told = json.loads(said)["error"]["message"]
+    except (ValueError, TypeError, KeyError):
+        told = said
+    return told if isinstance(told, str) and told.strip() else text
 
 
 def _first_lines(text: str) -> str:

@@ -8,12 +8,18 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, ToolsUnsupportedError
 from falsifier.llm.litellm_import import may_take_tools
-from falsifier.llm.messages import MODES, ChatReply, ChatRequest, Mode, below
+from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, below
+
+# Replies in a row that the server could not parse, before they are asked for in a plainer way: one is the
+# LLM's mistake, several are the server's.
+_MOST_UNREADABLE = 2
 
 
 @dataclass
 class LadderChat:
     """Asks by JSON Schema, else for any JSON object, else in words only; remembers what worked.
+
+    The next way is tried if the server rejects one, or repeatedly cannot parse what it makes the LLM write.
 
     Requests that offer tools have their own ladder: some servers accept a schema and accept tools but reject
     the two together. Below its last step, or if the server rejects tools altogether, the request is sent
@@ -27,6 +33,7 @@ class LadderChat:
     _mode: Mode = field(init=False)
     _mode_with_tools: Mode = field(init=False)
     _takes_tools: bool | None = field(init=False, default=None)
+    _unreadable: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
         self._mode = self._mode_with_tools = self.inner.mode
@@ -51,22 +58,35 @@ class LadderChat:
         while True:
             mode = max(self._mode, self._mode_with_tools, key=MODES.index) if request.tools else self._mode
             try:
-                return replace(self.inner, mode=mode).complete(request)
+                return self._noted(request, mode, replace(self.inner, mode=mode).complete(request))
             except FormatUnsupportedError:
                 plainer = below(mode) if request.reply_schema is not None else None
                 if plainer is None and not request.tools:
                     raise
                 if plainer is None:
                     request = self._refused_with_tools(request)
-                elif request.tools:
-                    self._mode_with_tools = plainer
                 else:
-                    self._mode = plainer
+                    self._descend(request, plainer)
             except ToolsUnsupportedError:
                 request = self._refused_with_tools(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         self.inner.accepted(request, reply)
+
+    def _noted(self, request: ChatRequest, mode: Mode, reply: ChatReply) -> ChatReply:
+        """Return a reply; after several that the server could not parse, ask in a plainer way from now on."""
+        self._unreadable = self._unreadable + 1 if reply.finish_reason == UNREADABLE else 0
+        plainer = below(mode) if request.reply_schema is not None else None
+        if self._unreadable >= _MOST_UNREADABLE and plainer is not None:
+            self._unreadable = 0
+            self._descend(request, plainer)
+        return reply
+
+    def _descend(self, request: ChatRequest, plainer: Mode) -> None:
+        if request.tools:
+            self._mode_with_tools = plainer
+        else:
+            self._mode = plainer
 
     def _may_offer_tools(self) -> bool:
         if self._takes_tools is None:

@@ -11,6 +11,8 @@ Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
 Mode = Literal["json_schema", "json_object", "prompt"]
 MODES: tuple[Mode, ...] = get_args(Mode)
+# Finish reason of a reply that the server could not parse in the form that was asked for.
+UNREADABLE = "unreadable"
 # What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
 ReplyKind = Literal["json", "points"]
 
@@ -174,6 +176,11 @@ class Exchange(_Value):
     def usage(self) -> Usage:
         """Tokens and cost of this exchange; without a reply, those of requests that timed out."""
         return self.lost or Usage(cost=0.0) if self.reply is None else self.reply.usage
+
+    @property
+    def requests(self) -> int:
+        """Number of requests that were answered or timed out; at least 1."""
+        return max(1, self.usage.timed_out + (self.reply is not None))
 
     @property
     def seconds(self) -> float:

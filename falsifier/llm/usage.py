@@ -89,11 +89,11 @@ def usage_of(
     )
 
 
-def lost_usage(request: ChatRequest, *, llm: str, price: Price | None) -> Usage:
-    """Usage of a request that timed out: the provider charges at least for what was sent."""
+def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, timed_out: int = 1) -> Usage:
+    """Usage of a request that brought nothing: the provider charges at least for what was sent."""
     sent = sum(count_tokens(part, llm) for part in _sent(request))
     cost = None if price is None else price.cost(sent, 0)
-    return Usage(prompt_tokens=sent, cost=cost, estimated=True, timed_out=1)
+    return Usage(prompt_tokens=sent, cost=cost, estimated=True, timed_out=timed_out)
 
 
 def _count(reported: Any) -> int | None:

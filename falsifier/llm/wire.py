@@ -1,6 +1,8 @@
 """Messages and tools in the client library's form, and the tool calls that it returns."""
 
+import json
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
 from falsifier.llm.messages import Message, Tool, ToolCall
@@ -54,5 +56,23 @@ def storable(text: str) -> str:
 
 
 def _sent_call(call: ToolCall) -> dict[str, Any]:
-    function = {"name": call.name, "arguments": call.arguments}
+    function = {"name": call.name, "arguments": _as_servers_take(call.arguments)}
     return {"id": call.id, "type": "function", "function": function, **call.echo}
+
+
+def _as_servers_take(arguments: str) -> str:
+    """Arguments of an earlier call; empty ones if they are not JSON, because servers reject the conversation.
+
+    The answer to the call says what was wrong with them.
+    """
+    try:
+        json.loads(arguments, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError):
+        return "{}"
+    return arguments
+
+
+def _finite(number: str) -> float:
+    if not isfinite(float(number)):
+        raise ValueError(f"{number} is not finite")
+    return float(number)

@@ -4,6 +4,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
+from falsifier.llm.failures import ContextExceededError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.scripted import ScriptedChat
 from tests.llm.support import ADD, ask_with_tools, calling, wrong
@@ -96,6 +97,13 @@ def test_no_answer_is_not_asked_again_here() -> None:
     with pytest.raises(ChatError, match="nobody there"):
         converse(chat, QUESTION, number, exchanges.append)
     assert exchanges == []
+
+
+def test_a_question_that_outgrows_the_context_when_asked_again_has_no_valid_reply() -> None:
+    with pytest.raises(NoValidReplyError, match=r"2 attempts; rejected because: 'x' is no number.*too long"):
+        asked("x", ContextExceededError("too long"))
+    with pytest.raises(ContextExceededError):
+        asked(ContextExceededError("too long"))
 
 
 def test_exchanges_go_through_json() -> None:

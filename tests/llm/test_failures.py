@@ -5,7 +5,7 @@ import pytest
 from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.failures import TransientChatError, classify
+from falsifier.llm.failures import ContextExceededError, TransientChatError, classify
 from falsifier.llm.retry import Gate, RetryingChat
 from tests.llm.test_client import REQUEST
 
@@ -58,6 +58,23 @@ def test_content_filter_and_long_prompts_say_what_to_do() -> None:
 
     assert "--anonymous" in told("content_policy_violation")
     assert "too long" in told("this model's maximum context length is 8192 tokens")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "litellm.BadRequestError: ContextWindowExceededError: OpenAIException - request (9 tokens) exceeds "
+        "the available context size (8 tokens), try increasing it",
+        'litellm.BadRequestError: Hosted_vllmException - {"error":{"code":400,"message":"request '
+        '(9 tokens) exceeds the available context size (8 tokens), try increasing it","n_ctx":8}}',
+    ],
+)
+def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str) -> None:
+    error = classify(RuntimeError(text), llm="m", api_base="http://x", key_variables=(), secrets=())
+    assert isinstance(error, ContextExceededError)
+    assert "llama.cpp: --ctx-size" in str(error)
+    said = "request (9 tokens) exceeds the available context size (8 tokens), try increasing it"
+    assert str(error).endswith(f"The server says: {said}")
 
 
 def free_port() -> int:

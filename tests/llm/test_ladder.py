@@ -71,6 +71,29 @@ def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
     assert second.text == "again"
 
 
+UNPARSED = [
+    Step(status=500, message="The model produced output that does not match the expected peg-native format"),
+    Step(status=500, message="Failed to parse input at pos 12: <tool_call>{"),
+    Step(status=400, message="Failed to generate JSON. Please adjust your prompt."),
+]
+
+
+@pytest.mark.parametrize("unparsed", UNPARSED, ids=lambda step: step.message)
+def test_what_a_server_cannot_parse_twice_is_asked_for_more_plainly(unparsed: Step) -> None:
+    with serving(unparsed, Step("one"), unparsed, unparsed, Step("two")) as server:
+        chat = LadderChat(LiteLLMChat("openai/m", api_base=server.url))
+        texts = [chat.complete(REQUEST).text for _ in range(5)]
+    assert texts == ["", "one", "", "", "two"]
+    kinds = [r.body["response_format"]["type"] for r in server.received]
+    assert kinds == ["json_schema"] * 4 + ["json_object"]
+
+
+def test_a_server_that_cannot_constrain_the_llm_is_asked_more_plainly() -> None:
+    refused = Step(status=400, message="Failed to initialize samplers: std::exception")
+    with serving(refused, Step("one")) as server:
+        assert LadderChat(LiteLLMChat("openai/m", api_base=server.url)).complete(REQUEST).text == "one"
+
+
 def test_ladder_ends_at_its_last_rung() -> None:
     refused = Step(status=400, message="grammar is not supported")
     with serving(refused, refused, refused) as server, pytest.raises(ChatError, match="grammar"):

@@ -4,6 +4,8 @@ import pytest
 
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import converse
+from falsifier.llm.messages import Message, ToolCall
+from falsifier.llm.wire import sent_message
 from tests.llm.server import Step, serving
 from tests.llm.support import ADD, QUESTION, SCHEMA, add
 
@@ -41,6 +43,12 @@ class TestWire:
             call["tool_calls"][0]["id"],
             "3",
         )
+
+    @pytest.mark.parametrize("arguments", ['{"terms": [1', '{"terms": [87E787055]}', '{"terms": [NaN]}'])
+    def test_calls_that_are_no_json_are_sent_back_without_their_arguments(self, arguments: str) -> None:
+        calls = (ToolCall(id="1", name="add", arguments=arguments),)
+        sent = sent_message(Message(role="assistant", content="", tool_calls=calls))
+        assert sent["tool_calls"][0]["function"] == {"name": "add", "arguments": "{}"}
 
     def test_ollama(self) -> None:
         value, (first, second) = self.talk("ollama_chat/qwen3", root=True)
