@@ -3,9 +3,10 @@
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from falsifier.core.candidate import Candidate
@@ -34,8 +35,11 @@ def local_executor(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    with _process_pool(jobs) as executor:
+    executor = _process_pool(jobs)
+    try:
         yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 @dataclass(slots=True)
@@ -87,22 +91,24 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
         workers.executor.shutdown(cancel_futures=True)
 
 
-def evaluate_all(
+def start(
     problem: Problem, candidates: Sequence[Candidate], executor: Executor | None
-) -> Iterator[Evaluation]:
-    """Yield the evaluations in the order of the candidates, each as soon as it and those before it are done.
+) -> list[Callable[[], Evaluation]]:
+    """Start to simulate candidates; return functions that wait for their evaluations, in order.
 
-    If a worker process dies, its evaluation has the status ``crashed``.
+    Without an executor, a function simulates when it is called. If a worker process dies, its evaluation has
+    the status ``crashed``.
     """
     if executor is None:
-        yield from (evaluate(problem, candidate) for candidate in candidates)
-        return
-    futures = [executor.submit(evaluate, problem, candidate) for candidate in candidates]
-    for candidate, future in zip(candidates, futures, strict=True):
-        try:
-            yield future.result()
-        except BrokenExecutor as error:
-            yield Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
+        return [partial(evaluate, problem, candidate) for candidate in candidates]
+    return [partial(_wait, c, executor.submit(evaluate, problem, c)) for c in candidates]
+
+
+def _wait(candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
+    try:
+        return future.result()
+    except BrokenExecutor as error:
+        return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
 
 
 def _check_jobs(jobs: int) -> None:
