@@ -44,6 +44,11 @@ class Slower:
         """What the model says of itself."""
         return self.model.info
 
+    @property
+    def isolate(self) -> bool:
+        """Whether it simulates in processes of its own."""
+        return bool(getattr(self.model, "isolate", False))
+
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
     ) -> Trajectory:

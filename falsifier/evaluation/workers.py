@@ -3,13 +3,14 @@
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import Model
 from falsifier.errors import SpecError
 from falsifier.evaluation.cluster import connected
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -25,8 +26,11 @@ _TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
-def local_executor(jobs: int) -> Iterator[Executor | None]:
-    """Open an executor with this many local processes; None for one job, which runs in this process.
+def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
+    """Open an executor for so many simulations of a model at a time; None for one, in this thread.
+
+    A model that simulates in processes of its own needs only threads, each with its own such process: other
+    Python processes would take seconds to start. They are there for models in Python.
 
     Raises:
         SpecError: if jobs is not positive.
@@ -35,7 +39,8 @@ def local_executor(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    executor = _process_pool(jobs)
+    is_apart = getattr(model, "isolate", False)
+    executor: Executor = ThreadPoolExecutor(jobs) if is_apart else _process_pool(jobs)
     try:
         yield executor
     finally:

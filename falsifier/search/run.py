@@ -301,7 +301,9 @@ def carry_out(
         scouts = make_scouts(request, problems)
         known = deque(map(Candidate.from_json, request.start_from))
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
-        live = Live(stack.enter_context(local_executor(request.jobs)))
+        for problem in problems:
+            stack.callback(problem.model.close)
+        live = Live(stack.enter_context(local_executor(request.jobs, problems[0].model)))
         steps: Steps = live
         all_listeners = tuple(listeners)
         if directory is not None:
@@ -313,8 +315,6 @@ def carry_out(
                 write_manifest(directory, described.model_dump(mode="json"))
             steps = replayed(directory, journal.records, live)
             all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
-        for problem in problems:
-            stack.callback(problem.model.close)
         return search(
             problems,
             engines,

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,8 +15,11 @@ import pytest
 from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SpecError
 from falsifier.evaluation.workers import local_executor, open_workers
+from falsifier.fmu.isolation import REGISTRY
+from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
-from tests.patience import wait_until
+from tests.fmu.fixtures import isolated, ramp, run
+from tests.patience import HANG, wait_until
 from tests.problems import BEGUN, HOLD, RELEASE
 
 if TYPE_CHECKING:
@@ -78,8 +82,28 @@ def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
     before = logger.level
     logger.setLevel(logging.ERROR)
     try:
-        with local_executor(2) as executor:
+        with local_executor(2, lag_problem().model) as executor:
             assert executor is not None
             assert executor.submit(level).result() == logging.ERROR
     finally:
         logger.setLevel(before)
+
+
+def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:
+    model = isolated("Lag_2")
+    together = Barrier(2)
+
+    def simulate(level: float) -> float:
+        together.wait(HANG)
+        return float(run(model, ("y",), signals={"u": ramp(1.0, level)})["y"][-1])
+
+    def workers() -> int:
+        return sum(key[0] == model.sha256 for key in REGISTRY._fmus)
+
+    with local_executor(2, model) as executor:
+        assert executor is not None
+        one, two = executor.map(simulate, (1.0, 2.0))
+        assert two == pytest.approx(2 * one) and one > 0
+        assert workers() == 2
+    model.close()
+    assert workers() == 0

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import Model
 from falsifier.engines import make_engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -68,7 +69,7 @@ def measure(monkeypatch: pytest.MonkeyPatch, *, proposal: float, simulation: flo
 
 
 @contextmanager
-def threads(jobs: int) -> Iterator[Executor]:
+def threads(jobs: int, model: Model) -> Iterator[Executor]:
     with ThreadPoolExecutor(jobs) as executor:
         yield executor
 
