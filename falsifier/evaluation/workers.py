@@ -7,7 +7,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecu
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
@@ -18,6 +18,8 @@ from falsifier.problem.problem import Problem
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
+
+T = TypeVar("T")
 
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
@@ -40,7 +42,7 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
         yield None
         return
     is_apart = getattr(model, "isolate", False)
-    executor: Executor = ThreadPoolExecutor(jobs) if is_apart else _process_pool(jobs)
+    executor = ThreadPoolExecutor(jobs) if is_apart else Renewing(lambda: _process_pool(jobs))
     try:
         yield executor
     finally:
@@ -94,6 +96,31 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
         yield workers
     finally:
         workers.executor.shutdown(cancel_futures=True)
+
+
+class Renewing(Executor):
+    """An executor that makes another one if the processes of the present one have died.
+
+    Args:
+        make: makes an executor.
+    """
+
+    def __init__(self, make: Callable[[], Executor]) -> None:
+        self._make = make
+        self._executor = make()
+
+    def submit(self, function: Callable[..., T], /, *args: Any, **options: Any) -> "Future[T]":
+        """Start a task."""
+        try:
+            return self._executor.submit(function, *args, **options)
+        except BrokenExecutor:
+            self._executor.shutdown(wait=False)
+            self._executor = self._make()
+            return self._executor.submit(function, *args, **options)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - as in the base class
+        """End the present executor."""
+        self._executor.shutdown(wait, cancel_futures=cancel_futures)
 
 
 def start(

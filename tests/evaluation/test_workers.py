@@ -5,16 +5,17 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from threading import Barrier
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SpecError
-from falsifier.evaluation.workers import local_executor, open_workers
+from falsifier.evaluation.workers import Renewing, local_executor, open_workers
 from falsifier.fmu.isolation import REGISTRY
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
@@ -107,3 +108,30 @@ def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:
         assert workers() == 2
     model.close()
     assert workers() == 0
+
+
+class Mortal(ThreadPoolExecutor):
+    """An executor that is broken after its first task, as a pool is if one of its processes is killed."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.tasks = 0
+
+    def submit(self, *args: Any, **options: Any) -> "Future[Any]":
+        self.tasks += 1
+        if self.tasks > 1:
+            raise BrokenProcessPool("a process was terminated abruptly")
+        return super().submit(*args, **options)
+
+
+def test_processes_that_died_are_replaced() -> None:
+    made: list[Mortal] = []
+
+    def make() -> Mortal:
+        made.append(Mortal())
+        return made[-1]
+
+    executor = Renewing(make)
+    assert [executor.submit(abs, -i).result() for i in range(3)] == [0, 1, 2]
+    assert len(made) == 3
+    executor.shutdown()
