@@ -173,7 +173,12 @@ def make_run(request: RunRequest, place: Path) -> None:
     for i in range(BUDGET):
         records.append(
             AskedRecord(
-                first=i, n=1, candidates=[candidate.to_json()], seconds=0.0001, requirement=problem.name
+                first=i,
+                n=1,
+                candidates=[candidate.to_json()],
+                seconds=0.0001,
+                requirement=problem.name,
+                told=i,
             )
         )
         falling = verdict.model_copy(update={"robustness": float(BUDGET - i) if i < BUDGET - 1 else -1.0})

@@ -41,6 +41,7 @@ from falsifier.cli.options import (
     json_option,
     limit_options,
     llm_option,
+    objective_option,
     out_option,
     parameterization_option,
     profile_option,
@@ -55,8 +56,9 @@ from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
 from falsifier.search.leaders import price_of
+from falsifier.search.moves import Objective
 from falsifier.search.request import Effort, LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
 from falsifier.views.terminal import warn
@@ -100,7 +102,11 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     help="Number of runs per requirement and method, each with its own seed.",
 )
 @seed_option("Random seed of the first run; the others count up.")
-@budget_option(suite=PROTOCOL_SIMULATIONS, note=" per run")
+@budget_option(
+    shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}; with --objective time none",
+    note=" per run",
+)
+@objective_option
 @limit_options(note=" per run")
 @total_options
 @click.option(
@@ -133,6 +139,7 @@ def bench(
     runs: int,
     seed: int,
     budget: int | None,
+    objective: Objective | None,
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
@@ -161,18 +168,20 @@ def bench(
         refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     if not parameterization:
         parameterization = (PROTOCOL_PARAMETERIZATION if suite_name else DEFAULT_PARAMETERIZATION,)
-    if budget is None:
-        # The competition's 1500 simulations may be 1500 paid questions.
-        budget = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
+    # The competition's 1500 simulations may be 1500 paid questions.
+    usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
-    methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
+    methods = [
+        replace(method, objective=objective or "simulations")
+        for method in _methods(engines, llms, effort, variants, parameterization, profile or "", how)
+    ]
     limits = (total_budget, total_seconds, total_tokens, total_cost)
     request = CampaignRequest(
         runs=cross(
             problems,
             methods,
             seeds=range(seed, seed + runs),
-            budget=Budget(budget, seconds, max_tokens, max_cost),
+            budget=budget_of(budget, seconds, max_tokens, max_cost, objective=objective, default=usual),
             asking=how,
         ),
         limits=Budget(*limits) if any(x is not None for x in limits) else None,

@@ -20,7 +20,7 @@ from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts.variants import DEFAULT_VARIANT
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import Parameterization, ProblemSource
-from falsifier.search.budget import DEFAULT_SIMULATIONS
+from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS
 from falsifier.search.request import Effort, LLMSettings
 
 # What a price is, in errors; as providers state prices.
@@ -336,15 +336,25 @@ def _llm_option(text: str) -> tuple[str, str | float]:
 
 
 def budget_option(
-    default: int = DEFAULT_SIMULATIONS, *, suite: int | None = None, note: str = ""
+    default: int = DEFAULT_SIMULATIONS, *, shown: str | None = None, note: str = ""
 ) -> Decorator:
+    """Option --budget; shown: its default in words if that depends on other options."""
     return click.option(
         "--budget",
         type=int,
-        default=default if suite is None else None,
-        show_default=True if suite is None else f"{default}; with --suite {suite}",
+        default=default if shown is None else None,
+        show_default=True if shown is None else shown,
         help=f"Maximum number of simulations{note}.",
     )
+
+
+def objective_option(command: Function) -> Function:
+    return click.option(
+        "--objective",
+        type=click.Choice(["simulations", "time"]),
+        help="What to keep small: with time, cheap proposals are simulated while the engine thinks or beside "
+        f"it, and without limits the run ends after {DEFAULT_SECONDS:g} s. Default: simulations.",
+    )(command)
 
 
 def limit_options(*, note: str = "") -> Decorator:

@@ -21,6 +21,7 @@ from falsifier.cli.options import (
     limit_options,
     llm_options,
     llm_settings,
+    objective_option,
     out_option,
     problem_options,
     problem_source,
@@ -39,7 +40,8 @@ from falsifier.problem.loading import find_spec, load_source, sources_of
 from falsifier.problem.problem import Problem
 from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
-from falsifier.search.budget import Budget
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
+from falsifier.search.moves import Objective
 from falsifier.search.result import Result
 from falsifier.search.run import falsify
 from falsifier.search.run import resume as resume_run
@@ -72,7 +74,8 @@ class _OneTarget(click.Command):
 @problem_options
 @engine_option()
 @llm_options
-@budget_option()
+@budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --objective time none")
+@objective_option
 @limit_options()
 @seed_option()
 @jobs_option("simulations")
@@ -96,7 +99,8 @@ class _OneTarget(click.Command):
 def run(
     *,
     engine: str | None,
-    budget: int,
+    budget: int | None,
+    objective: Objective | None,
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
@@ -138,7 +142,8 @@ def run(
             engine,
             llm=llm,
             seed=seed,
-            budget=Budget(budget, seconds, max_tokens, max_cost),
+            budget=budget_of(budget, seconds, max_tokens, max_cost, objective=objective),
+            objective=objective,
             jobs=jobs,
             directory=out or _new_directory(source.name),
             start_from=known,

@@ -3,12 +3,14 @@
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import Model
 from falsifier.errors import SpecError
 from falsifier.evaluation.cluster import connected
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -17,6 +19,8 @@ from falsifier.problem.problem import Problem
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
+T = TypeVar("T")
+
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
 # Filter in the format of python -W: warnings whose message starts with this word.
@@ -24,8 +28,11 @@ _TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
-def local_executor(jobs: int) -> Iterator[Executor | None]:
-    """Open an executor with this many local processes; None for one job, which runs in this process.
+def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
+    """Open an executor for so many simulations of a model at a time; None for one, in this thread.
+
+    A model that simulates in processes of its own needs only threads, each with its own such process: other
+    Python processes would take seconds to start. They are there for models in Python.
 
     Raises:
         SpecError: if jobs is not positive.
@@ -34,8 +41,12 @@ def local_executor(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    with _process_pool(jobs) as executor:
+    is_apart = getattr(model, "isolate", False)
+    executor = ThreadPoolExecutor(jobs) if is_apart else Renewing(lambda: _process_pool(jobs))
+    try:
         yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 @dataclass(slots=True)
@@ -87,22 +98,49 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
         workers.executor.shutdown(cancel_futures=True)
 
 
-def evaluate_all(
-    problem: Problem, candidates: Sequence[Candidate], executor: Executor | None
-) -> Iterator[Evaluation]:
-    """Yield the evaluations in the order of the candidates, each as soon as it and those before it are done.
+class Renewing(Executor):
+    """An executor that makes another one if the processes of the present one have died.
 
-    If a worker process dies, its evaluation has the status ``crashed``.
+    Args:
+        make: makes an executor.
+    """
+
+    def __init__(self, make: Callable[[], Executor]) -> None:
+        self._make = make
+        self._executor = make()
+
+    def submit(self, function: Callable[..., T], /, *args: Any, **options: Any) -> "Future[T]":
+        """Start a task."""
+        try:
+            return self._executor.submit(function, *args, **options)
+        except BrokenExecutor:
+            self._executor.shutdown(wait=False)
+            self._executor = self._make()
+            return self._executor.submit(function, *args, **options)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - as in the base class
+        """End the present executor."""
+        self._executor.shutdown(wait, cancel_futures=cancel_futures)
+
+
+def start(
+    problem: Problem, candidates: Sequence[Candidate], executor: Executor | None
+) -> list[Callable[[], Evaluation]]:
+    """Start to simulate candidates; return functions that wait for their evaluations, in order.
+
+    Without an executor, a function simulates when it is called. If a worker process dies, its evaluation has
+    the status ``crashed``.
     """
     if executor is None:
-        yield from (evaluate(problem, candidate) for candidate in candidates)
-        return
-    futures = [executor.submit(evaluate, problem, candidate) for candidate in candidates]
-    for candidate, future in zip(candidates, futures, strict=True):
-        try:
-            yield future.result()
-        except BrokenExecutor as error:
-            yield Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
+        return [partial(evaluate, problem, candidate) for candidate in candidates]
+    return [partial(_wait, c, executor.submit(evaluate, problem, c)) for c in candidates]
+
+
+def _wait(candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
+    try:
+        return future.result()
+    except BrokenExecutor as error:
+        return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
 
 
 def _check_jobs(jobs: int) -> None:

@@ -1,8 +1,8 @@
 """Simulation in worker processes: the side of the process that requests it.
 
-Each requesting process has one nursery, from which its workers are forked, and one worker per FMU and
-interface. A worker that crashes, hangs or leaks memory is replaced; the simulation that it was running raises
-a SimulationError.
+Each requesting process has one nursery, from which its workers are forked, and one worker per FMU, interface
+and thread. A worker that crashes, hangs or leaks memory is replaced; the simulation that it was running
+raises a SimulationError.
 """
 
 import atexit
@@ -271,7 +271,7 @@ class _Registry:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._nursery: Nursery | None = None
-        self._fmus: dict[tuple[str, str, bool], IsolatedFmu] = {}
+        self._fmus: dict[tuple[str, str, bool, int], IsolatedFmu] = {}
         atexit.register(self.close)
         os.register_at_fork(after_in_child=self.forget)
 
@@ -285,7 +285,7 @@ class _Registry:
             return self._nursery
 
     def fmu(self, order: Order) -> IsolatedFmu:
-        key = (order.sha256, order.interface, order.logging)
+        key = (order.sha256, order.interface, order.logging, threading.get_ident())
         found = self._fmus.get(key)
         if found is None:
             with self._lock:
@@ -294,9 +294,10 @@ class _Registry:
 
     def drop(self, sha256: str, interface: str, *, logging: bool = False) -> None:
         with self._lock:
-            found = self._fmus.pop((sha256, interface, logging), None)
-        if found is not None:
-            found.close()
+            keys = [key for key in self._fmus if key[:3] == (sha256, interface, logging)]
+            found = [self._fmus.pop(key) for key in keys]
+        for fmu in found:
+            fmu.close()
 
     def close(self) -> None:
         with self._lock:

@@ -1,15 +1,15 @@
 """The loop: ask, simulate, judge, tell, until every requirement is falsified or the budget is used up."""
 
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
-from falsifier.core.candidate import Candidate
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
@@ -25,12 +25,11 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
-from falsifier.search.findings import Finding
 from falsifier.search.levels import Level, reached
-from falsifier.search.parameterization import inexpressible
+from falsifier.search.moves import Ask, Costs, Move, Objective, Proposer, Situation, next_move
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Live, Steps
-from falsifier.search.vacuity import Vacuity
+from falsifier.search.targets import Target
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
@@ -41,8 +40,11 @@ def search(
     engines: Sequence[Engine],
     budget: Budget,
     *,
+    scouts: Sequence[Engine] = (),
+    objective: Objective | None = "simulations",
     steps: Steps | None = None,
-    batch: int = 1,
+    jobs: int = 1,
+    in_batches: bool = False,
     levels: Sequence[Level] = (),
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
@@ -57,8 +59,13 @@ def search(
         problems: what to falsify; they differ only in their requirement.
         engines: one per problem.
         budget: limits of the run.
+        scouts: one per problem for cheap proposals if time counts.
+        objective: what counts; if it is time, scouts simulate as long as that costs less than thinking. None:
+            time if they do.
         steps: how to ask, simulate and confirm; default: everything in this process.
-        batch: number of candidates to ask for and simulate at a time.
+        jobs: number of simulations at a time.
+        in_batches: whether an engine is asked for that many candidates at once, because each question costs;
+            otherwise it is asked for one whenever a simulation has ended.
         levels: the parts of the search space that the engines use, and from which simulation on; default: all
             of it.
         directory: where the run is recorded, to be stated in the results.
@@ -76,13 +83,14 @@ def search(
     check_limits(problems[0])
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
-    targets = [_Target(p, e) for p, e in zip(problems, engines, strict=True)]
+    beside = scouts if objective != "simulations" and scouts else [None] * len(problems)
+    targets = [Target(p, e, s) for p, e, s in zip(problems, engines, beside, strict=True)]
     levels = tuple(levels) or (Level(0, problems[0].space),)
-    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners))
+    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners), objective)
     status: ResultStatus
     try:
         loop.attach()
-        reason = loop.run(batch)
+        reason = loop.run(jobs, in_batches=in_batches)
         status = "not falsified"
         if loop.spent.has_mostly_failed:
             status, reason = "failed", loop.failure_text()
@@ -99,30 +107,12 @@ def search(
     return loop.end(status, reason)
 
 
-@dataclass(slots=True)
-class _Target:
-    """One requirement in a running search."""
+class _Started(NamedTuple):
+    """A candidate that is being simulated, or will be when its evaluation is waited for."""
 
-    problem: Problem
-    engine: Engine
-    evaluations: list[Evaluation] = field(default_factory=list)
-    doubtful: list[Confirmation] = field(default_factory=list)
-    best: Evaluation | None = None
-    counterexample: Confirmation | None = None
-    spent: Spent | None = None
-    vacuity: Vacuity = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.vacuity = Vacuity(self.problem)
-
-    def note(self, evaluation: Evaluation) -> bool:
-        """Add an evaluation; return whether it is the best so far."""
-        self.vacuity.see(evaluation, len(self.evaluations))
-        improved = _smaller(evaluation, self.best)
-        if improved:
-            self.best = evaluation
-        self.evaluations.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
-        return improved
+    target: Target
+    proposer: Proposer
+    wait: Callable[[], Evaluation]
 
 
 class _Loop:
@@ -130,12 +120,13 @@ class _Loop:
 
     def __init__(
         self,
-        targets: list[_Target],
+        targets: list[Target],
         levels: tuple[Level, ...],
         budget: Budget,
         steps: Steps,
         directory: Path | None,
         listeners: tuple[Listener, ...],
+        objective: Objective | None,
     ) -> None:
         self.targets = targets
         self.levels = levels
@@ -143,6 +134,11 @@ class _Loop:
         self.steps = steps
         self.directory = directory
         self.listeners = listeners
+        self.objective = objective
+        self.waiting: deque[_Started] = deque()
+        self.costs = Costs()
+        self.last: Proposer = "engine"
+        self.turns = self.untold_scouts = 0
         self.count = 0
         self.last_error = ""
         self.started = perf_counter() - steps.seconds
@@ -161,7 +157,7 @@ class _Loop:
             if isinstance(target.engine, FollowsRun):
                 target.engine.begin(self.budget.simulations)
 
-    def run(self, batch: int) -> str:
+    def run(self, jobs: int, *, in_batches: bool) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         self.emit(
             RunStarted(
@@ -173,33 +169,36 @@ class _Loop:
                 replayed=self.steps.replayed,
             )
         )
-        turns = 0
         while standing := [t for t in self.targets if t.counterexample is None]:
+            move = self.steps.move(self.count, lambda: self.decide(jobs, in_batches=in_batches))
+            if move is None:
+                self.settle(self.waiting.popleft(), standing)
+                continue
+            self.tell(standing)
             limit = self.budget.exceeded(self.clock())
             if limit is not None:
                 return limit
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
                 return self.failure_text()
-            turn = standing[turns % len(standing)]
-            turns += 1
-            told: dict[str, list[Evaluation]] = {t.problem.name: [] for t in standing}
             try:
-                candidates = self.ask(turn, batch)
+                self.ask(standing[self.turns % len(standing)], move)
             except LimitReached as reached:
                 return self.failure_text() if self.all_failed() else str(reached)
-            # One by one, as they finish: what an interruption leaves of a batch is counted and recorded.
-            for evaluation in self.steps.evaluate(turn.problem, candidates):
-                judged = [(t, evaluation if t is turn else judge(t.problem, evaluation)) for t in standing]
-                self.note(turn, evaluation, judged)
-                for target, seen in judged:
-                    told[target.problem.name].append(seen)
-                    self.consider(target, seen)
-            started = perf_counter()
-            for target in standing:
-                if target.counterexample is None:
-                    target.engine.tell(told[target.problem.name])
-            self.think(perf_counter() - started)
         return "all requirements are falsified"
+
+    def decide(self, jobs: int, *, in_batches: bool) -> Move:
+        """Decide on the next move."""
+        limit = self.budget.simulations
+        situation = Situation(
+            waiting=len(self.waiting),
+            last=self.last,
+            cores=jobs,
+            left=None if limit is None else limit - self.count - len(self.waiting),
+            in_batches=in_batches,
+            may_scout=self.targets[0].scout is not None,
+            costs=self.costs,
+        )
+        return next_move(situation)
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
@@ -212,29 +211,67 @@ class _Loop:
             failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
         return f"{failed} failed; the last error: {self.last_error}"
 
-    def ask(self, target: _Target, batch: int) -> list[Candidate]:
-        wanted = max(1, self.budget.remaining(self.spent, batch))
-        candidates, wanted, seconds = self.steps.ask(target.problem, target.engine, wanted)
-        if isinstance(target.engine, FollowsRun):
-            target.engine.timed(seconds)
+    def ask(self, target: Target, move: Ask) -> None:
+        """Ask for candidates, and start to simulate them."""
+        engine = target.scout if move.proposer == "scout" else target.engine
+        assert engine is not None
+        candidates, wanted, seconds = self.steps.ask(target.problem, engine, move.n)
+        if isinstance(engine, FollowsRun):
+            engine.timed(seconds)
+        self.turns += move.proposer == "engine"
+        self.last = move.proposer
+        self.costs = self.costs.asked(move.proposer, len(candidates), seconds)
         self.think(seconds)
         self.emit(
             Asked(
-                first=self.count,
+                first=self.count + len(self.waiting),
                 wanted=wanted,
                 candidates=tuple(candidates),
                 seconds=seconds,
                 problem=target.problem,
+                proposer=move.proposer,
+                told=self.count,
             )
         )
-        return candidates
+        started = self.steps.start(target.problem, candidates)
+        self.waiting.extend(_Started(target, move.proposer, wait) for wait in started)
+
+    def settle(self, started: _Started, standing: Sequence[Target]) -> None:
+        """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
+
+        Simulations end in the order in which they were asked for, so that a run does not depend on which one
+        is faster. What an interruption leaves of them is counted and recorded.
+        """
+        evaluation = started.wait()
+        # Also against the one whose engine proposed it, because a resumed run needs that verdict.
+        judges = standing if started.target in standing else [started.target, *standing]
+        judged = [(t, evaluation if t is started.target else judge(t.problem, evaluation)) for t in judges]
+        self.costs = self.costs.simulated(started.proposer, evaluation.seconds)
+        self.untold_scouts += started.proposer == "scout"
+        self.note(started, evaluation, judged)
+        for target, seen in judged:
+            target.untold.append(seen)
+            self.consider(target, seen)
+
+    def tell(self, standing: Sequence[Target]) -> None:
+        """Tell the engines what was simulated since they were told last."""
+        count = max((len(target.untold) for target in standing), default=0)
+        seconds = 0.0
+        for target in standing:
+            evaluations, target.untold = target.untold, []
+            told = [engine for engine in (target.engine, target.scout) if engine is not None and evaluations]
+            seconds += sum(self.steps.tell(engine, evaluations) for engine in told)
+        if count:
+            self.costs = self.costs.told(self.untold_scouts / count, seconds)
+            self.untold_scouts = 0
+            self.think(seconds)
 
     def think(self, seconds: float) -> None:
         """Add to the time spent in engines."""
         self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
 
     def note(
-        self, turn: _Target, evaluation: Evaluation, judged: Sequence[tuple[_Target, Evaluation]]
+        self, started: _Started, evaluation: Evaluation, judged: Sequence[tuple[Target, Evaluation]]
     ) -> None:
         """Count and announce one simulation, judged against each requirement not yet falsified."""
         improved = [target.note(seen) for target, seen in judged]
@@ -245,22 +282,23 @@ class _Loop:
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
             failures=self.spent.failures + failed,
+            scouts=self.spent.scouts + (started.proposer == "scout"),
         )
         self.emit(
             Evaluated(
                 index=self.count,
-                problem=turn.problem,
+                problem=started.target.problem,
                 evaluation=evaluation,
                 judged={target.problem.name: seen for target, seen in judged},
                 improved=any(improved),
-                best=turn.best,
+                best=started.target.best,
                 spent=self.spent,
                 replayed=self.count < self.steps.replayed,
             )
         )
         self.count += 1
 
-    def consider(self, target: _Target, evaluation: Evaluation) -> None:
+    def consider(self, target: Target, evaluation: Evaluation) -> None:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
         if not evaluation.violated or target.counterexample is not None:
             return
@@ -316,19 +354,7 @@ class _Loop:
         self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
         return [replace(result, unrecorded=self.unrecorded) for result in results]
 
-    def findings(self, target: _Target) -> tuple[Finding, ...]:
-        """Return what the search could not show about a requirement that it did not falsify."""
-        if target.best is None:
-            return ()
-        limits = inexpressible(target.problem, self.levels, len(target.evaluations))
-        return (*target.vacuity.findings(), *([limits] if limits else []))
-
-    def remarks(self, target: _Target) -> tuple[str, ...]:
-        """Return what the engine of a requirement says of how it worked."""
-        engine = target.engine
-        return engine.remarks(target.evaluations) if isinstance(engine, HasRemarks) else ()
-
-    def result(self, target: _Target, status: ResultStatus, reason: str) -> Result:
+    def result(self, target: Target, status: ResultStatus, reason: str) -> Result:
         found = target.counterexample
         begun = reached(self.levels, len(target.evaluations))
         return Result(
@@ -343,9 +369,10 @@ class _Loop:
             spent=target.spent or self.clock(),
             searched=begun[-1].space,
             levels=self.levels if len(self.levels) > 1 else (),
-            findings=() if found is not None else self.findings(target),
+            findings=() if found is not None else target.findings(self.levels),
             directory=self.directory,
-            remarks=self.remarks(target),
+            remarks=target.remarks,
+            objective=self.objective or ("time" if self.spent.scouts else "simulations"),
         )
 
 
@@ -356,9 +383,3 @@ def _check_alike(one: Problem, other: Problem) -> None:
             f"{one.name} and {other.name} differ in what is varied or in how it is simulated, so they cannot "
             "share a search: falsify them one after the other"
         )
-
-
-def _smaller(evaluation: Evaluation, best: Evaluation | None) -> bool:
-    if evaluation.robustness is None:
-        return False
-    return best is None or best.robustness is None or evaluation.robustness < best.robustness

@@ -5,9 +5,9 @@ confirmations and replies of a language model come from the journal and cost not
 valid reply that ended a run is asked again; it stays paid for.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby
+from functools import partial
 from pathlib import Path
 
 from falsifier.core.candidate import Candidate
@@ -21,6 +21,7 @@ from falsifier.llm.replay import RecordedChat, Recording
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.journal import recorded_evaluations
+from falsifier.search.moves import Ask, Move
 from falsifier.search.proposals import proposals
 from falsifier.search.records import (
     AskedRecord,
@@ -60,6 +61,13 @@ class Replayed:
     def __post_init__(self) -> None:
         self.replayed = len(self.evaluations)
 
+    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
+        """Repeat the recorded moves: ask the same proposer once as much has been told as then."""
+        if not self.asked.get(self._next):
+            return decide()
+        record = self.asked[self._next][0]
+        return Ask(record.proposer, record.n) if settled >= record.told else None
+
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Let the engine repeat its recorded suggestions.
 
@@ -78,15 +86,19 @@ class Replayed:
             )
         return candidates, record.n, record.seconds
 
-    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Yield recorded evaluations, and live ones of candidates without."""
-        numbered = list(enumerate(candidates, self._next))
-        self._next += len(candidates)
-        for is_recorded, group in groupby(numbered, lambda pair: pair[0] in self.evaluations):
-            if is_recorded:
-                yield from (_with_trajectory(problem, self.evaluations[index]) for index, _ in group)
-            else:
-                yield from self.live.evaluate(problem, [candidate for _, candidate in group])
+    def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
+        """Return functions for recorded evaluations, and start live ones of candidates without."""
+        first, self._next = self._next, self._next + len(candidates)
+        return [
+            partial(_with_trajectory, problem, self.evaluations[index])
+            if index in self.evaluations
+            else self.live.start(problem, [candidate])[0]
+            for index, candidate in enumerate(candidates, first)
+        ]
+
+    def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
+        """Tell the engine, which has to learn again what it had learnt."""
+        return self.live.tell(engine, evaluations)
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
         """Return the recorded confirmation of a violation; without one, confirm it."""

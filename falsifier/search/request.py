@@ -9,6 +9,7 @@ from falsifier.llm.messages import ReplyKind
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
+from falsifier.search.moves import Objective
 
 Effort = Literal["none", "minimal", "low", "medium", "high"]
 # A negative price, or one that is not a number, would switch off the limit on the cost.
@@ -66,6 +67,10 @@ class RunRequest(_Strict):
     seed: int = Field(default=0, ge=0)
     budget: Budget = Budget()
     jobs: int = Field(default=1, ge=1)
+    objective: Objective | None = Field(
+        default="simulations",
+        description="What counts; null: time as long as a simulation takes less of it than a proposal.",
+    )
     keep: Keep = "history"
     levels: tuple[int, ...] = Field(
         default=(),

@@ -11,7 +11,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
 from falsifier.engines import ENGINES
-from falsifier.engines.protocol import Engine
+from falsifier.engines.protocol import AsksLLM, Engine
 from falsifier.engines.starting import Starting
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
@@ -21,13 +21,14 @@ from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.search import manifest
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search.budget import Budget, budget_of, what_counts
 from falsifier.search.events import Listener
 from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
-from falsifier.search.leaders import make_engines
+from falsifier.search.leaders import make_engines, make_scouts
 from falsifier.search.levels import Level
 from falsifier.search.loop import search
 from falsifier.search.manifest import Manifest
+from falsifier.search.moves import Objective
 from falsifier.search.refine import level_starts, levels_of, make_refining
 from falsifier.search.replay import replayed
 from falsifier.search.request import LLMSettings, RunRequest
@@ -44,7 +45,8 @@ def falsify(
     engine: str | Engine | None = ...,
     *,
     llm: LLM | None = ...,
-    budget: Budget | int = ...,
+    budget: Budget | int | None = ...,
+    objective: Objective | None = ...,
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
@@ -60,7 +62,8 @@ def falsify(
     engine: str | None = ...,
     *,
     llm: LLM | None = ...,
-    budget: Budget | int = ...,
+    budget: Budget | int | None = ...,
+    objective: Objective | None = ...,
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
@@ -77,7 +80,8 @@ def falsify(
     engine: str | None = ...,
     *,
     llm: LLM | None = ...,
-    budget: Budget | int = ...,
+    budget: Budget | int | None = ...,
+    objective: Objective | None = ...,
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
@@ -92,7 +96,8 @@ def falsify(
     engine: str | Engine | None = None,
     *,
     llm: LLM | None = None,
-    budget: Budget | int = DEFAULT_SIMULATIONS,
+    budget: Budget | int | None = None,
+    objective: Objective | None = None,
     seed: int = 0,
     directory: Path | str | None = None,
     jobs: int = 1,
@@ -111,7 +116,12 @@ def falsify(
         engine: name of an engine, or an engine made in Python; default: ``surrogate``, or the language model
             if one is given.
         llm: name of a language model such as ``"openai/gpt-5-mini"``, its settings, or a chat with it.
-        budget: limits; a plain number limits the simulations.
+        budget: limits; a plain number limits the simulations. Default: 100 simulations, or 60 s if time is
+            the objective.
+        objective: ``"simulations"``: find a violation in few simulations; ``"time"``: in little time, so
+            that cheap proposals are simulated while the engine thinks or beside it, as long as a simulation
+            takes less time than a proposal. Default: simulations if the budget limits their number,
+            otherwise time.
         seed: seed of an engine given by name.
         directory: where to record the run, so that it can be resumed; None: no record.
         jobs: number of simulations at a time.
@@ -142,7 +152,10 @@ def falsify(
     problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
     check_names(problems)
     _check_engine(engine)
-    seed, jobs, limits = whole("seed", seed, least=0), whole("jobs", jobs, least=1), _budget(budget)
+    seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)
+    limits = _budget(budget, objective)
+    if objective not in (None, "simulations", "time"):
+        raise SpecError(f"objective: expected 'simulations' or 'time', got {objective!r}")
     if refine and not isinstance(engine, str | None):
         raise SpecError("refine: each level has an engine of its own: pass the name of an engine instead")
     groups, known = alike(problems), list(start_from)
@@ -160,6 +173,7 @@ def falsify(
             seed=seed,
             budget=limits,
             jobs=jobs,
+            objective=what_counts(objective, limits),
             start_from=tuple(fit(space, each).candidate.to_json() for each in known),
         )
         place = None if directory is None else Path(directory)
@@ -284,9 +298,12 @@ def carry_out(
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         levels = levels_of(request, problems[0].space)
         made = [engine] if engine is not None else _engines(request, problems, levels, chat)
+        scouts = make_scouts(request, problems)
         known = deque(map(Candidate.from_json, request.start_from))
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
-        live = Live(stack.enter_context(local_executor(request.jobs)))
+        for problem in problems:
+            stack.callback(problem.model.close)
+        live = Live(stack.enter_context(local_executor(request.jobs, problems[0].model)))
         steps: Steps = live
         all_listeners = tuple(listeners)
         if directory is not None:
@@ -298,14 +315,15 @@ def carry_out(
                 write_manifest(directory, described.model_dump(mode="json"))
             steps = replayed(directory, journal.records, live)
             all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
-        for problem in problems:
-            stack.callback(problem.model.close)
         return search(
             problems,
             engines,
             request.budget,
             steps=steps,
-            batch=request.jobs,
+            scouts=scouts,
+            objective=request.objective,
+            jobs=request.jobs,
+            in_batches=bool(request.levels) or any(isinstance(each, AsksLLM) for each in made),
             levels=levels,
             directory=directory,
             listeners=all_listeners,
@@ -354,8 +372,10 @@ def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
     return tuple(s for s in sources if s is not None) if all(sources) else ()
 
 
-def _budget(given: Budget | int) -> Budget:
-    return given if isinstance(given, Budget) else Budget(whole("budget", given, least=1))
+def _budget(given: Budget | int | None, objective: Objective | None = None) -> Budget:
+    if isinstance(given, Budget):
+        return given
+    return budget_of(None if given is None else whole("budget", given, least=1), objective=objective)
 
 
 def _settings(llm: LLM | None) -> LLMSettings | None:

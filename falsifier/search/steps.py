@@ -1,6 +1,6 @@
 """The steps of the loop that touch the world: asking engines, simulating, confirming."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -10,10 +10,11 @@ from falsifier.core.candidate import Candidate
 from falsifier.engines.protocol import Engine
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.evaluation.workers import evaluate_all
+from falsifier.evaluation.workers import start
 from falsifier.llm.messages import Chat
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
+from falsifier.search.moves import Move
 from falsifier.search.proposals import proposals
 
 
@@ -35,12 +36,25 @@ class Steps(Protocol):
         """What the recorded part spent on questions to a language model that are not played back."""
         ...
 
+    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
+        """Return what to do next.
+
+        Args:
+            settled: number of evaluations so far.
+            decide: decides it from what was measured.
+        """
+        ...
+
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
         ...
 
-    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
-        """Yield the candidates' evaluations in order."""
+    def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
+        """Start to simulate candidates; return functions that wait for their evaluations, in order."""
+        ...
+
+    def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
+        """Tell an engine; return the time that took in s."""
         ...
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
@@ -65,15 +79,25 @@ class Live:
     seconds: float = 0.0
     unrepeated: Spent = field(default_factory=Spent)
 
+    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
+        """Decide; the number of evaluations is for replay only."""
+        return decide()
+
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Ask the engine, and measure the time."""
         started = perf_counter()
         candidates = proposals(engine, problem.space, wanted)
         return candidates, wanted, perf_counter() - started
 
-    def evaluate(self, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[Evaluation]:
+    def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
         """Simulate and judge on the executor."""
-        return evaluate_all(problem, candidates, self.executor)
+        return start(problem, candidates, self.executor)
+
+    def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
+        """Tell the engine, and measure the time."""
+        started = perf_counter()
+        engine.tell(evaluations)
+        return perf_counter() - started
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
         """Simulate again with a fresh instance; the index is for replay only."""

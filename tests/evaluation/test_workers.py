@@ -5,17 +5,22 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import TYPE_CHECKING
+from threading import Barrier
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SpecError
-from falsifier.evaluation.workers import local_executor, open_workers
+from falsifier.evaluation.workers import Renewing, local_executor, open_workers
+from falsifier.fmu.isolation import REGISTRY
+from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
-from tests.patience import wait_until
+from tests.fmu.fixtures import isolated, ramp, run
+from tests.patience import HANG, wait_until
 from tests.problems import BEGUN, HOLD, RELEASE
 
 if TYPE_CHECKING:
@@ -78,8 +83,55 @@ def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
     before = logger.level
     logger.setLevel(logging.ERROR)
     try:
-        with local_executor(2) as executor:
+        with local_executor(2, lag_problem().model) as executor:
             assert executor is not None
             assert executor.submit(level).result() == logging.ERROR
     finally:
         logger.setLevel(before)
+
+
+def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:
+    model = isolated("Lag_2")
+    together = Barrier(2)
+
+    def simulate(level: float) -> float:
+        together.wait(HANG)
+        return float(run(model, ("y",), signals={"u": ramp(1.0, level)})["y"][-1])
+
+    def workers() -> int:
+        return sum(key[0] == model.sha256 for key in REGISTRY._fmus)
+
+    with local_executor(2, model) as executor:
+        assert executor is not None
+        one, two = executor.map(simulate, (1.0, 2.0))
+        assert two == pytest.approx(2 * one) and one > 0
+        assert workers() == 2
+    model.close()
+    assert workers() == 0
+
+
+class Mortal(ThreadPoolExecutor):
+    """An executor that is broken after its first task, as a pool is if one of its processes is killed."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.tasks = 0
+
+    def submit(self, *args: Any, **options: Any) -> "Future[Any]":
+        self.tasks += 1
+        if self.tasks > 1:
+            raise BrokenProcessPool("a process was terminated abruptly")
+        return super().submit(*args, **options)
+
+
+def test_processes_that_died_are_replaced() -> None:
+    made: list[Mortal] = []
+
+    def make() -> Mortal:
+        made.append(Mortal())
+        return made[-1]
+
+    executor = Renewing(make)
+    assert [executor.submit(abs, -i).result() for i in range(3)] == [0, 1, 2]
+    assert len(made) == 3
+    executor.shutdown()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.search.budget import Budget, Spent
+from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS, Budget, Spent, budget_of
 
 
 @pytest.mark.parametrize(
@@ -38,9 +38,12 @@ def test_a_budget_needs_a_positive_limit() -> None:
         Budget(0)
 
 
-def test_remaining_cuts_a_batch() -> None:
-    assert Budget(10).remaining(Spent(simulations=8), 4) == 2
-    assert Budget(None, seconds=1).remaining(Spent(simulations=8), 4) == 4
+def test_time_as_the_objective_does_not_limit_simulations_by_default() -> None:
+    assert budget_of(None) == Budget(DEFAULT_SIMULATIONS)
+    assert budget_of(None, 5.0) == Budget(DEFAULT_SIMULATIONS, 5.0)
+    assert budget_of(None, objective="time") == Budget(None, DEFAULT_SECONDS)
+    assert budget_of(None, 5.0, objective="time") == Budget(None, 5.0)
+    assert budget_of(7, objective="time") == Budget(7)
 
 
 def test_whole_numbers_of_numpy_become_ints() -> None:

@@ -15,10 +15,10 @@ from tests.search.test_tally import evaluated
 def test_candidates_are_found_in_batches(tmp_path: Path) -> None:
     lines: list[Record] = [
         AskedRecord(
-            first=0, n=2, candidates=[{"origin": "a"}, {"origin": "b"}], seconds=0.1, requirement="R"
+            first=0, n=2, candidates=[{"origin": "a"}, {"origin": "b"}], seconds=0.1, requirement="R", told=0
         ),
         evaluated(0, 1.0),
-        AskedRecord(first=2, n=2, candidates=[{"origin": "c"}], seconds=0.1, requirement="R"),
+        AskedRecord(first=2, n=2, candidates=[{"origin": "c"}], seconds=0.1, requirement="R", told=1),
     ]
     (tmp_path / "journal.jsonl").write_bytes(b"".join(line_of(line, i) for i, line in enumerate(lines, 1)))
     found = recorded_candidates(read_journal(tmp_path))

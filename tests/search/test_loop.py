@@ -115,10 +115,10 @@ def test_batches_are_told_in_the_order_of_asking() -> None:
             [problem],
             [make_engine("uniform", problem, seed=5)],
             Budget(10),
-            batch=4,
+            jobs=4,
             steps=Live(executor),
         )
-    (alone,) = search([problem], [make_engine("uniform", problem, seed=5)], Budget(10), batch=4)
+    (alone,) = search([problem], [make_engine("uniform", problem, seed=5)], Budget(10), jobs=4)
     assert len(parallel.evaluations) == 10
     assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
 

@@ -7,7 +7,9 @@ from falsifier.search.records import AskedRecord, ExchangeRecord, Record
 
 
 def asked(first: int, count: int = 1) -> AskedRecord:
-    return AskedRecord(first=first, n=count, candidates=[{}] * count, seconds=0.0, requirement="R")
+    return AskedRecord(
+        first=first, n=count, candidates=[{}] * count, seconds=0.0, requirement="R", told=first
+    )
 
 
 def exchange(text: str) -> ExchangeRecord:

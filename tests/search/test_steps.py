@@ -1,5 +1,6 @@
 from falsifier.engines.uniform import Uniform
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.search.moves import Ask
 from falsifier.search.steps import Live
 from falsifier.testing import lag_problem
 
@@ -8,8 +9,10 @@ def test_every_step_is_carried_out() -> None:
     problem, steps = lag_problem(), Live()
     candidates, wanted, seconds = steps.ask(problem, Uniform(problem, seed=1), 3)
     assert (len(candidates), wanted) == (3, 3) and seconds > 0
-    evaluations = list(steps.evaluate(problem, candidates))
+    evaluations = [wait() for wait in steps.start(problem, candidates)]
     assert [e.candidate for e in evaluations] == candidates
+    assert steps.tell(Uniform(problem, seed=1), evaluations) > 0
+    assert steps.move(3, lambda: Ask("engine", 2)) == Ask("engine", 2)
     worst = min(evaluations, key=lambda e: e.robustness or 0.0)
     assert steps.confirm(problem, worst, 0).robustness == worst.robustness
     chat = ScriptedChat([])

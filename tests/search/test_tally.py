@@ -41,7 +41,7 @@ def confirmed(index: int, outcome: Outcome, reason: str, **spent: float | None) 
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     tally = Tally()
     assert status(tally) == "waiting"
-    tally.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R"))
+    tally.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", told=0))
     assert status(tally) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         tally.add(evaluated(i, robustness))

@@ -111,7 +111,12 @@ class History:
 
     def direct_costs(self) -> list[float]:
         """Return the costs of all samples for the search without dynamics, see ``direct_cost``."""
-        return [self.direct_cost(s) for s in self.samples]
+        if not self.samples or self.objective is None or not self.objective.is_relaxed:
+            return [s.robustness for s in self.samples]
+        relaxed = scaled_costs(self.samples, self.scaled_objective()).tolist()
+        return [
+            s.robustness if s.robustness < 0 else cost for s, cost in zip(self.samples, relaxed, strict=True)
+        ]
 
     def direct_cost(self, sample: Sample) -> float:
         """Return the robustness if it is negative or has a slope, else the mean of the relaxed formulas'."""

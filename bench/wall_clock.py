@@ -1,0 +1,117 @@
+"""How long does it take until the first violation, by the clock?
+
+    python bench/wall_clock.py                                    # engines beside the surrogate, one core
+    python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a CC3 AFC27
+    python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a CC5 --slower 0.5
+
+A method is an engine, with the objective after a colon. A run that finds nothing in --seconds counts as that.
+The methods take turns seed by seed, so that another load of the machine hits all of them. Seconds are those
+of a run until its counterexample is confirmed, with the start of the FMU and of worker processes, without
+loading the spec; --slower lets each simulation wait that much longer, as a larger FMU would take.
+Committed result: bench/wall_clock.md.
+"""
+
+import argparse
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from statistics import mean, stdev
+
+# For the engines' small matrices, threads of the linear algebra cost more than they save.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from falsifier import Budget, Problem, Result, falsify, load_problem
+from falsifier.core.model import Experiment, Model, ModelInfo
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
+
+REQUIREMENTS = ("AT1", "AT6a", "CC3", "PulseMeter", "ChargerHandshake", "HeaterLimpHome")
+METHODS = ("surrogate:time", "surrogate:simulations", "uniform", "corners", "cma", "coverage")
+
+
+@dataclass(frozen=True)
+class Slower:
+    """A model whose simulations wait."""
+
+    model: Model
+    seconds: float
+
+    @property
+    def info(self) -> ModelInfo:
+        """What the model says of itself."""
+        return self.model.info
+
+    @property
+    def isolate(self) -> bool:
+        """Whether it simulates in processes of its own."""
+        return bool(getattr(self.model, "isolate", False))
+
+    def simulate(
+        self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
+    ) -> Trajectory:
+        """Wait, then simulate."""
+        time.sleep(self.seconds)
+        return self.model.simulate(signals, parameters, experiment)
+
+    def close(self) -> None:
+        """Release the model."""
+        self.model.close()
+
+
+def run(problem: Problem, method: str, *, jobs: int, seed: int, seconds: float) -> Result:
+    """Search with one method."""
+    engine, _, objective = method.partition(":")
+    return falsify(
+        problem,
+        engine,
+        objective="time" if objective == "time" else "simulations",
+        budget=Budget(None, seconds=seconds),
+        jobs=jobs,
+        seed=seed,
+    )
+
+
+def cells(results: list[Result], limit: float) -> list[str]:
+    """Falsified runs, simulations and seconds; a run that found nothing counts as the limit."""
+    seconds = [r.spent.seconds if r.falsified else limit for r in results]
+    simulations = [r.spent.simulations for r in results if r.falsified]
+    error = f" ± {stdev(seconds) / len(seconds) ** 0.5:.1f}" if len(seconds) > 1 else ""
+    return [
+        f"{len(simulations)}/{len(results)}",
+        f"{mean(simulations):.1f}" if simulations else "–",
+        f"{mean(seconds):.1f}{error}",
+    ]
+
+
+def main() -> None:
+    """Print one line per requirement and method."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS, metavar="NAME")
+    parser.add_argument("--methods", nargs="+", default=METHODS, metavar="ENGINE[:time]")
+    parser.add_argument("--jobs", nargs="+", type=int, default=[1])
+    parser.add_argument("--slower", type=float, default=0.0, metavar="SECONDS")
+    parser.add_argument("--seconds", type=float, default=60.0, help="limit of each run")
+    parser.add_argument("--seeds", type=int, nargs=2, default=(100, 104), metavar=("FIRST", "LAST"))
+    options = parser.parse_args()
+    print("| requirement | method | jobs | FR | simulations | seconds |\n|---|---|---|---|---|---|")
+    for name in options.requirements:
+        problem = load_problem(name)
+        if options.slower:
+            problem = replace(problem, model=Slower(problem.model, options.slower))
+        run(problem, "corners", jobs=1, seed=0, seconds=5.0)  # compiles what is compiled once
+        ways = list(product(options.methods, options.jobs))
+        results: dict[tuple[str, int], list[Result]] = {way: [] for way in ways}
+        for seed in range(options.seeds[0], options.seeds[1] + 1):
+            for method, jobs in ways:
+                found = run(problem, method, jobs=jobs, seed=seed, seconds=options.seconds)
+                results[method, jobs].append(found)
+        for (method, jobs), all_found in results.items():
+            words = " | ".join(cells(all_found, options.seconds))
+            print(f"| {name} | {method} | {jobs} | {words} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
