@@ -5,7 +5,6 @@ import ctypes
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Variable
 from falsifier.errors import ModelError
 from falsifier.fmu import continuous, solver
 from falsifier.fmu.buffers import Room
@@ -13,12 +12,11 @@ from falsifier.fmu.continuous import Memory, Model, make_memory
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle
-from falsifier.fmu.plan import Plan
+from falsifier.fmu.plan import Plan, solver_tolerance
 from falsifier.fmu.stepper import Stepper
 
 # Solver steps between two checks of the time limit.
 _STEPS_PER_CLOCK_CHECK = 2000
-_DEFAULT_TOLERANCE = 1e-6
 # Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7).
 _ABSOLUTE_SHARE = 0.01
 # Maximum number of states, and of event indicators: an FMU may report anything.
@@ -64,7 +62,7 @@ class ModelExchange(Stepper):
         self._lifecycle = lifecycle
         self._addresses = [library.address(name) if name else 0 for name in _NAMES[description.major]]
         self._states, self._indicators = self._sizes(description)
-        self._tolerance = plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE
+        self._tolerance = solver_tolerance(plan, description.info)
 
     def advance(self, deadline: float) -> None:
         """Solve the differential equation up to the stop time.
@@ -132,9 +130,6 @@ class ModelExchange(Stepper):
         )
         status = function(self._library.component, values.ctypes.data, values.size)
         self._check(status, self._loops.GETTING if status > 1 else self._loops.DONE, 0.0)
-
-    def _is_held(self, variable: Variable) -> bool:
-        return variable.kind != "real" or variable.variability != "continuous"
 
     def _sizes(self, description: Description) -> tuple[int, int]:
         """Return the number of states and of event indicators; FMI 3 reports them only at run time."""

@@ -77,7 +77,7 @@ class _Nursery:
         connection, log = descriptors
         try:
             folder = self._extracted(order)
-            if order.interface == "model-exchange":
+            if order.interface == "model-exchange" and not order.through_wine:
                 self._load_solver()
             if order.network is not None:
                 self._load_master()
