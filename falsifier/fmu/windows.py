@@ -55,11 +55,11 @@ class WindowsInstance:
         self._plan: Plan | None = None
         self._saved = False
         self._rooms = 0
-        try:
-            self._wine = WineProcess(scratch, log)
-            self._ask(_LOAD, _fmu(description, folder, interface, logging=logging))
-        except SimulationError as error:
-            raise ModelError(str(error)) from error
+        self._wine = WineProcess(scratch, log)
+        answer = self._wine.request(_LOAD, _fmu(description, folder, interface, logging=logging))
+        if answer.where != _DONE:
+            self._wine.close()
+            raise ModelError(f"{self._name}: {answer.text}")
 
     @property
     def saves_state(self) -> bool:
@@ -141,12 +141,6 @@ class WindowsInstance:
     def close(self) -> None:
         """See Instance."""
         self._wine.close()
-
-    def _ask(self, kind: int, payload: bytes) -> None:
-        answer = self._wine.request(kind, payload)
-        if answer.where != _DONE:
-            self._wine.close()
-            raise ModelError(f"{self._name}: {answer.text}")
 
     def _share(self, plan: Plan) -> Path:
         """Make the file that both processes map, laid out as a Room; return its path."""

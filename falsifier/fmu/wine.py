@@ -101,14 +101,14 @@ class WineProcess:
         folder: the process's own folder.
 
     Raises:
-        ModelError: if Wine is not installed.
+        ModelError: if Wine is not installed, or cannot run the worker.
     """
 
     def __init__(self, scratch: Path, log: Callable[[str], None]) -> None:
         wine = find_wine()
         if wine is None:
             raise ModelError(f"Windows libraries run through Wine, which is missing: {HOW_TO_INSTALL}")
-        self._log = log
+        self._wine, self._log, self._connected = wine, log, False
         self.folder = Path(tempfile.mkdtemp(prefix="wine-", dir=scratch))
         prefix, replies = self.folder / "prefix", self.folder / "replies"
         _make_prefix(prefix)
@@ -123,6 +123,7 @@ class WineProcess:
         )
         self._life = posix.open_life(self._process.pid)
         self.request(_CONNECT, text(windows_path(replies)))
+        self._connected = True
 
     def request(self, kind: int, payload: bytes = b"") -> Answer:
         """Send a request and wait for its outcome, however long that takes."""
@@ -178,7 +179,14 @@ class WineProcess:
         return some or self._end_alike(self._process.wait())
 
     def _end_alike(self, code: int) -> NoReturn:
-        """End this process as the FMU's has ended: with its exit code, or the signal for its exception."""
+        """End this process as the FMU's has ended: with its exit code, or the signal for its exception.
+
+        Raises:
+            ModelError: if that was before anything of the FMU was loaded.
+        """
+        if not self._connected:
+            self.close()
+            raise ModelError(f"{self._wine} cannot run {WORKER} (exit code {code}); is it a 64-bit Wine?")
         found = _SIGNALS.get(code) or (-code if code < 0 else None)
         if found is not None:
             os.kill(os.getpid(), found)
@@ -214,6 +222,7 @@ def _environment(folder: Path, prefix: Path) -> dict[str, str]:
         **kept,
         "WINEPREFIX": str(prefix),
         "WINEARCH": "win64",
+        "LC_ALL": "C.UTF-8",  # for the names of files
         "WINEDEBUG": "-all",
         "WINEDLLOVERRIDES": _OVERRIDES,
         # Without an installation, Wine finds its own libraries only in this mode.
