@@ -5,7 +5,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test lint types pytest docs notebooks fmus clean
+.PHONY: demo test lint types pytest docs notebooks fmus windows-worker clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
@@ -34,6 +34,10 @@ notebooks: .venv/test
 # different versions of the antlr runtime.
 fmus: .venv-export/installed
 	$(MAKE) -C modelica PYTHON=$(CURDIR)/.venv-export/bin/python fmus
+
+# Rebuilds the program that runs Windows libraries through Wine, if its sources have changed.
+windows-worker: .venv-export/installed
+	$(MAKE) -C falsifier/fmu/windows_worker ZIG="$(CURDIR)/.venv-export/bin/python -m ziglang"
 
 .venv/installed: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is required; install it, or run make PYTHON=/path/to/python3"; exit 2; }

@@ -41,6 +41,8 @@ _OLD_PLATFORMS = {
     "win32": "x86-windows",
     "darwin64": "x86_64-darwin",
 }
+# The platform whose libraries run on Linux too, through Wine.
+WINDOWS = "x86_64-windows"
 _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
@@ -135,18 +137,24 @@ def this_platform() -> str:
     return f"{_MACHINES.get(machine, machine)}-{system}"
 
 
-def binary_folder(fmi_version: str) -> str:
-    """Return this platform's folder below ``binaries`` for an FMU of this version."""
-    here = this_platform()
+def binary_folder(fmi_version: str, platform: str = "") -> str:
+    """Return a platform's folder below ``binaries`` for an FMU of this version.
+
+    Args:
+        fmi_version: FMI version of the FMU.
+        platform: FMI 3 name of the platform; empty for this one.
+    """
+    platform = platform or this_platform()
     if fmi_version.startswith("3"):
-        return here
-    return next((old for old, new in _OLD_PLATFORMS.items() if new == here), here)
+        return platform
+    return next((old for old, new in _OLD_PLATFORMS.items() if new == platform), platform)
 
 
-def library_file(fmi_version: str, identifier: str) -> PurePosixPath:
-    """Return the path of this platform's library inside an FMU."""
-    suffix = _LIBRARY_SUFFIX.get(_SYSTEMS.get(sys.platform, ""), ".so")
-    return PurePosixPath("binaries", binary_folder(fmi_version), identifier + suffix)
+def library_file(fmi_version: str, identifier: str, platform: str = "") -> PurePosixPath:
+    """Return the path of a platform's library inside an FMU; arguments as for binary_folder."""
+    platform = platform or this_platform()
+    suffix = _LIBRARY_SUFFIX.get(platform.rpartition("-")[2], ".so")
+    return PurePosixPath("binaries", binary_folder(fmi_version, platform), identifier + suffix)
 
 
 def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:

@@ -4,7 +4,6 @@ import time
 
 import numpy as np
 
-from falsifier.core.model import Variable
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
@@ -68,6 +67,3 @@ class CoSimulation(Stepper):
             first = last
             if time.perf_counter() - started < QUICK_SECONDS:
                 chunk *= CHUNK_GROWTH
-
-    def _is_held(self, variable: Variable) -> bool:
-        return self._in_event_mode and variable.variability != "continuous"

@@ -19,6 +19,7 @@ from falsifier.fmu import archive
 from falsifier.fmu.libraries import find_libraries
 from falsifier.fmu.remarks import input_clocks, remarks, with_aliases_marked
 from falsifier.fmu.slot import Slot
+from falsifier.fmu.wine import can_run_windows, windows_text
 
 # Element name -> (kind, type code). The type code names the FMU's get and set functions for the value.
 _TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
@@ -65,6 +66,7 @@ class Description:
         token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
         identifiers: model identifier by interface.
         libraries: path of this platform's library inside the archive, by interface; missing if there is none.
+        windows_libraries: the same for 64-bit Windows.
         slots: how to access each scalar variable, by name.
         arrays: start values of all elements by value reference, for arrays only.
         states: number of continuous states (FMI 1 and 2; FMI 3 reports it at run time).
@@ -79,6 +81,7 @@ class Description:
     identifiers: Mapping[Interface, str]
     slots: Mapping[str, Slot]
     libraries: Mapping[Interface, PurePosixPath] = field(default_factory=dict)
+    windows_libraries: Mapping[Interface, PurePosixPath] = field(default_factory=dict)
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     states: int = 0
     indicators: int = 0
@@ -90,6 +93,10 @@ class Description:
     def major(self) -> int:
         """Major FMI version: 1, 2 or 3."""
         return int(self.info.fmi_version[0])
+
+    def needs_wine(self, interface: Interface) -> bool:
+        """Whether the only library that this machine can run is the one for Windows."""
+        return can_run_windows() and interface not in self.libraries and interface in self.windows_libraries
 
     def slot(self, name: str) -> Slot:
         """Return how to access a numeric variable.
@@ -139,7 +146,11 @@ def describe(path: Path, sha256: str) -> Description:
     described = parse(root, name=str(path), platforms=archive.platforms(names))
     info = described.info
     libraries, said = find_libraries(names, info.fmi_version, described.identifiers)
-    return replace(described, info=replace(info, notes=(*info.notes, *said)), libraries=libraries)
+    windows, _ = find_libraries(names, info.fmi_version, described.identifiers, archive.WINDOWS)
+    described = replace(described, libraries=libraries, windows_libraries=windows)
+    if any(described.needs_wine(interface) for interface in info.interfaces):
+        said = (*said, windows_text())
+    return replace(described, info=replace(info, notes=(*info.notes, *said)))
 
 
 def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Description:

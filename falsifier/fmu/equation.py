@@ -12,10 +12,9 @@ from falsifier.fmu.continuous import Memory, Model, make_memory
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle
-from falsifier.fmu.plan import Plan
+from falsifier.fmu.plan import Plan, solver_tolerance
 from falsifier.fmu.ports import Addresses
 
-_DEFAULT_TOLERANCE = 1e-6
 # Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7).
 _ABSOLUTE_SHARE = 0.01
 # Maximum number of states, and of event indicators: an FMU may report anything.
@@ -65,7 +64,7 @@ class Equation:
         self._description, self._library, self._plan, self._check = description, library, plan, check
         self._addresses = [library.address(name) if name else 0 for name in _NAMES[description.major]]
         self.states, self.indicators = self._sizes()
-        self._tolerance = plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE
+        self._tolerance = solver_tolerance(plan, description.info)
 
     def model(
         self,

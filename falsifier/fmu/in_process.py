@@ -67,25 +67,25 @@ class LocalFmu:
         self._log.append(printable(line))
 
 
-_FMUS: dict[tuple[str, str, bool], LocalFmu] = {}
+_FMUS: dict[tuple[str, str, bool, bool], LocalFmu] = {}
 
 
 def fmu(order: Order) -> LocalFmu:
     """Return the FMU as loaded in this process; load it if necessary."""
-    key = (order.sha256, order.interface, order.logging)
+    key = (order.sha256, order.interface, order.logging, order.through_wine)
     if key not in _FMUS:
         _FMUS[key] = LocalFmu(order)
     return _FMUS[key]
 
 
-def drop(sha256: str, interface: str, *, logging: bool = False) -> None:
+def drop(sha256: str, interface: str, *, logging: bool = False, through_wine: bool = False) -> None:
     """Unload an FMU, if it is loaded."""
-    found = _FMUS.pop((sha256, interface, logging), None)
+    found = _FMUS.pop((sha256, interface, logging, through_wine), None)
     if found is not None:
         found.close()
 
 
 @atexit.register
 def _close_all() -> None:
-    for sha256, interface, logging in list(_FMUS):
-        drop(sha256, interface, logging=logging)
+    for sha256, interface, logging, through_wine in list(_FMUS):
+        drop(sha256, interface, logging=logging, through_wine=through_wine)

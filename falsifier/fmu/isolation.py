@@ -271,7 +271,7 @@ class _Registry:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._nursery: Nursery | None = None
-        self._fmus: dict[tuple[str, str, bool, int], IsolatedFmu] = {}
+        self._fmus: dict[tuple[str, str, bool, bool, int], IsolatedFmu] = {}
         atexit.register(self.close)
         os.register_at_fork(after_in_child=self.forget)
 
@@ -285,16 +285,16 @@ class _Registry:
             return self._nursery
 
     def fmu(self, order: Order) -> IsolatedFmu:
-        key = (order.sha256, order.interface, order.logging, threading.get_ident())
+        key = (order.sha256, order.interface, order.logging, order.through_wine, threading.get_ident())
         found = self._fmus.get(key)
         if found is None:
             with self._lock:
                 found = self._fmus.setdefault(key, IsolatedFmu(self.nursery, order))
         return found
 
-    def drop(self, sha256: str, interface: str, *, logging: bool = False) -> None:
+    def drop(self, sha256: str, interface: str, *, logging: bool = False, through_wine: bool = False) -> None:
         with self._lock:
-            keys = [key for key in self._fmus if key[:3] == (sha256, interface, logging)]
+            keys = [key for key in self._fmus if key[:-1] == (sha256, interface, logging, through_wine)]
             found = [self._fmus.pop(key) for key in keys]
         for fmu in found:
             fmu.close()

@@ -1,4 +1,4 @@
-"""Which file of an FMU is the library of each interface on this platform."""
+"""Which file of an FMU is the library of each interface on a platform."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
@@ -8,9 +8,15 @@ from falsifier.fmu import archive
 
 
 def find_libraries(
-    names: Sequence[str], fmi_version: str, identifiers: Mapping[Interface, str]
+    names: Sequence[str], fmi_version: str, identifiers: Mapping[Interface, str], platform: str = ""
 ) -> tuple[dict[Interface, PurePosixPath], tuple[str, ...]]:
-    """Look up the libraries among an FMU's entries; the only one for this platform may have any name.
+    """Look up the libraries among an FMU's entries; the only one for a platform may have any name.
+
+    Args:
+        names: names of the entries.
+        fmi_version: FMI version of the FMU.
+        identifiers: model identifier by interface.
+        platform: FMI 3 name of the platform; empty for this one.
 
     Returns:
         The path of the library by interface, missing if there is none, and what the user should know.
@@ -18,7 +24,7 @@ def find_libraries(
     libraries: dict[Interface, PurePosixPath] = {}
     said: list[str] = []
     for interface, identifier in identifiers.items():
-        expected = archive.library_file(fmi_version, identifier)
+        expected = archive.library_file(fmi_version, identifier, platform)
         found = _find(names, expected)
         if found is None:
             continue

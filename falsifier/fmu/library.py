@@ -13,7 +13,8 @@ from falsifier.fmu import archive
 from falsifier.fmu.description import Description
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
-_TYPES: Mapping[int, tuple[str, ...]] = {
+# Type codes by FMI version; they name the functions that read and write values.
+TYPES: Mapping[int, tuple[str, ...]] = {
     1: ("Real", "Integer", "Boolean"),
     2: ("Real", "Integer", "Boolean"),
     3: ("Float64", "Float32", "Boolean", *(f"{u}Int{n}" for u in ("", "U") for n in (8, 16, 32, 64))),
@@ -99,11 +100,11 @@ class Library:
 
     def getters(self) -> dict[str, int]:
         """Return the addresses of the functions that read values, by type code."""
-        return {code: self.address(f"Get{code}") for code in _TYPES[self.description.major]}
+        return {code: self.address(f"Get{code}") for code in TYPES[self.description.major]}
 
     def setters(self) -> dict[str, int]:
         """Return the addresses of the functions that write values, by type code."""
-        return {code: self.address(f"Set{code}") for code in _TYPES[self.description.major]}
+        return {code: self.address(f"Set{code}") for code in TYPES[self.description.major]}
 
     def renew(self) -> None:
         """Replace the instance with a new one from the same library."""

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from falsifier.core.model import Variable
 from falsifier.fmu import continuous, equation, solver
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.continuous import make_memory
@@ -58,6 +57,3 @@ class ModelExchange(Stepper):
                 continue
             self._check(status, where, reached)
             return
-
-    def _is_held(self, variable: Variable) -> bool:
-        return not variable.is_continuous

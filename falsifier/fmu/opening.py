@@ -29,7 +29,11 @@ def unpack(order: Order, folder: Path) -> None:
 
 
 def open_session(
-    order: Order, folder: Path, log: LogSink, announce: Callable[[int], None] = lambda _: None
+    order: Order,
+    folder: Path,
+    log: LogSink,
+    announce: Callable[[int], None] = lambda _: None,
+    scratch: Path | None = None,
 ) -> Session:
     """Load what an order asks for from the folder to which it was unpacked.
 
@@ -38,6 +42,7 @@ def open_session(
         folder: where it was unpacked.
         log: called with each message of an FMU.
         announce: called with the position of each component of a system before it is loaded.
+        scratch: folder of this process, in which Wine may write; None: the folder above.
 
     Raises:
         ModelError: if it cannot be loaded.
@@ -47,6 +52,11 @@ def open_session(
         from falsifier.fmu.system_instance import SystemInstance
 
         return Session(partial(SystemInstance, order.network, folder, log, announce, logging=order.logging))
+    if order.through_wine:
+        from falsifier.fmu.windows import WindowsInstance
+
+        make = partial(WindowsInstance, order.description, folder, scratch or folder, order.interface, log)
+        return Session(partial(make, logging=order.logging))
     return Session(
         partial(FmuInstance, order.description, folder, order.interface, log, logging=order.logging)
     )

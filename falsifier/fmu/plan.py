@@ -3,9 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from falsifier.core.model import GRID_ROUNDING, Experiment
+from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description import Description
+
+_DEFAULT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,11 @@ class Plan:
     def steps(self) -> int:
         """Number of communication steps."""
         return (self.samples - 1) * self.every
+
+
+def solver_tolerance(plan: Plan, info: ModelInfo) -> float:
+    """Return the relative tolerance of the solver (model exchange)."""
+    return plan.tolerance or info.tolerance or _DEFAULT_TOLERANCE
 
 
 def make_plan(

@@ -31,6 +31,8 @@ class FmuModel:
         interface: ``co-simulation`` (the FMU contains its own solver) or ``model-exchange``.
         isolate: whether to simulate in a worker process; if not, a crash of the FMU crashes this process.
         logging: whether to ask the FMU for messages in every simulation; otherwise only after a failure.
+        windows: whether to simulate the library for 64-bit Windows, through Wine, although there is another;
+            if there is no other for this machine, that happens anyway.
         sha256: hash of the file; models with different files are not equal.
 
     Raises:
@@ -41,6 +43,7 @@ class FmuModel:
     interface: Interface = "co-simulation"
     isolate: bool = field(default=True, kw_only=True)
     logging: bool = field(default=False, kw_only=True)
+    windows: bool = field(default=False, kw_only=True)
     sha256: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
@@ -96,10 +99,9 @@ class FmuModel:
 
     def close(self) -> None:
         """End the worker process or unload the library; the next simulation starts again."""
-        if self.isolate:
-            REGISTRY.drop(self.sha256, self.interface, logging=self.logging)
-        else:
-            in_process.drop(self.sha256, self.interface, logging=self.logging)
+        drop = REGISTRY.drop if self.isolate else in_process.drop
+        wine = _order(self).through_wine
+        drop(self.sha256, self.interface, logging=self.logging, through_wine=wine)
 
     def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
         """Return the inputs as piecewise cubics; for a solver, discrete ones change on the output grid."""
@@ -160,12 +162,22 @@ def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
 
 def _order(model: FmuModel) -> Order:
     description = describe(model.path, model.sha256)
-    return Order(model.path, model.sha256, description, model.interface, None, logging=model.logging)
+    return Order(
+        model.path,
+        model.sha256,
+        description,
+        model.interface,
+        None,
+        logging=model.logging,
+        through_wine=model.windows or description.needs_wine(model.interface),
+    )
 
 
 def _check_interface(model: FmuModel) -> None:
     description = describe(model.path, model.sha256)
     info = description.info
+    if model.windows and model.interface in info.interfaces:
+        _check_windows(model, description)
     if model.interface in info.interfaces:
         return
     if model.interface not in get_args(Interface):
@@ -178,3 +190,11 @@ def _check_interface(model: FmuModel) -> None:
     raise ModelError(
         f'{model.path}: the FMU does not offer {model.interface}; set interface = "{info.interfaces[0]}"'
     )
+
+
+def _check_windows(model: FmuModel, description: Description) -> None:
+    if model.interface not in description.windows_libraries:
+        raise ModelError(
+            f"{model.path}: the FMU has no library for {archive.WINDOWS}, only "
+            f"{', '.join(description.info.platforms) or 'no binaries at all'}"
+        )

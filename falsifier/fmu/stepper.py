@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Variable
+from falsifier.core.model import Interface, Variable
 from falsifier.errors import SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
@@ -38,7 +38,7 @@ class Stepper(ABC):
         # What is recorded, the address to record to, and the length of its rows.
         self._record = (self._outputs.table, room.outputs.ctypes.data, plan.samples)
         kinds = {v.name: v for v in description.info.variables}
-        held = np.array([self._is_held(kinds[name]) for name in plan.inputs], dtype=bool)
+        held = np.array([is_held(description, library.interface, kinds[n]) for n in plan.inputs], dtype=bool)
         self._held_rows, self._other_rows = np.flatnonzero(held), np.flatnonzero(~held)
         self._inputs = make_ports(description, [plan.inputs[k] for k in self._other_rows], setters)
         self._held_inputs = make_ports(description, [plan.inputs[k] for k in self._held_rows], setters)
@@ -57,10 +57,7 @@ class Stepper(ABC):
             if not len(rows):
                 continue
             pieces = self._pieces(rows)
-            if ports.is_limited:
-                # Interpolated values are always between those at the ends of a piece.
-                values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
-                check_range(self._name, [self._plan.inputs[k] for k in rows], ports, values)
+            check_input_range(self._name, [self._plan.inputs[k] for k in rows], ports, pieces)
             self._write(ports, pieces[:, 0, 1].copy(), "inputs")
 
     def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
@@ -68,10 +65,6 @@ class Stepper(ABC):
         inputs = self._room.inputs
         chosen = inputs if len(rows) == len(inputs) else inputs[rows]
         return chosen.reshape(len(rows), self._plan.pieces, 5)
-
-    @abstractmethod
-    def _is_held(self, variable: Variable) -> bool:
-        """Whether an input may change only at events."""
 
     @abstractmethod
     def advance(self, deadline: float) -> None:
@@ -109,13 +102,24 @@ class Stepper(ABC):
 
     def _watch_clock(self, deadline: float, reached: float) -> None:
         if time.perf_counter() > deadline:
-            limit = self._plan.time_limit
-            raise SimulationError(
-                f"{self._name}: stopped at t = {reached:g} s after the time limit of {limit:g} s; "
-                "slow models need a larger time_limit",
-                status="timeout",
-                time=reached,
-            )
+            raise out_of_time(self._name, self._plan, reached)
+
+
+def is_held(description: Description, interface: Interface, variable: Variable) -> bool:
+    """Whether an input may change only at events."""
+    if interface == "co-simulation":
+        return description.major == 3 and description.event_mode and variable.variability != "continuous"
+    return not variable.is_continuous
+
+
+def out_of_time(model: str, plan: Plan, reached: float) -> SimulationError:
+    """Return the error of a simulation that reached its time limit."""
+    return SimulationError(
+        f"{model}: stopped at t = {reached:g} s after the time limit of {plan.time_limit:g} s; "
+        "slow models need a larger time_limit",
+        status="timeout",
+        time=reached,
+    )
 
 
 def component_failure(
@@ -157,6 +161,18 @@ def check_range(model: str, names: Sequence[str], ports: Ports, rows: NDArray[np
                 f"whose type ranges from {low:g} to {high:g}",
                 time=0.0,
             )
+
+
+def check_input_range(model: str, names: Sequence[str], ports: Ports, pieces: NDArray[np.float64]) -> None:
+    """Reject inputs outside the range of a variable's type; pieces: shape (inputs, pieces, 5).
+
+    Raises:
+        SimulationError: naming the variable and the range of its type.
+    """
+    if ports.is_limited:
+        # Interpolated values are always between those at the ends of a piece.
+        values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
+        check_range(model, names, ports, values)
 
 
 def loops() -> Any:

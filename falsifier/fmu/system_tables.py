@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Variable
 from falsifier.fmu import coupled_stepping as loops
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
@@ -14,7 +13,7 @@ from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.saved_state import SavedState
-from falsifier.fmu.stepper import check_range
+from falsifier.fmu.stepper import check_range, is_held
 
 if TYPE_CHECKING:
     from falsifier.fmu.system_solver import SystemSolver
@@ -147,22 +146,20 @@ class SystemTables:
     def _fill(self, row: NDArray[np.int64], member: int, recorded: Sequence[tuple[Place, int]]) -> None:
         part, one = self._parts[member], self._network.members[member]
         library = part.library
-        has_events = steps_with_events(one)
         row[loops.FUNCTIONS : loops.PLAIN] = [
             0,  # the instance, see start_again
             *(library.address(name) for name in _FUNCTIONS),
             one.description.major,
-            int(has_events),
+            int(steps_with_events(one)),
         ]
         kinds = {v.name: v for v in one.description.info.variables}
         places = [p for p in (*self._links, *self._inputs) if p.member == member]
-        is_solved = one.interface == "model-exchange"
-        held = [p for p in places if _is_held(kinds[p.name], has_events=has_events, is_solved=is_solved)]
+        held = [p for p in places if is_held(one.description, one.interface, kinds[p.name])]
         plain = [p for p in places if p not in held]
         first = self._fed
         ports = self._inputs_to(row, loops.PLAIN, loops.PLAIN_FEEDS, plain, one, library.setters())
         held_ports = self._inputs_to(row, loops.HELD, loops.HELD_FEEDS, held, one, library.setters())
-        if is_solved:
+        if one.interface == "model-exchange":
             self._solve(row, member, (ports, held_ports), [*plain, *held], first)
         signals = {place: k for place, k in self._signal_of.items() if place.member == member}
         self._ports_to(row, loops.SOURCES, one, signals, library.getters())
@@ -282,10 +279,3 @@ def steps_with_events(member: Member) -> bool:
     """Whether a component of co-simulation has an event mode, in which its discrete inputs change."""
     description = member.description
     return member.interface == "co-simulation" and description.major == 3 and description.event_mode
-
-
-def _is_held(variable: Variable, *, has_events: bool, is_solved: bool) -> bool:
-    """Whether an input changes at events."""
-    if is_solved:
-        return not variable.is_continuous
-    return has_events and variable.variability != "continuous"

@@ -99,6 +99,12 @@ def _member(
             "first values; export it as FMI 2 or 3",
             key=key,
         )
+    if description.needs_wine("co-simulation"):
+        raise SpecError(
+            f"{path}: its only library is for Windows; such an FMU runs through Wine, but not as a component "
+            "of a system; export it for this platform too",
+            key=key,
+        )
     named = replace(description, info=replace(description.info, name=name))
     return Member(name, path, sha256, named, step, chosen, str(position))
 

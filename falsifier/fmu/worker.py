@@ -99,7 +99,7 @@ class _Worker:
     def _load(self) -> Session:
         """Load the library and make an instance, which may succeed at another time."""
         try:
-            self._session = open_session(self._order, self._folder, _log, self._announce)
+            self._session = open_session(self._order, self._folder, _log, self._announce, Path.cwd())
         except ModelError as error:
             raise SimulationError(str(error)) from error
         return self._session

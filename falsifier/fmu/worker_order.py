@@ -26,6 +26,7 @@ class Order:
         reuse: how the next simulation starts; None if not yet known.
         untrusted: ways to start that made the FMU crash or hang; they are not tried again.
         logging: whether to ask the FMU for messages.
+        through_wine: whether to simulate the library for Windows.
         network: components and connections of a system; None for a single FMU.
     """
 
@@ -36,4 +37,5 @@ class Order:
     reuse: Reuse | None
     untrusted: tuple[Reuse, ...] = ()
     logging: bool = False
+    through_wine: bool = False
     network: Network | None = None

@@ -1,4 +1,4 @@
-from falsifier.fmu.archive import library_file
+from falsifier.fmu.archive import WINDOWS, library_file
 from falsifier.fmu.libraries import find_libraries
 
 EXPECTED = library_file("2.0", "model")
@@ -21,3 +21,10 @@ def test_the_only_other_library_is_used_and_told_once() -> None:
 def test_of_several_others_none_is_guessed() -> None:
     names = [EXPECTED.with_name(f"{name}{EXPECTED.suffix}").as_posix() for name in ("a", "b")]
     assert find_libraries(names, "2.0", {"co-simulation": "model"}) == ({}, ())
+
+
+def test_libraries_of_another_platform_are_found_by_its_folder() -> None:
+    names = ["binaries/win64/model.dll", "binaries/x86_64-windows/model.dll", "binaries/linux64/model.so"]
+    for version, folder in (("2.0", "win64"), ("3.0", "x86_64-windows")):
+        found, _ = find_libraries(names, version, {"co-simulation": "model"}, WINDOWS)
+        assert found["co-simulation"].as_posix() == f"binaries/{folder}/model.dll"

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.fmu import Connection, Coupling
+from falsifier.fmu import Connection, Coupling, System, wine
+from tests.fmu import fixtures
 from tests.fmu.systems import LOOP, solved, system
 
 PAIR = {"plant": "Plant_2", "pi": "Gain_2"}
@@ -91,3 +92,11 @@ def test_a_unit_that_is_missing_is_told() -> None:
 def test_an_output_may_feed_several_inputs_and_arrays_go_element_by_element() -> None:
     found = system({"a": "Arrays_3", "b": "Arrays_3", "c": "Plant_2"}, {"b.u": "a.y", "c.u": "a.y[2]"})
     assert found.info.connections == (("a.y[1]", "b.u[1]"), ("a.y[2]", "b.u[2]"), ("a.y[2]", "c.u"))
+
+
+def test_components_with_a_windows_library_only_are_refused() -> None:
+    path = fixtures.FOLDER / "win64" / "Lag_2.fmu"
+    if not wine.can_run_windows():
+        pytest.skip("on this machine it is refused as an FMU without a library")
+    with pytest.raises(SpecError, match=r"its only library is for Windows; .* not as a component"):
+        System({"lag": path}, {})

@@ -1,0 +1,173 @@
+/* Co-simulation: the FMU contains its own solver; it gets inputs and communication steps. */
+
+#include <math.h>
+
+#include "worker.h"
+
+/* Early returns at one time, or rounds of one event iteration, after which the FMU is considered stuck. */
+#define MOST_ROUNDS 1000
+#define STEPS_PER_CLOCK_CHECK 100
+
+typedef unsigned (*mode)(void *);
+typedef unsigned (*update_3)(void *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, double *);
+typedef unsigned (*step_1)(void *, double, double, char);
+typedef unsigned (*step_2)(void *, double, double, int);
+typedef unsigned (*step_3)(void *, double, double, uint8_t, uint8_t *, uint8_t *, uint8_t *, double *);
+
+static const struct outcome done = {0, DONE};
+
+static struct {
+    void *do_step;
+    mode enter_event_mode, enter_step_mode;
+    update_3 update;
+} f;
+
+/* Iterate events in FMI 3's event mode until nothing changes any more. */
+static struct outcome settle(struct fmu *fmu)
+{
+    for (int round = 0; round < MOST_ROUNDS; round++) {
+        uint8_t again = 0, end = 0, nominals = 0, states = 0, defined = 0;
+        double next_time = 0.0;
+        unsigned status = f.update(fmu->instance, &again, &end, &nominals, &states, &defined, &next_time);
+        if (status > 1)
+            return (struct outcome){status, EVENT};
+        if (end)
+            return (struct outcome){status, TERMINATED};
+        if (!again)
+            return (struct outcome){status, DONE};
+    }
+    return (struct outcome){0, STUCK};
+}
+
+/* Enter event mode, set inputs, update the discrete states, return to step mode. */
+static struct outcome handle_event(struct fmu *fmu, const struct ports *ports)
+{
+    unsigned status = f.enter_event_mode(fmu->instance);
+    if (status > 1)
+        return (struct outcome){status, EVENT};
+    status = ports ? exchange_values(fmu, ports) : 0;
+    if (status > 1)
+        return (struct outcome){status, SETTING};
+    struct outcome o = settle(fmu);
+    if (o.where != DONE)
+        return o;
+    status = f.enter_step_mode(fmu->instance);
+    return (struct outcome){status, status > 1 ? EVENT : DONE};
+}
+
+/* Do one communication step of FMI 3, in several calls if the FMU returns early. */
+static struct outcome advance_3(struct fmu *fmu, double start, double end, int *ends)
+{
+    double time = start;
+    int rounds = 0;
+    for (;;) {
+        uint8_t event = 0, terminate = 0, early = 0;
+        double reached = end;
+        unsigned status = ((step_3)f.do_step)(
+            fmu->instance, time, end - time, 1, &event, &terminate, &early, &reached);
+        *ends = 0;
+        if (status > 1)
+            return (struct outcome){status, STEPPING};
+        *ends = terminate != 0;
+        double before = time;
+        time = early ? reached : end;
+        if (event && fmu->event_mode && !*ends) {
+            struct outcome o = handle_event(fmu, NULL);
+            if (o.where == TERMINATED) {
+                *ends = 1;
+                return (struct outcome){o.status, time >= end ? DONE : TERMINATED};
+            }
+            if (o.where != DONE)
+                return o;
+            status = o.status;
+        }
+        /* A remainder smaller than this is a rounding error; FMUs reject steps that short. */
+        if (*ends || end - time <= 1e-12 * fmax(1.0, fabs(end)))
+            return (struct outcome){status, end - time <= 1e-9 * fmax(1.0, fabs(end)) ? DONE : TERMINATED};
+        rounds = time > before ? 0 : rounds + 1;
+        if (rounds > MOST_ROUNDS)
+            return (struct outcome){0, STUCK};
+    }
+}
+
+/* Set the inputs at a communication point. */
+static struct outcome set_inputs(struct fmu *fmu, struct plan *plan, double time, int is_initialised)
+{
+    if (plan->inputs.ports.count) {
+        put_inputs(&plan->inputs, time);
+        unsigned status = exchange_values(fmu, &plan->inputs.ports);
+        if (status > 1)
+            return (struct outcome){status, SETTING};
+    }
+    /* Initialisation has already set the values at time 0. */
+    if (plan->held.ports.count && put_inputs(&plan->held, time) && is_initialised)
+        return handle_event(fmu, &plan->held.ports);
+    return done;
+}
+
+static struct outcome step(struct fmu *fmu, double start, double end, int *ends)
+{
+    if (fmu->major == 3)
+        return advance_3(fmu, start, end, ends);
+    *ends = 0;
+    unsigned status = fmu->major == 2
+                          ? ((step_2)f.do_step)(fmu->instance, start, end - start, 1)
+                          : ((step_1)f.do_step)(fmu->instance, start, end - start, 1);
+    return (struct outcome){status, status > 1 ? STEPPING : DONE};
+}
+
+static struct outcome begin(struct fmu *fmu, struct plan *plan)
+{
+    f.do_step = fmu_required(fmu, "DoStep");
+    struct outcome o = done;
+    if (fmu->event_mode) {
+        f.enter_event_mode = (mode)fmu_required(fmu, "EnterEventMode");
+        f.enter_step_mode = (mode)fmu_required(fmu, "EnterStepMode");
+        f.update = (update_3)fmu_required(fmu, "UpdateDiscreteStates");
+        /* Leave the event mode in which initialisation ends. */
+        o = settle(fmu);
+        if (o.where == DONE) {
+            unsigned status = f.enter_step_mode(fmu->instance);
+            o = (struct outcome){status, status > 1 ? EVENT : DONE};
+        }
+    }
+    if (o.where != DONE)
+        return o;
+    unsigned status = read_row(fmu, plan, 0);
+    return (struct outcome){status, status > 1 ? GETTING : DONE};
+}
+
+/* Do all communication steps.
+ *
+ * The step sizes are differences of the communication points. The FMU adds them to its time again, which is
+ * exact for these; with k * size + size it would pass the stop time by a rounding error, and some refuse. */
+struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, double *reached)
+{
+    size_t steps = (plan->samples - 1) * plan->every;
+    double size = plan->stop_time / (double)steps;
+    *reached = 0.0;
+    struct outcome o = begin(fmu, plan);
+    for (size_t k = 0; k < steps && o.where == DONE;) {
+        double start = (double)k * size;
+        double end = k + 1 == steps ? plan->stop_time : fmin((double)(k + 1) * size, plan->stop_time);
+        int ends = 0;
+        o = set_inputs(fmu, plan, start, k > 0);
+        if (o.where == DONE)
+            o = step(fmu, start, end, &ends);
+        if (o.where != DONE)
+            break;
+        *reached = (double)++k * size;
+        if (k % plan->every == 0) {
+            unsigned status = read_row(fmu, plan, k / plan->every);
+            if (status > 1)
+                return (struct outcome){status, GETTING};
+        }
+        if (k == steps)
+            break;
+        if (ends)
+            return (struct outcome){0, TERMINATED};
+        if (k % STEPS_PER_CLOCK_CHECK == 0 && now() > deadline)
+            return (struct outcome){0, TIMEOUT};
+    }
+    return o;
+}

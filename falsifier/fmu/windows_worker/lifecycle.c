@@ -1,0 +1,165 @@
+/* Start, end and reset of a simulation: the calls that FMI 1, 2 and 3 require, in their order.
+ *
+ * Parameters and start values are set before initialisation, inputs within initialisation mode. */
+
+#include <stdio.h>
+
+#include "worker.h"
+
+typedef unsigned (*only)(void *);
+typedef unsigned (*time_1)(void *, double);
+typedef unsigned (*initialise_slave_1)(void *, double, char, double);
+typedef unsigned (*initialise_1)(void *, char, double, struct event_info_1 *);
+typedef unsigned (*setup_2)(void *, int, double, double, int, double);
+typedef unsigned (*enter_3)(void *, uint8_t, double, double, uint8_t, double);
+typedef unsigned (*string_2)(void *, const uint32_t *, size_t, char *const *);
+typedef unsigned (*string_3)(void *, const uint32_t *, size_t, char *const *, size_t);
+typedef unsigned (*get_state)(void *, void **);
+typedef unsigned (*set_state)(void *, void *);
+
+static const struct outcome done = {0, DONE};
+
+static struct outcome called(const char *name, unsigned status)
+{
+    failing = name;
+    return (struct outcome){status, status > 1 ? CALLING : DONE};
+}
+
+static struct outcome call(struct fmu *fmu, const char *name)
+{
+    return called(name, ((only)fmu_required(fmu, name))(fmu->instance));
+}
+
+static struct outcome set_strings(struct fmu *fmu, const struct plan *plan)
+{
+    static char position[24];
+    for (size_t k = 0; k < plan->strings_count; k++) {
+        const struct string *s = &plan->strings[k];
+        void *set = fmu_required(fmu, "SetString");
+        unsigned status = fmu->major == 3
+                              ? ((string_3)set)(fmu->instance, &s->reference, 1, &s->text, 1)
+                              : ((string_2)set)(fmu->instance, &s->reference, 1, &s->text);
+        if (status > 1) {
+            snprintf(position, sizeof position, "%zu", k);
+            failing = position;
+            return (struct outcome){status, TEXT};
+        }
+    }
+    return done;
+}
+
+static struct outcome set_parameters(struct fmu *fmu, const struct plan *plan)
+{
+    struct outcome o = set_strings(fmu, plan);
+    if (o.where != DONE || !plan->parameters.count)
+        return o;
+    unsigned status = write_row(fmu, &plan->parameters, plan->parameter_values);
+    failing = "parameters";
+    return (struct outcome){status, status > 1 ? WRITING : DONE};
+}
+
+static struct outcome set_inputs(struct fmu *fmu, struct plan *plan)
+{
+    struct inputs *both[] = {&plan->inputs, &plan->held};
+    for (int k = 0; k < 2; k++) {
+        for (size_t j = 0; j < both[k]->ports.count; j++)
+            put(&both[k]->ports.places[j], both[k]->rows[j][0].c[0]);
+        unsigned status = exchange_values(fmu, &both[k]->ports);
+        failing = "inputs";
+        if (status > 1)
+            return (struct outcome){status, WRITING};
+    }
+    return done;
+}
+
+static struct outcome enter(struct fmu *fmu, struct plan *plan)
+{
+    struct outcome o = set_parameters(fmu, plan);
+    if (o.where != DONE)
+        return o;
+    if (fmu->major == 3) {
+        enter_3 f = (enter_3)fmu_required(fmu, "EnterInitializationMode");
+        return called("EnterInitializationMode",
+                      f(fmu->instance, plan->has_tolerance, plan->tolerance, 0.0, 1, plan->stop_time));
+    }
+    setup_2 f = (setup_2)fmu_required(fmu, "SetupExperiment");
+    o = called("SetupExperiment",
+               f(fmu->instance, plan->has_tolerance, plan->tolerance, 0.0, 1, plan->stop_time));
+    return o.where == DONE ? call(fmu, "EnterInitializationMode") : o;
+}
+
+static struct outcome initialise_first_version(
+    struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events)
+{
+    struct outcome o = done;
+    if (fmu->is_model_exchange)
+        o = called("SetTime", ((time_1)fmu_required(fmu, "SetTime"))(fmu->instance, 0.0));
+    if (o.where == DONE)
+        o = set_parameters(fmu, plan);
+    if (o.where == DONE)
+        o = set_inputs(fmu, plan);
+    if (o.where != DONE)
+        return o;
+    if (!fmu->is_model_exchange) {
+        initialise_slave_1 f = (initialise_slave_1)fmu_required(fmu, "InitializeSlave");
+        return called("InitializeSlave", f(fmu->instance, 0.0, 1, plan->stop_time));
+    }
+    initialise_1 f = (initialise_1)fmu_required(fmu, "Initialize");
+    return called("Initialize", f(fmu->instance, (char)plan->has_tolerance, plan->tolerance, first_events));
+}
+
+/* Initialise a new or reset instance; first_events is filled by FMI 1 model exchange. */
+struct outcome initialise(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events)
+{
+    if (fmu->major == 1)
+        return initialise_first_version(fmu, plan, first_events);
+    struct outcome o = enter(fmu, plan);
+    if (o.where == DONE)
+        o = set_inputs(fmu, plan);
+    return o.where == DONE ? call(fmu, "ExitInitializationMode") : o;
+}
+
+/* End the simulation; a bad status is ignored, because the trajectory is complete. */
+void terminate(struct fmu *fmu)
+{
+    const char *name = fmu->major == 1 && !fmu->is_model_exchange ? "TerminateSlave" : "Terminate";
+    ((only)fmu_required(fmu, name))(fmu->instance);
+}
+
+/* Reset the instance; FMI 1 model exchange does not define that. Returns whether it worked. */
+int reset(struct fmu *fmu)
+{
+    if (fmu->major == 1 && fmu->is_model_exchange)
+        return 0;
+    only f = (only)fmu_function(fmu, fmu->major == 1 ? "ResetSlave" : "Reset");
+    return f && f(fmu->instance) <= 1;
+}
+
+static void *state_function(const struct fmu *fmu, const char *verb)
+{
+    char name[32];
+    snprintf(name, sizeof name, "%sFMU%state", verb, fmu->major == 3 ? "S" : "s");
+    return fmu->major == 1 ? NULL : fmu_function(fmu, name);
+}
+
+/* Save the current state; returns whether it worked. */
+int take_state(struct fmu *fmu)
+{
+    get_state get = (get_state)state_function(fmu, "Get");
+    if (!get || !state_function(fmu, "Set") || !state_function(fmu, "Free"))
+        return 0;
+    return get(fmu->instance, &fmu->state) <= 1 && fmu->state;
+}
+
+int restore_state(struct fmu *fmu)
+{
+    return fmu->state && ((set_state)state_function(fmu, "Set"))(fmu->instance, fmu->state) <= 1;
+}
+
+/* Free the saved state; required before its instance is freed. */
+void forget_state(struct fmu *fmu)
+{
+    if (fmu->state)
+        ((get_state)state_function(fmu, "Free"))(fmu->instance, &fmu->state);
+    fmu->state = NULL;
+}

@@ -1,0 +1,123 @@
+/* Many variables of an FMU at once, whatever their types, and inputs as functions of time. */
+
+#include <math.h>
+
+#include "worker.h"
+
+typedef unsigned (*values_2)(void *, const uint32_t *, size_t, void *);
+typedef unsigned (*values_3)(void *, const uint32_t *, size_t, void *, size_t);
+
+static double fetch(const struct place *place)
+{
+    double value;
+    switch (place->storage) {
+    case 0: return *(double *)place->address * place->sign;
+    case 1: value = *(float *)place->address; break;
+    case 2: value = *(int8_t *)place->address; break;
+    case 3: value = *(uint8_t *)place->address; break;
+    case 4: value = *(int16_t *)place->address; break;
+    case 5: value = *(uint16_t *)place->address; break;
+    case 6: value = *(int32_t *)place->address; break;
+    case 7: value = *(uint32_t *)place->address; break;
+    case 8: value = (double)*(int64_t *)place->address; break;
+    default: value = (double)*(uint64_t *)place->address; break;
+    }
+    /* Any non-zero value is true; the negated alias of a Boolean is its complement. */
+    if (place->is_boolean)
+        return (value != 0.0) == (place->sign > 0.0);
+    return value * place->sign;
+}
+
+/* Write a number to a variable's location; integers and Booleans are rounded. */
+void put(const struct place *place, double number)
+{
+    double value = number * place->sign;
+    if (place->storage == 0) {
+        *(double *)place->address = value;
+        return;
+    }
+    if (place->is_boolean)
+        value = (number >= 0.5) == (place->sign > 0.0);
+    switch (place->storage) {
+    case 1: *(float *)place->address = (float)value; break;
+    case 2: *(int8_t *)place->address = (int8_t)rint(value); break;
+    case 3: *(uint8_t *)place->address = (uint8_t)rint(value); break;
+    case 4: *(int16_t *)place->address = (int16_t)rint(value); break;
+    case 5: *(uint16_t *)place->address = (uint16_t)rint(value); break;
+    case 6: *(int32_t *)place->address = (int32_t)rint(value); break;
+    case 7: *(uint32_t *)place->address = (uint32_t)rint(value); break;
+    case 8: *(int64_t *)place->address = (int64_t)rint(value); break;
+    default: *(uint64_t *)place->address = (uint64_t)rint(value); break;
+    }
+}
+
+/* Make the calls; stop at the first status worse than a warning. */
+unsigned exchange_values(const struct fmu *fmu, const struct ports *ports)
+{
+    unsigned worst = 0;
+    for (size_t g = 0; g < ports->call_count; g++) {
+        const struct call *c = &ports->calls[g];
+        unsigned status =
+            fmu->major == 3
+                ? ((values_3)c->function)(fmu->instance, c->references, c->count, c->values, c->size)
+                : ((values_2)c->function)(fmu->instance, c->references, c->count, c->values);
+        worst = status > worst ? status : worst;
+        if (status > 1)
+            break;
+    }
+    return worst;
+}
+
+/* Record all outputs. */
+unsigned read_row(const struct fmu *fmu, const struct plan *plan, size_t column)
+{
+    unsigned status = exchange_values(fmu, &plan->outputs);
+    if (status <= 1)
+        for (size_t j = 0; j < plan->outputs.count; j++)
+            plan->recorded[j * plan->samples + column] = fetch(&plan->outputs.places[j]);
+    return status;
+}
+
+unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers)
+{
+    for (size_t j = 0; j < ports->count; j++)
+        put(&ports->places[j], numbers[j]);
+    return exchange_values(fmu, ports);
+}
+
+/* The difference in s below which two times are considered equal. */
+double rounding(double time)
+{
+    return 1e-11 * fmax(1.0, fabs(time));
+}
+
+/* The start of a piece in s; inf after the last one. */
+double start_of(const struct inputs *inputs, size_t j, size_t piece)
+{
+    return piece < inputs->pieces ? inputs->rows[j][piece].start : INFINITY;
+}
+
+/* An input at a time within one of its pieces or at its end. */
+double value_at(const struct inputs *inputs, size_t j, size_t piece, double time)
+{
+    const struct piece *p = &inputs->rows[j][piece];
+    double dt = time - p->start;
+    return ((p->c[3] * dt + p->c[2]) * dt + p->c[1]) * dt + p->c[0];
+}
+
+/* Write the values of all inputs at a time to their buffers. */
+int put_inputs(struct inputs *inputs, double time)
+{
+    int changed = 0;
+    for (size_t j = 0; j < inputs->ports.count; j++) {
+        size_t piece = inputs->current[j];
+        while (start_of(inputs, j, piece + 1) <= time + rounding(time))
+            piece++;
+        inputs->current[j] = piece;
+        double value = value_at(inputs, j, piece, time);
+        changed = changed || value != inputs->values[j];
+        inputs->values[j] = value;
+        put(&inputs->ports.places[j], value);
+    }
+    return changed;
+}

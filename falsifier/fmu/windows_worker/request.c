@@ -1,0 +1,147 @@
+/* What requests contain: numbers of 8 bytes and, padded to a multiple of 8, bytes after their number.
+ *
+ * Texts end with a NUL. Values point into the request, which is therefore never freed; plans are few. */
+
+#include <stdio.h>
+#include <string.h>
+#include <windows.h>
+
+#include "worker.h"
+
+static void *read_bytes(struct request *r, size_t count)
+{
+    char *at = r->at;
+    size_t padded = (count + 7) / 8 * 8;
+    if ((size_t)(r->end - at) < padded)
+        give_up("a request of this tool is incomplete");
+    r->at += padded;
+    return at;
+}
+
+static size_t read_size(struct request *r)
+{
+    return (size_t) * (uint64_t *)read_bytes(r, 8);
+}
+
+double read_number(struct request *r)
+{
+    return *(double *)read_bytes(r, 8);
+}
+
+static void *read_block(struct request *r, size_t *size)
+{
+    *size = read_size(r);
+    return read_bytes(r, *size);
+}
+
+char *read_text(struct request *r)
+{
+    size_t size;
+    return read_block(r, &size);
+}
+
+void read_fmu(struct request *r, struct fmu *fmu)
+{
+    memset(fmu, 0, sizeof *fmu);
+    fmu->major = (int)read_size(r);
+    fmu->is_model_exchange = (int)read_size(r);
+    fmu->logging = (int)read_size(r);
+    fmu->event_mode = (int)read_size(r);
+    fmu->states = read_size(r);
+    fmu->indicators = read_size(r);
+    fmu->library = read_text(r);
+    fmu->identifier = read_text(r);
+    fmu->name = read_text(r);
+    fmu->token = read_text(r);
+    fmu->resources = read_text(r);
+}
+
+static void read_ports(struct request *r, const struct fmu *fmu, const char *verb, struct ports *ports)
+{
+    ports->call_count = read_size(r);
+    ports->calls = need(ports->call_count, sizeof *ports->calls);
+    for (size_t g = 0; g < ports->call_count; g++) {
+        struct call *c = &ports->calls[g];
+        char name[32];
+        const char *code = read_text(r);
+        size_t bytes;
+        snprintf(name, sizeof name, "%s%s", verb, code);
+        c->function = fmu_function(fmu, name);
+        if (!c->function)
+            give_up("the library does not export the function for values of type %s", code);
+        c->references = read_block(r, &bytes);
+        c->count = bytes / sizeof *c->references;
+        c->size = read_size(r);
+        c->values = read_block(r, &bytes);
+    }
+    ports->count = read_size(r);
+    ports->places = need(ports->count, sizeof *ports->places);
+    for (size_t j = 0; j < ports->count; j++) {
+        struct place *p = &ports->places[j];
+        p->storage = (int)read_size(r);
+        const struct call *c = &ports->calls[read_size(r)];
+        p->address = (char *)c->values + read_size(r);
+        p->sign = read_number(r);
+        p->is_boolean = (int)read_size(r);
+    }
+}
+
+static void read_inputs(
+    struct request *r, const struct fmu *fmu, size_t pieces, const double *table, struct inputs *inputs)
+{
+    read_ports(r, fmu, "Set", &inputs->ports);
+    inputs->pieces = pieces;
+    inputs->rows = need(inputs->ports.count, sizeof *inputs->rows);
+    inputs->current = need(inputs->ports.count, sizeof *inputs->current);
+    inputs->values = need(inputs->ports.count, sizeof *inputs->values);
+    for (size_t j = 0; j < inputs->ports.count; j++)
+        inputs->rows[j] = (const struct piece *)(table + read_size(r) * 5 * pieces);
+}
+
+/* Map the file that is shared with the process that requests simulations. */
+static double *map_room(const char *path)
+{
+    static void *last;
+    wchar_t wide[4096];
+    if (last)
+        UnmapViewOfFile(last);
+    last = NULL;
+    MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, sizeof wide / sizeof *wide);
+    HANDLE file = CreateFileW(wide, GENERIC_READ | GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL,
+                              OPEN_EXISTING, 0, NULL);
+    HANDLE mapping = CreateFileMappingW(file, NULL, PAGE_READWRITE, 0, 0, NULL);
+    last = mapping ? MapViewOfFile(mapping, FILE_MAP_WRITE, 0, 0, 0) : NULL;
+    if (!last)
+        give_up("%s cannot be mapped (Windows error %lu)", path, GetLastError());
+    CloseHandle(mapping);
+    CloseHandle(file);
+    return last;
+}
+
+/* Read a plan; its shared memory is laid out as Room is: parameters, inputs, outputs. */
+void read_plan(struct request *r, const struct fmu *fmu, struct plan *plan)
+{
+    memset(plan, 0, sizeof *plan);
+    double *room = map_room(read_text(r));
+    plan->samples = read_size(r);
+    plan->every = read_size(r);
+    size_t pieces = read_size(r);
+    size_t parameters = read_size(r), inputs = read_size(r);
+    plan->has_tolerance = (int)read_size(r);
+    plan->stop_time = read_number(r);
+    plan->max_step = read_number(r);
+    plan->tolerance = read_number(r);
+    plan->solver_tolerance = read_number(r);
+    plan->strings_count = read_size(r);
+    plan->strings = need(plan->strings_count, sizeof *plan->strings);
+    for (size_t k = 0; k < plan->strings_count; k++) {
+        plan->strings[k].reference = (uint32_t)read_size(r);
+        plan->strings[k].text = read_text(r);
+    }
+    plan->parameter_values = room;
+    plan->recorded = room + parameters + inputs * 5 * pieces;
+    read_ports(r, fmu, "Set", &plan->parameters);
+    read_inputs(r, fmu, pieces, room + parameters, &plan->inputs);
+    read_inputs(r, fmu, pieces, room + parameters, &plan->held);
+    read_ports(r, fmu, "Get", &plan->outputs);
+}

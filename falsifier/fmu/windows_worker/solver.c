@@ -1,0 +1,341 @@
+/* Model exchange: the solver.
+ *
+ * Inputs are applied at every stage of every step. Steps end at output points, control points of the inputs and
+ * time events. State events are located on the dense output, and the step is repeated up to the event; the state
+ * at the event is then the result of a step and not interpolated. If stability rather than accuracy limits
+ * explicit steps, the rest of the simulation uses implicit ones. */
+
+#include <math.h>
+#include <string.h>
+#include <windows.h>
+
+#include "model_exchange.h"
+
+/* Constants of Hairer and Wanner: a problem is stiff after 15 steps with h times the dominant eigenvalue above
+ * 3.25 (the method is stable up to 3.3); 6 other steps in a row reset the count. */
+#define STIFF_BOUND 3.25
+#define STIFF_STEPS 15
+#define OTHER_STEPS 6
+#define SAFETY 0.9
+#define MIN_FACTOR 0.2
+#define MAX_FACTOR 5.0
+/* Events within one output interval after which the FMU is considered stuck (Zeno behaviour). */
+#define MOST_EVENTS 10000
+#define STEPS_PER_CLOCK_CHECK 100
+/* Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7). */
+#define ABSOLUTE_SHARE 0.01
+#define PAGE 4096
+
+static struct solver solver;
+
+static const struct outcome done = {0, DONE};
+
+/* Numbers that the FMU writes end where accessible memory ends: an FMU that writes past them crashes there. */
+static double *guarded(size_t count)
+{
+    size_t usable = (count * sizeof(double) + PAGE - 1) / PAGE * PAGE;
+    char *memory = VirtualAlloc(NULL, usable + PAGE, MEM_COMMIT | MEM_RESERVE, PAGE_READWRITE);
+    DWORD before;
+    if (!memory)
+        give_up("not enough memory for the FMU and what surrounds it");
+    VirtualProtect(memory + usable, PAGE, PAGE_NOACCESS, &before);
+    return (double *)(memory + usable) - count;
+}
+
+void prepare_solver(struct fmu *fmu, struct plan *plan)
+{
+    struct solver *s = &solver;
+    get_sizes(fmu);
+    int is_known = s->fmu && s->n == fmu->states && s->indicators == fmu->indicators;
+    s->fmu = fmu;
+    s->plan = plan;
+    s->n = fmu->states;
+    s->indicators = fmu->indicators;
+    find_functions(s);
+    if (is_known)
+        return;
+    s->weights = need(s->n, sizeof(double));
+    s->x = guarded(s->n);
+    s->new_x = guarded(s->n);
+    for (int i = 0; i < STAGES; i++)
+        s->stages[i] = guarded(s->n);
+    for (int i = 0; i < 4; i++)
+        s->work[i] = guarded(s->n);
+    s->jacobian = need(s->n * s->n, sizeof(double));
+    s->factors = need(s->n * s->n, sizeof(double));
+    s->pivots = need(s->n, sizeof(size_t));
+    double **z[] = {&s->z, &s->new_z, &s->z_low, &s->z_high, &s->z_trial};
+    for (int i = 0; i < 5; i++)
+        *z[i] = guarded(s->indicators);
+}
+
+static struct outcome checked(unsigned status)
+{
+    return (struct outcome){status, status > 1 ? GETTING : DONE};
+}
+
+static struct outcome start(struct solver *s)
+{
+    s->time = 0.0;
+    s->next_step = s->plan->max_step;
+    s->next_event = INFINITY;
+    s->column = 1;
+    s->implicit = s->stiff_hits = s->other_hits = s->events = s->jacobian_known = 0;
+    for (size_t i = 0; i < s->n; i++) {
+        s->x[i] = s->new_x[i] = 0.0;
+        s->weights[i] = 1.0;
+    }
+    for (size_t i = 0; i < s->indicators; i++)
+        s->z[i] = s->new_z[i] = 0.0;
+    struct outcome o = checked(get_nominals(s, s->weights));
+    for (size_t i = 0; i < s->n; i++) {
+        double nominal = s->weights[i] > 0.0 ? s->weights[i] : 1.0;
+        s->weights[i] = ABSOLUTE_SHARE * s->plan->solver_tolerance * nominal;
+    }
+    return o.where == DONE ? checked(get_states(s)) : o;
+}
+
+/* Get from initialisation to continuous time, handling the events at time 0. */
+static struct outcome begin(struct solver *s, const struct event_info_1 *first)
+{
+    struct outcome o = start(s);
+    if (o.where != DONE)
+        return o;
+    if (s->fmu->major > 1 || !first->converged) {
+        o = settle_events(s);
+    } else {
+        if (first->terminate)
+            return (struct outcome){0, TERMINATED};
+        s->next_event = first->has_next_time ? first->next_time : INFINITY;
+        o = refresh(s);
+    }
+    if (o.where == DONE && s->fmu->major > 1) {
+        /* Event mode may have changed the states, whether the FMU reports it or not. */
+        o = checked(get_states(s));
+        if (o.where == DONE)
+            o = refresh(s);
+    }
+    return o.where == DONE ? checked(read_row(s->fmu, s->plan, 0)) : o;
+}
+
+static struct trial try_step(struct solver *s, double h)
+{
+    if (!s->implicit)
+        return explicit_step(s, h);
+    struct trial t = implicit_step(s, h);
+    /* The FMU was last evaluated at an iterate of Newton's method; set it to the end of the step. */
+    if (t.status <= 1 && isfinite(t.error))
+        t.status = derive(s, s->time + h, s->new_x, s->work[1]);
+    return t;
+}
+
+/* Count steps at the limit of stability; after enough of them step_towards changes to implicit steps. */
+static void watch_stiffness(struct solver *s, double stiffness)
+{
+    if (stiffness > STIFF_BOUND) {
+        s->other_hits = 0;
+        s->stiff_hits++;
+    } else if (s->stiff_hits && ++s->other_hits >= OTHER_STEPS) {
+        s->stiff_hits = 0;
+    }
+}
+
+static double spacing(double x)
+{
+    return nextafter(x, INFINITY) - x;
+}
+
+/* Shorten the step until its error is within the tolerance. */
+static struct outcome accepted_step(struct solver *s, double *h)
+{
+    double tried = *h;
+    for (;;) {
+        struct trial t = try_step(s, *h);
+        if (t.status > 2)
+            return (struct outcome){t.status, STEPPING};
+        double factor = MIN_FACTOR;
+        if (t.status != 2 && isfinite(t.error)) {
+            factor = SAFETY * pow(fmax(t.error, 1e-10), -1.0 / (s->implicit ? 4.0 : 5.0));
+            factor = fmin(MAX_FACTOR, fmax(MIN_FACTOR, factor));
+        }
+        int is_accepted = t.status <= 1 && t.error <= 1.0;
+        if (is_accepted) {
+            /* A step that was cut short by a target is no reason to propose less than before. */
+            double proposal = *h < tried ? *h * factor : fmax(*h * factor, s->next_step);
+            s->next_step = fmin(proposal, s->plan->max_step);
+        } else {
+            *h = s->next_step = *h * fmin(factor, 0.9);
+        }
+        if (!s->implicit && isfinite(t.error))
+            watch_stiffness(s, t.stiffness);
+        if (is_accepted)
+            return (struct outcome){t.status, DONE};
+        /* Give up once the step is too small to change the time in floating point. */
+        if (*h < 4.0 * spacing(fmax(fabs(s->time), 1e-3 * s->plan->stop_time)))
+            return (struct outcome){0, TOO_SMALL};
+    }
+}
+
+static int changes_sign(const struct solver *s, const double *z)
+{
+    for (size_t i = 0; i < s->indicators; i++)
+        if ((s->z[i] > 0.0) != (z[i] > 0.0))
+            return 1;
+    return 0;
+}
+
+/* Locate the first sign change within the last trial step; theta is just after it.
+ *
+ * Alternates two trials on either side of the secant's root with a bisection, which guarantees convergence. */
+static unsigned locate(struct solver *s, double h, double *theta)
+{
+    double low = 0.0, width = fmax(1e-13, 0.1 * rounding(s->time) / h);
+    size_t bytes = s->indicators * sizeof(double);
+    memcpy(s->z_low, s->z, bytes);
+    memcpy(s->z_high, s->new_z, bytes);
+    memcpy(s->z_trial, s->new_z, bytes);
+    *theta = 1.0;
+    for (int trial = 0; *theta - low > width; trial++) {
+        double gap = *theta - low, root = 0.5;
+        if (trial % 3 != 2) {
+            root = 1.0;
+            for (size_t i = 0; i < s->indicators; i++)
+                if ((s->z_low[i] > 0.0) != (s->z_high[i] > 0.0) && s->z_low[i] != s->z_high[i])
+                    root = fmin(root, s->z_low[i] / (s->z_low[i] - s->z_high[i]));
+            root += trial % 3 == 0 ? 1e-3 : -1e-3;
+        }
+        double at = low + gap * fmin(fmax(root, 1e-4), 1.0 - 1e-4);
+        interpolate(s, h, at, s->implicit ? 5 : 6, s->work[0]);
+        unsigned status = derive(s, s->time + at * h, s->work[0], s->work[1]);
+        if (status <= 1)
+            status = get_indicators(s, s->z_trial);
+        if (status > 1)
+            return status;
+        if (changes_sign(s, s->z_trial)) {
+            *theta = at;
+            memcpy(s->z_high, s->z_trial, bytes);
+        } else {
+            low = at;
+            memcpy(s->z_low, s->z_trial, bytes);
+        }
+    }
+    return 0;
+}
+
+/* Repeat the last step up to the first sign change of an event indicator within it. */
+static struct outcome stop_at_event(struct solver *s, double *h)
+{
+    double theta, nudge = fmax(1e-12, rounding(s->time) / *h);
+    unsigned status = locate(s, *h, &theta);
+    if (status > 1)
+        return (struct outcome){status, EVENT};
+    for (;; theta += nudge, nudge *= 4.0) {
+        double shorter = *h * fmin(theta, 1.0);
+        struct trial t = try_step(s, shorter);
+        if (t.status <= 1 && isfinite(t.error))
+            t.status = get_indicators(s, s->new_z);
+        if (t.status > 1 || !isfinite(t.error))
+            return (struct outcome){t.status > 2 ? t.status : 2, STEPPING};
+        /* On the interpolant the sign may change slightly earlier than in the repeated step. */
+        if (changes_sign(s, s->new_z) || theta >= 1.0) {
+            *h = shorter;
+            return done;
+        }
+    }
+}
+
+/* The proposed step, adjusted so that no tiny step remains before the target. */
+static double step_size(const struct solver *s, double target)
+{
+    double left = target - s->time, h = s->next_step;
+    if (h >= left * (1.0 - 1e-6))
+        return left;
+    return 2.0 * h > left ? fmin(h, 0.5 * left) : h;
+}
+
+/* Do one accepted step that ends at the target, at an event or in between. */
+static struct outcome step_towards(struct solver *s, double target, int *wants_event)
+{
+    double h = step_size(s, target);
+    struct outcome o = accepted_step(s, &h);
+    if (o.where != DONE)
+        return o;
+    unsigned status = get_indicators(s, s->new_z);
+    if (status > 1)
+        return (struct outcome){status, EVENT};
+    *wants_event = changes_sign(s, s->new_z);
+    if (*wants_event) {
+        o = stop_at_event(s, &h);
+        if (o.where != DONE)
+            return o;
+    }
+    double end = s->time + h;
+    s->time = target - end <= rounding(target) ? target : end;
+    memcpy(s->x, s->new_x, s->n * sizeof(double));
+    memcpy(s->stages[0], s->stages[s->implicit ? 5 : 6], s->n * sizeof(double));
+    memcpy(s->z, s->new_z, s->indicators * sizeof(double));
+    if (s->stiff_hits >= STIFF_STEPS && !s->implicit) {
+        s->implicit = 1;
+        s->jacobian_known = 0;
+    }
+    int asks, ends;
+    status = complete_step(s, &asks, &ends);
+    if (status > 1)
+        return (struct outcome){status, STEPPING};
+    *wants_event = *wants_event || asks;
+    return (struct outcome){status, ends ? TERMINATED : DONE};
+}
+
+/* Do at most one step, handle the events at its end and record the outputs. */
+static struct outcome advance(struct solver *s)
+{
+    struct plan *plan = s->plan;
+    double grid_time = plan->stop_time * (double)s->column / (double)(plan->samples - 1);
+    double target = fmax(fmin(grid_time, fmin(next_break(s), s->next_event)), s->time);
+    int wants_event = 0;
+    if (target - s->time > rounding(target)) {
+        struct outcome o = step_towards(s, target, &wants_event);
+        if (o.where != DONE)
+            return o;
+    } else {
+        s->time = target;
+    }
+    int jumps = enter_pieces(s);
+    if (wants_event || jumps || s->next_event <= s->time + rounding(s->time)) {
+        if (++s->events > MOST_EVENTS)
+            return (struct outcome){0, STUCK};
+        struct outcome o = handle_event(s);
+        if (o.where != DONE) {
+            /* A model that terminates at the stop time has finished: only the last sample is left. */
+            int is_last = s->column == plan->samples - 1 && plan->stop_time - s->time <= rounding(s->time);
+            if (o.where != TERMINATED || !is_last)
+                return o;
+            s->next_event = INFINITY;
+        }
+    }
+    if (grid_time <= s->time + rounding(s->time)) {
+        unsigned status = read_row(s->fmu, plan, s->column);
+        if (status > 1)
+            return (struct outcome){status, GETTING};
+        s->column++;
+        s->events = 0;
+    }
+    return done;
+}
+
+/* Solve the differential equation up to the stop time. */
+struct outcome solve(
+    struct fmu *fmu, struct plan *plan, const struct event_info_1 *first_events, double deadline, double *reached)
+{
+    struct solver *s = &solver;
+    (void)fmu;
+    struct outcome o = begin(s, first_events);
+    for (size_t k = 1; o.where == DONE && s->column < plan->samples; k++) {
+        o = advance(s);
+        int is_late = k % STEPS_PER_CLOCK_CHECK == 0 && now() > deadline;
+        if (is_late && o.where == DONE && s->column < plan->samples)
+            o = (struct outcome){0, TIMEOUT};
+    }
+    *reached = s->time;
+    return o;
+}

@@ -1,0 +1,147 @@
+/* What the parts of the worker share: the FMU, the plan of its simulations, and the outcome of each request.
+ *
+ * The worker runs FMUs' Windows libraries; see main.c. Stepping and solver do the same operations in the same
+ * order as the Python modules of the same names, so that both give the same trajectories. */
+
+#ifndef WORKER_H
+#define WORKER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Where a simulation stopped. The first eight are those of stepping.py, the others are named in windows.py. */
+enum where {
+    DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL,
+    CALLING = 20,   /* a function at the start of the simulation; the text names it */
+    WRITING,        /* the first values; the text says which */
+    TEXT,           /* a string parameter; the text is its position */
+    TIMEOUT,        /* the time limit */
+    IMPOSSIBLE,     /* the FMU cannot be used; the text says why */
+    REFUSED,        /* a reset or a saved state, without consequences */
+    MESSAGE,        /* not an outcome: a message of the FMU */
+    CRASHED         /* not an outcome: the last words of a process; the status is Windows' exception code */
+};
+
+/* FMI's status is unsigned: a negative one, which FMI does not define, is larger than all others. */
+struct outcome {
+    unsigned status;
+    enum where where;
+};
+
+struct fmu {
+    int major, is_model_exchange, logging, event_mode;
+    size_t states, indicators;
+    char *library, *identifier, *name, *token, *resources;
+    void *module, *instance, *state;
+};
+
+/* One get or set call. */
+struct call {
+    void *function;
+    uint32_t *references;
+    size_t count;
+    void *values;
+    size_t size;
+};
+
+/* Where the value of one variable is: storage type (the position in ports.STORAGE), address, and sign. */
+struct place {
+    int storage, is_boolean;
+    double sign;
+    char *address;
+};
+
+struct ports {
+    struct call *calls;
+    size_t call_count;
+    struct place *places;
+    size_t count;
+};
+
+/* One piece of an input: c[0] + c[1] dt + c[2] dt^2 + c[3] dt^3 from its start; unused pieces start at inf. */
+struct piece {
+    double start, c[4];
+};
+
+/* Variables that are set during the simulation. */
+struct inputs {
+    struct ports ports;
+    const struct piece **rows;
+    size_t pieces;
+    size_t *current; /* the piece that each one is in */
+    double *values;  /* written last */
+};
+
+struct string {
+    uint32_t reference;
+    char *text;
+};
+
+struct plan {
+    double stop_time, max_step, tolerance, solver_tolerance;
+    int has_tolerance;
+    size_t samples, every, strings_count;
+    struct string *strings;
+    struct ports parameters, outputs;
+    struct inputs inputs, held; /* held: may change only at events */
+    const double *parameter_values;
+    double *recorded; /* one row per output, one column per sample */
+};
+
+/* fmiEventInfo */
+struct event_info_1 {
+    char converged, references_changed, states_changed, terminate, has_next_time;
+    double next_time;
+};
+
+/* library.c */
+const char *fmu_load(struct fmu *fmu); /* returns what went wrong, or NULL */
+const char *fmu_instantiate(struct fmu *fmu);
+void fmu_free(struct fmu *fmu);
+void *fmu_function(const struct fmu *fmu, const char *name); /* NULL if it is not exported */
+void *fmu_required(const struct fmu *fmu, const char *name); /* ends the request if it is not exported */
+
+/* ports.c */
+unsigned exchange_values(const struct fmu *fmu, const struct ports *ports);
+unsigned read_row(const struct fmu *fmu, const struct plan *plan, size_t column);
+unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers);
+void put(const struct place *place, double number);
+double rounding(double time);
+double start_of(const struct inputs *inputs, size_t j, size_t piece);
+double value_at(const struct inputs *inputs, size_t j, size_t piece, double time);
+int put_inputs(struct inputs *inputs, double time); /* returns whether any has changed */
+
+/* lifecycle.c */
+struct outcome initialise(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events);
+void terminate(struct fmu *fmu);
+int reset(struct fmu *fmu);
+int take_state(struct fmu *fmu);
+int restore_state(struct fmu *fmu);
+void forget_state(struct fmu *fmu);
+
+/* co_simulation.c */
+struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, double *reached);
+
+/* solver.c */
+void prepare_solver(struct fmu *fmu, struct plan *plan);
+struct outcome solve(
+    struct fmu *fmu, struct plan *plan, const struct event_info_1 *first_events, double deadline, double *reached);
+
+/* request.c */
+struct request {
+    char *at, *end;
+};
+void read_fmu(struct request *request, struct fmu *fmu);
+void read_plan(struct request *request, const struct fmu *fmu, struct plan *plan);
+char *read_text(struct request *request);
+double read_number(struct request *request);
+
+/* main.c */
+void give_up(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
+void say(unsigned status, const char *text); /* passes a message of the FMU on */
+void *need(size_t count, size_t size);       /* zeroed memory */
+double now(void);                            /* in s */
+
+extern const char *failing; /* the text of the next outcome */
+
+#endif
