@@ -137,17 +137,19 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     >>> did_you_mean("sped", ["rpm", "speed"])
     "did you mean 'speed'? Known: rpm, speed"
+    >>> did_you_mean("altitude", ["rpm", "speed"])
+    'known: rpm, speed'
     """
     name = name[:_LONGEST_NAME]
     names = list(dict.fromkeys(_shortened(other, _LONGEST_NAME) for other in known))
     shown = [*names[:_LISTED], *(["..."] if len(names) > _LISTED else [])]
-    listing = f"Known: {', '.join(shown) or 'none'}"
+    listing = f"known: {', '.join(shown) or 'none'}"
     # Also names that differ in the case of letters only.
     folded = {other.casefold(): other for other in reversed(names)}
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     near = near or [folded[n] for n in difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)]
     found = folded.get(name.casefold()) or next(iter(near), None)
-    return f"did you mean {found!r}? {listing}" if found else listing
+    return f"did you mean {found!r}? K{listing[1:]}" if found else listing
 
 
 def _shortened(text: str, most: int) -> str:

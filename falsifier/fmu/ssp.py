@@ -193,11 +193,25 @@ def _check_connector(
             f"{flat.shown}: the connector {title} is of kind {connector.kind}, but the FMU's variable has "
             f"the causality {variable.causality}; use the FMU's"
         )
+    if connector.type and _kind(connector.type) != (
+        "integer" if variable.kind == "enumeration" else variable.kind
+    ):
+        raise SpecError(
+            f"{flat.shown}: the connector {title} is of type {connector.type}, but the FMU's variable of "
+            f"type {variable.type or variable.kind}; state the FMU's type"
+        )
     if connector.unit and variable.unit and connector.unit != variable.unit:
         raise SpecError(
             f"{flat.shown}: the connector {title} is in {connector.unit}, but the FMU's variable in "
             f"{variable.unit}; state the FMU's unit"
         )
+
+
+def _kind(type_name: str) -> str:
+    """Return the kind of the values of a connector; tools write enumerations as integers too."""
+    if type_name in ("Real", "Float32", "Float64"):
+        return "real"
+    return type_name.lower() if type_name in ("Boolean", "String") else "integer"
 
 
 def _wire(

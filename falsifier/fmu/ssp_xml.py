@@ -31,11 +31,12 @@ class Transformation:
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """A port of a component or system."""
+    """A port of a component or system; the type is the name of its element, empty if none is stated."""
 
     name: str
     kind: str
     unit: str
+    type: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +205,8 @@ def _part(element: Element) -> Part:
 def _connector(element: Element) -> Connector:
     typed = next((child for child in element if child.tag.rpartition("}")[2] in _VALUE_TAGS), None)
     unit = "" if typed is None else typed.get("unit", "")
-    return Connector(element.attrib["name"], element.attrib["kind"], "" if unit == "1" else unit)
+    kind = "" if typed is None else typed.tag.rpartition("}")[2]
+    return Connector(element.attrib["name"], element.attrib["kind"], "" if unit == "1" else unit, kind)
 
 
 def _transformation(element: Element) -> Transformation:

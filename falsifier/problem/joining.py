@@ -203,7 +203,7 @@ def _join_formula(
         inputs = [v.name for v in info.inputs]
         why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
-            f"{path}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH. "
+            f"{path}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH; "
             f"{did_you_mean('', inputs)}"
         )
     every = changes.model_copy(update={"inputs": bounded | changes.inputs})

@@ -57,7 +57,7 @@ def find_spec(target: str) -> tuple[Path, str | None]:
             f"falsifier prompt {shlex.quote(target)} --at N prints what was asked before sample N"
         )
     raise SpecError(
-        f"no spec file or bundled requirement {target!r}; give a file like my.toml:REQ, or a bundled name: "
+        f"no spec file or bundled requirement {target!r}; give a file like my.toml:REQ, or a bundled name; "
         f"{did_you_mean(name, names)}"
     )
 

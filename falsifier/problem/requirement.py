@@ -97,8 +97,8 @@ def similar(name: str, info: ModelInfo) -> str:
     usual = [v.name for v in (*info.observables, *info.inputs)]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))
-    if listing.startswith("Known") and not near.startswith("Known"):
-        return f"{near.split('?')[0]}? {listing}"
+    if listing.startswith("known") and not near.startswith("known"):
+        return f"{near.split('?')[0]}? K{listing[1:]}"
     return listing
 
 

@@ -26,7 +26,7 @@ def test_values_at_a_time() -> None:
 
 
 def test_missing_signals_and_unequal_lengths_are_named() -> None:
-    with pytest.raises(MonitorError, match=r"no signal 'z'.*Known: x, y"):
+    with pytest.raises(MonitorError, match=r"no signal 'z'.*known: x, y"):
         TRAJECTORY["z"]
     with pytest.raises(MonitorError, match="'x' has 3 samples, expected 11 as in the time grid"):
         Trajectory(TIMES, {"x": np.zeros(3)})

@@ -152,6 +152,10 @@ WRONG: list[tuple[str, str]] = [
         "the connector plant.u is of kind output, but the FMU's variable has the causality input",
     ),
     (
+        structure(system(PLANT.replace('Real unit="m"', "Boolean"))),
+        "the connector plant.u is of type Boolean, but the FMU's variable of type Real; state the FMU's type",
+    ),
+    (
         structure(system(PLANT.replace('unit="m"', 'unit="kg"'))),
         "the connector plant.u is in kg, but the FMU's variable in m",
     ),
@@ -159,7 +163,7 @@ WRONG: list[tuple[str, str]] = [
         structure(
             system(PLANT + PI, FEEDBACK.replace('"plant" endConnector="u"', '"plant" endConnector="v"'))
         ),
-        "the connection pi.y - plant.v names the unknown connector 'plant.v'; Known: u, y, T",
+        "the connection pi.y - plant.v names the unknown connector 'plant.v'; known: u, y, T",
     ),
     (
         structure(system(PLANT + PI, FEEDBACK.replace('startElement="pi"', 'startElement="po"'))),

@@ -14,8 +14,8 @@ ECHO = {"a": "Echo_3", "b": "Echo_3"}
 WRONG: list[tuple[dict[str, str], dict[str, str | Connection], str]] = [
     (PAIR, {"plnt.u": "pi.y"}, "pi.y -> plnt.u: no component of the name in 'plnt.u'.*did you mean 'plant'"),
     (PAIR, {"plant.u": "y"}, "y -> plant.u: no component of the name in 'y'.*COMPONENT.VARIABLE"),
-    (PAIR, {"plant.v": "pi.y"}, "pi.y -> plant.v: plant has no input 'v'; .*Known: u"),
-    (PAIR, {"plant.u": "pi.z"}, "pi.z -> plant.u: pi has no output 'z'; .*Known: y"),
+    (PAIR, {"plant.v": "pi.y"}, "pi.y -> plant.v: plant has no input 'v'; .*known: u"),
+    (PAIR, {"plant.u": "pi.z"}, "pi.z -> plant.u: pi has no output 'z'; .*known: y"),
     (PAIR, {"plant.T": "pi.y"}, "pi.y -> plant.T: plant.T is not an input, its causality is parameter"),
     (PAIR, {"plant.u": "pi.r"}, "pi.r -> plant.u: pi.r is not an output, its causality is input"),
     ({"a": "Arrays_3", "b": "Plant_2"}, {"a.u": "b.y"}, "b.y -> a.u: b.y has 1 elements, a.u has 2"),

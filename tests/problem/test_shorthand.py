@@ -14,7 +14,7 @@ from falsifier.problem.spec import InputSection
         ("=0:1", "expected NAME="),
         ("throttle=0:x", "'x' is not a number"),
         ("throttle=0:1:many", "not a number of control points"),
-        ("throttle=0:1:3:cubic", "Known: pchip, linear, constant"),
+        ("throttle=0:1:3:cubic", "known: pchip, linear, constant"),
         ("throttle=1:0:3", "low < high"),
     ],
 )
