@@ -97,7 +97,7 @@ def prompt(
         count=count,
         anonymous=anonymous,
         reply=reply or "json",
-        simulations=limit if limit is None or len(told) < limit else None,
+        simulations=limit,
         doubtful=doubtful_confirmations(problem, records, evaluations),
     )
     tools: tuple[Tool, ...] = ()

@@ -40,6 +40,10 @@ class CornerWalk:
         """Learn the cost of a corner; None if its simulation failed."""
         self._costs[levels] = inf if cost is None else cost
 
+    def heard(self, levels: Levels, cost: float) -> None:
+        """Learn the cost of a corner from a sample of someone else's, unless it has been tried."""
+        self._costs.setdefault(levels, cost)
+
     @property
     def settled(self) -> bool:
         """Whether every single flip of the best corner has been tried, without an improvement."""

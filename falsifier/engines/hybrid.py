@@ -39,6 +39,8 @@ from falsifier.stl import Verdict
 _LOG = logging.getLogger(__name__)
 # Characters of a reason in a remark.
 _LONGEST_REASON = 240
+# What the surrogate says in its reasons.
+_SCALED = "scaled robustness"
 
 # The LLM's candidates replace half of the inputs that only show how the system responds, but not the constant
 # extremes if a single one can violate the requirement: they would be missed if the LLM does not help.
@@ -310,6 +312,11 @@ class Hybrid:
             "The optimiser would simulate this next, if you propose nothing better: "
             f"{adviser.describe(self._numeric)}{because}."
         )
+        if any(_SCALED in line for line in lines):
+            lines.append(
+                "Scaled robustness is the robustness of signals that are each divided by their spread in the "
+                "samples so far; it too is below 0 for a violation."
+            )
         if not self._is_trusted:
             return [
                 *lines,

@@ -111,6 +111,16 @@ class Layout:
             point[group] = level
         return point
 
+    def nearest_extreme(self, point: Array, *, within: float) -> tuple[int, ...] | None:
+        """Return the levels of the constant extreme that a point is near to, in each coordinate; or None."""
+        levels = []
+        for group in self.groups:
+            level = round(float(point[group][0]))
+            if np.abs(point[group] - level).max() > within:
+                return None
+            levels.append(level)
+        return tuple(levels)
+
 
 def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
     """Return the layout with held cells for free inputs and the spec's control points for fixed ones."""

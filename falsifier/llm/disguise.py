@@ -38,6 +38,8 @@ from falsifier.stl.formula import Predicate
 
 Columns = Mapping[str, NDArray[np.float64]]
 
+# Of a signal between 0 and 1, so that it is told as exactly as one in the hundreds.
+_MORE_DECIMALS = 2
 _DESCRIPTION = (
     "Names are neutral and numbers have no units: everything that you choose runs from 0 to 1, and each "
     "signal is divided by a constant; signals that are compared have the same one"
@@ -107,6 +109,7 @@ class Disguise:
             experiment=replace(real.experiment, outputs=tuple(names[n] for n in real.experiment.outputs)),
             levels={names[name]: found for name, r in self._searched.items() if (found := levels(r))},
             tells_kinds=False,
+            more_decimals=_MORE_DECIMALS,
         )
 
     def fitted(self, evaluations: Sequence[Evaluation]) -> "Disguise":

@@ -51,8 +51,12 @@ def check_name(llm: str) -> None:
         ChatSetupError: stating the expected form.
     """
     provider, _, name = llm.partition("/")
-    if name and (provider in PROVIDERS or _knows(llm)):
+    if name.strip("/ ") and (provider in PROVIDERS or _knows(llm)):
         return
+    if provider in PROVIDERS:
+        raise ChatSetupError(
+            f"{llm!r} names a provider, but no model: expected PROVIDER/MODEL such as openai/gpt-5-mini"
+        )
     raise ChatSetupError(
         f"{llm!r} does not name a known provider: expected PROVIDER/MODEL such as openai/gpt-5-mini; "
         f"{did_you_mean(provider, PROVIDERS)}"

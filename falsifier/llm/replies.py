@@ -80,16 +80,12 @@ class ReplyForm:
     def _named_parts(self) -> dict[str, Any]:
         parts: dict[str, Any] = {}
         if self.space.inputs:
-            name = {"type": "string", "enum": [r.name for r in self.space.inputs]}
-            signal = _object(name=name, values=_NUMBERS)
-            if self.is_free:
-                signal = _object(
-                    name=name,
-                    interpolation={"type": "string", "enum": list(INTERPOLATIONS)},
-                    times=_NUMBERS,
-                    values=_RUNS,
-                )
-            parts["signals"] = {"type": "array", "items": signal}
+            kinds: dict[tuple[str, ...], list[str]] = {}
+            for r in self.space.inputs:
+                kinds.setdefault(_interpolations(r) if self.is_free else (), []).append(r.name)
+            signals = [_signal_part(names, possible) for possible, names in kinds.items()]
+            items = signals[0] if len(signals) == 1 else {"anyOf": signals}
+            parts["signals"] = {"type": "array", "items": items}
         if self.space.parameters:
             name = {"type": "string", "enum": [p.name for p in self.space.parameters]}
             parts["parameters"] = {"type": "array", "items": _object(name=name, value={"type": "number"})}
@@ -227,6 +223,22 @@ def _object(**properties: Any) -> dict[str, Any]:
         "required": list(properties),
         "additionalProperties": False,
     }
+
+
+def _signal_part(names: list[str], interpolations: tuple[str, ...]) -> dict[str, Any]:
+    """Schema of a signal with one of the names; without interpolations, its control points are fixed."""
+    name = {"type": "string", "enum": names}
+    if not interpolations:
+        return _object(name=name, values=_NUMBERS)
+    interpolation = {"type": "string", "enum": list(interpolations)}
+    return _object(name=name, interpolation=interpolation, times=_NUMBERS, values=_RUNS)
+
+
+def _interpolations(r: InputRange) -> tuple[str, ...]:
+    """Interpolations that an input can have if others are free."""
+    if r.free is None:
+        return (r.interpolation,)
+    return INTERPOLATIONS if r.kind == "real" else ("constant",)
 
 
 class _Reply(BaseModel):

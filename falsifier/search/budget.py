@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
+from falsifier.llm.messages import Usage
 from falsifier.search.moves import Objective
 
 # Maximum number of simulations of a run if nothing else is said.
@@ -28,7 +29,8 @@ class Spent:
         seconds: wall-clock time of the run.
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
-        calls: requests to a language model that were answered.
+        calls: requests to a language model that were answered or timed out.
+        timed_out: number of them that timed out.
         prompt_tokens: tokens sent.
         completion_tokens: tokens received, including reasoning.
         reasoning_tokens: part of them used for reasoning, if the provider reports it.
@@ -45,6 +47,7 @@ class Spent:
     reasoning_tokens: int = 0
     cost: float | None = 0.0
     failures: int = 0
+    timed_out: int = 0
     scouts: int = 0
 
     @property
@@ -63,15 +66,16 @@ class Spent:
         """Tokens sent and received."""
         return self.prompt_tokens + self.completion_tokens
 
-    def plus_call(self, *, prompt: int, completion: int, reasoning: int, cost: float | None) -> "Spent":
-        """Return this with one more answered request to a language model."""
+    def plus_requests(self, count: int, usage: Usage) -> "Spent":
+        """Return this with more requests to a language model, and what they used."""
         return replace(
             self,
-            calls=self.calls + 1,
-            prompt_tokens=self.prompt_tokens + prompt,
-            completion_tokens=self.completion_tokens + completion,
-            reasoning_tokens=self.reasoning_tokens + reasoning,
-            cost=None if cost is None or self.cost is None else self.cost + cost,
+            calls=self.calls + count,
+            timed_out=self.timed_out + usage.timed_out,
+            prompt_tokens=self.prompt_tokens + usage.prompt_tokens,
+            completion_tokens=self.completion_tokens + usage.completion_tokens,
+            reasoning_tokens=self.reasoning_tokens + usage.reasoning_tokens,
+            cost=None if usage.cost is None or self.cost is None else self.cost + usage.cost,
         )
 
 

@@ -99,7 +99,7 @@ def search(
     except ChatError as error:
         status, reason = "failed", str(error)
         if error.lost is not None:
-            loop.count_usage(error.lost)
+            loop.count_requests(error.lost.timed_out, error.lost)
     except BaseException as error:
         with suppress(Exception):  # an error in a listener must not hide the first one
             loop.end("failed", f"{type(error).__name__}: {error}")
@@ -318,17 +318,12 @@ class _Loop:
 
     def exchanged(self, exchange: Exchange) -> None:
         """Count and announce an exchange with a language model."""
-        self.count_usage(exchange.usage)
+        self.count_requests(exchange.requests, exchange.usage)
         self.emit(Exchanged(exchange=exchange, spent=self.clock()))
 
-    def count_usage(self, usage: Usage) -> None:
+    def count_requests(self, count: int, usage: Usage) -> None:
         """Count what was asked of a language model."""
-        self.spent = self.spent.plus_call(
-            prompt=usage.prompt_tokens,
-            completion=usage.completion_tokens,
-            reasoning=usage.reasoning_tokens,
-            cost=usage.cost,
-        )
+        self.spent = self.spent.plus_requests(count, usage)
 
     def clock(self) -> Spent:
         """Update and return what has been spent."""

@@ -168,7 +168,8 @@ def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
     costs = [usage.cost for usage in usages if usage.cost is not None]
     cost = None if spent.cost is None else max(0.0, round(spent.cost - sum(costs), 12))
     return Spent(
-        calls=spent.calls - len(played),
+        calls=spent.calls - sum(exchange.requests for exchange in played),
+        timed_out=spent.timed_out - sum(usage.timed_out for usage in usages),
         prompt_tokens=spent.prompt_tokens - sum(usage.prompt_tokens for usage in usages),
         completion_tokens=spent.completion_tokens - sum(usage.completion_tokens for usage in usages),
         reasoning_tokens=spent.reasoning_tokens - sum(usage.reasoning_tokens for usage in usages),

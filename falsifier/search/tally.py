@@ -113,13 +113,8 @@ class Tally:
             case ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
-                usage = Exchange.model_validate(record.exchange).usage
-                self._spent = self._spent.plus_call(
-                    prompt=usage.prompt_tokens,
-                    completion=usage.completion_tokens,
-                    reasoning=usage.reasoning_tokens,
-                    cost=usage.cost,
-                )
+                exchange = Exchange.model_validate(record.exchange)
+                self._spent = self._spent.plus_requests(exchange.requests, exchange.usage)
             case EndedRecord():
                 self.status = _ended(record.status)
                 self.reason = record.reason

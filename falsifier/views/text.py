@@ -228,7 +228,8 @@ def llm_use(spent: Spent) -> str:
     """Calls, tokens and cost of the language model."""
     cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
     reasoning = f" ({spent.reasoning_tokens} for reasoning)" if spent.reasoning_tokens else ""
-    return f"{counted(spent.calls, 'call')}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
+    lost = f" ({spent.timed_out} of them timed out)" if spent.timed_out else ""
+    return f"{counted(spent.calls, 'request')}{lost}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
 
 
 def seconds_text(spent: Spent) -> str:

@@ -23,6 +23,8 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
         *("prompt", "AT1", "--variant", "MP4", "--after", "run", "--samples", "1", "--json"), cwd=tmp_path
     )
     assert json.loads(printed.out) == sent
+    rich = falsifier("prompt", "AT1", "--after", "run", cwd=tmp_path).out
+    assert "2 of 100 simulations spent, 98 left. Propose the next sample." in rich
     at = falsifier("prompt", "run", "--at", "2", cwd=tmp_path)
     assert sent[1]["content"] in at.out and "--- reply of openai/" in at.out
     assert at.out.endswith("--- rationale of sample 2 ---\nbecause\n")

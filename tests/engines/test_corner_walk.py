@@ -42,3 +42,14 @@ def test_a_failed_corner_is_tried_once_and_never_built_upon() -> None:
     third = walk.next(rng)
     assert third not in (None, first, second)
     assert sum(a != b for a, b in zip(second, third or (), strict=True)) == 1, "the best one is built upon"
+
+
+def test_a_corner_that_was_heard_of_is_built_upon_and_not_tried() -> None:
+    walk = CornerWalk(2)
+    walk.heard((0, 0), 1.0)
+    rng = np.random.default_rng(0)
+    first = walk.next(rng)
+    assert first in ((0, 1), (1, 0))
+    walk.learn(first, 2.0)
+    walk.heard(first, 0.5)
+    assert walk.next(rng) == tuple(1 - level for level in first)

@@ -164,6 +164,15 @@ def test_the_model_is_told_why_the_surrogate_chose_its_samples() -> None:
     assert any(note.startswith("The optimiser would simulate this next") for note in script.notes[1])
 
 
+def test_scaled_robustness_is_explained_where_a_reason_speaks_of_it() -> None:
+    problem = wide_problem("G[0,10] (x <= 9)")
+    engine, script = hybrid(problem, [[0.1], [0.3], [0.4], [0.5]])
+    drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=40)
+    spoken_of = [any("a scaled robustness of" in note for note in notes) for notes in script.notes]
+    explained = [any(note.startswith("Scaled robustness is") for note in notes) for notes in script.notes]
+    assert any(spoken_of) and spoken_of == explained
+
+
 def test_the_model_is_told_when_the_surrogate_errs() -> None:
     problem = wide_problem("G[0,10] (x <= 1)")
     engine, script = hybrid(problem, [[-1.0, 0.5], [0.0]])

@@ -23,3 +23,13 @@ def test_layouts_keep_to_the_allowed_parameterization() -> None:
     assert len(planning_layout(fixed.space, grid).codings[0].times) == 4
     assert [len(r.codings[0].times) for r in region_layouts(free.space, grid, (5, 8))] == [5, 8]
     assert len(region_layouts(fixed.space, grid, (5, 8))) == 1
+
+
+def test_a_point_near_a_constant_extreme_is_known_as_one() -> None:
+    problem = lag_problem(free=FREE, inputs=2, parameters=[START])
+    layout = planning_layout(problem.space, Grid.over(10.0, 10.0, cells=100, shortest=0.05))
+    assert layout.nearest_extreme(layout.constant((0.05, 0.95, 1.0)), within=0.1) == (0, 1, 1)
+    assert layout.nearest_extreme(layout.constant((0.05, 0.8, 1.0)), within=0.1) is None
+    stepping_in_time = layout.constant((0.0, 0.0, 0.0))
+    stepping_in_time[50:100] = 1.0
+    assert layout.nearest_extreme(stepping_in_time, within=0.1) is None

@@ -1,4 +1,13 @@
-from falsifier.llm.litellm_import import listed_price, may_take_tools
+import pytest
+
+from falsifier.errors import ChatSetupError
+from falsifier.llm.litellm_import import check_name, listed_price, may_take_tools
+
+
+@pytest.mark.parametrize("llm", ["openai", "openai/", "openai//", "ollama_chat/ "])
+def test_a_provider_alone_is_no_name(llm: str) -> None:
+    with pytest.raises(ChatSetupError, match="names a provider, but no model: expected PROVIDER/MODEL"):
+        check_name(llm)
 
 
 def test_prices() -> None:

@@ -194,6 +194,22 @@ def test_schema_is_in_the_strict_subset(named: bool, free: bool, count: int) -> 
     strict_subset(schema)
 
 
+def test_schema_offers_only_the_interpolations_that_are_possible() -> None:
+    free = Freedom(50, 0.1)
+    smooth, gear = InputRange("u", 0.0, 1.0, free=free), InputRange("g", 1.0, 4.0, free=free, kind="integer")
+
+    def items(*inputs: InputRange) -> dict[str, Any]:
+        schema = ReplyForm(SearchSpace(inputs, (), 10.0), free=True).schema()
+        strict_subset(schema)
+        found: dict[str, Any] = schema["properties"]["signals"]["items"]
+        return found
+
+    assert items(gear)["properties"]["interpolation"]["enum"] == ["constant"]
+    each = [one["properties"] for one in items(smooth, gear)["anyOf"]]
+    assert [one["name"]["enum"] for one in each] == [["u"], ["g"]]
+    assert [len(one["interpolation"]["enum"]) for one in each] == [3, 1]
+
+
 def test_schema_without_inputs_or_without_parameters() -> None:
     only_parameters = ReplyForm(SearchSpace((), SPACE.parameters, 10.0)).schema()
     assert list(only_parameters["properties"]) == ["rationale", "parameters"]

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.errors import SpecError
+from falsifier.llm.messages import Usage
 from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS, Budget, Spent, budget_of
 
 
@@ -22,10 +23,12 @@ def test_the_first_limit_that_is_reached_is_named(budget: Budget, spent: Spent, 
 
 
 def test_an_unknown_price_stays_unknown_and_forbids_a_limit_on_money() -> None:
-    known = Spent().plus_call(prompt=10, completion=5, reasoning=2, cost=0.01)
-    unknown = known.plus_call(prompt=10, completion=5, reasoning=0, cost=None)
+    once = Usage(prompt_tokens=10, completion_tokens=5, reasoning_tokens=2, cost=0.01)
+    known = Spent().plus_requests(1, once)
+    unknown = known.plus_requests(3, Usage(prompt_tokens=10, completion_tokens=5, timed_out=2))
     assert known.cost == pytest.approx(0.01)
-    assert unknown.plus_call(prompt=1, completion=1, reasoning=0, cost=0.01).cost is None
+    assert unknown.plus_requests(1, Usage(prompt_tokens=1, cost=0.01)).cost is None
+    assert (unknown.calls, unknown.timed_out) == (4, 2)
     assert unknown.tokens == 30
     with pytest.raises(SpecError, match="price of this language model is unknown"):
         Budget(None, cost=1.0).exceeded(unknown)

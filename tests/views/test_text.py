@@ -84,10 +84,16 @@ def test_where_every_simulation_failed_there_is_nothing_but_the_reason() -> None
 def test_what_the_language_model_used_is_told(found: Result) -> None:
     assert "language model" not in result_text(found)
     spent = Spent(
-        simulations=1, calls=3, prompt_tokens=90, completion_tokens=10, reasoning_tokens=4, cost=0.25
+        simulations=1,
+        calls=3,
+        timed_out=1,
+        prompt_tokens=90,
+        completion_tokens=10,
+        reasoning_tokens=4,
+        cost=0.25,
     )
     text = result_text(replace(found, spent=spent))
-    assert "3 calls, 100 tokens" in text and "0.2500 US dollars" in text
+    assert "3 requests (1 of them timed out), 100 tokens" in text and "0.2500 US dollars" in text
     unknown = result_text(replace(found, spent=replace(spent, cost=None)))
     assert "unknown" in unknown
 

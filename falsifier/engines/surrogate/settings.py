@@ -12,6 +12,7 @@ class Settings:
             are held; enough for pieces of 1 % of the horizon, few enough for a rollout in milliseconds.
         constants: number of constant extremes among the first simulations of a formula that a single extreme
             can violate; each reaches one steady state.
+        near_extreme: share of each range within which another engine's constant input stands for the extreme.
         pauses: number of constant extremes between the first switching signals.
         bangs: number of switching signals among the first simulations of a formula with nested windows.
         most_bangs: maximum number of switching signals in total; if that many random ones did not violate,
@@ -66,6 +67,7 @@ class Settings:
 
     cells: int = 100
     constants: int = 2
+    near_extreme: float = 0.1
     pauses: int = 2
     bangs: int = 2
     most_bangs: int = 8

@@ -107,6 +107,8 @@ class Surrogate:
                 self._failed.append(point)
             if pending is not None:
                 self._settle(pending, sample)
+            elif sample is not None:
+                self._hear(point, sample)
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
         """Return the verdicts that the better dynamics predict for candidates, without simulating them.
@@ -152,6 +154,12 @@ class Surrogate:
         if pending.forecast is not None and sample is not None:
             objective = self.history.scaled_objective()
             self.dynamics.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
+
+    def _hear(self, point: Array, sample: Sample) -> None:
+        """Learn from another engine's candidate; near a constant extreme, that one need not be simulated."""
+        levels = self.layout.nearest_extreme(point, within=self.settings.near_extreme)
+        if levels is not None:
+            self._walk.heard(levels, sample.robustness)
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])

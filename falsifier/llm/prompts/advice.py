@@ -9,15 +9,24 @@ from falsifier.llm.prompts.view import View
 from falsifier.stl.formula import Always, And, Formula, Implies
 
 
-def advice(view: View, variant: Variant) -> AdviceBlock:
-    """Advice that fits what the variant shows, how the requirement is built and what is chosen."""
+def advice(view: View, variant: Variant, *, is_flat: bool = False) -> AdviceBlock:
+    """Advice that fits what the variant shows, how the requirement is built and what is chosen.
+
+    Args:
+        view: the problem.
+        variant: which parts the prompt contains.
+        is_flat: whether all samples have the same robustness, so that what decided it gives no direction.
+    """
     if variant.is_published:
         return AdviceBlock(lines=guidance(view, variant))
     what = view.chosen
+    deciding = (
+        f"Look at the time that decided each robustness value, and change the {what} so that the signals "
+        "at that time move towards violating the requirement."
+    )
     samples = [
         f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs.",
-        f"Look at the time that decided each robustness value, and change the {what} so that the signals "
-        "at that time move towards violating the requirement.",
+        *([] if is_flat else [deciding]),
         "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
         "strategy.",
     ]

@@ -75,7 +75,7 @@ def build_prompt(
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
         history=_history(view, variant, evaluations, pending, notes, context, reply),
         budget=_budget(variant, evaluations, context),
-        advice=advice(view, variant),
+        advice=advice(view, variant, is_flat=_is_flat(evaluations)),
         reply=reply_block(view, variant, count, reply),
     )
 
@@ -262,7 +262,7 @@ def _sample(
     if rich:
         robustness = signed(evaluation.robustness, observations.ROBUSTNESS_DIGITS)
     else:
-        robustness = f"{evaluation.robustness:.{ROBUSTNESS_DECIMALS}f}"
+        robustness = f"{evaluation.robustness:.{ROBUSTNESS_DECIMALS + view.more_decimals}f}"
     return SampleLines(
         number=index + 1,
         mark=mark,
@@ -300,11 +300,16 @@ def _chosen(view: View, variant: Variant, candidate: Candidate, reply: ReplyKind
 def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:
     """Observations about all samples together."""
     values = [e.robustness for e in evaluations if e.robustness is not None]
-    distinct = {f"{v:.9g}" for v in values}
-    if len(values) < 2 or len(distinct) > 1:
+    if not _is_flat(evaluations):
         return []
     return [
         f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its value "
         "gives no direction. Look instead at how close a condition came to being true, how briefly a "
         "discrete value was held, and how far a signal was from its switching point."
     ]
+
+
+def _is_flat(evaluations: Sequence[Evaluation]) -> bool:
+    """Whether several samples have the same robustness, and none has another."""
+    values = [e.robustness for e in evaluations if e.robustness is not None]
+    return len(values) > 1 and len({f"{v:.9g}" for v in values}) == 1

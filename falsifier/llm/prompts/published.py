@@ -58,7 +58,7 @@ def _values_at_control_points(view: View, trajectory: Trajectory) -> Iterator[st
     times = {time for r in view.space.inputs for time in view.space.fixed_times(r)}
     for text, column in _told_columns(view, trajectory).items():
         values = (
-            f"{_output(column[trajectory.index(t)])} at {clock(view, t)}"
+            f"{_output(view, column[trajectory.index(t)])} at {clock(view, t)}"
             for t in sorted(times or {0.0, stop_time})
         )
         yield f"{text}: {', '.join(values)}"
@@ -85,7 +85,7 @@ def _decided(view: View, evaluation: Evaluation) -> str:
     else:
         at = trajectory.index(verdict.critical_time)
         there = {text: float(column[at]) for text, column in _told_columns(view, trajectory).items()}
-    values = ", ".join(f"{name} = {_output(value)}" for name, value in there.items())
+    values = ", ".join(f"{name} = {_output(view, value)}" for name, value in there.items())
     time = f"{verdict.critical_time:.{_clock_decimals(view.requirement.formula)}f} s"
     return f"the robustness was decided at t = {time}" + (f" with {values}" if values else "")
 
@@ -97,10 +97,11 @@ def _clock_decimals(formula: Formula) -> int:
     return min(found, _MOST_CLOCK_DECIMALS) or 1
 
 
-def _output(value: float) -> str:
-    for decimals in range(_FEWEST_DECIMALS, _MOST_DECIMALS):
+def _output(view: View, value: float) -> str:
+    fewest, most = _FEWEST_DECIMALS + view.more_decimals, _MOST_DECIMALS + view.more_decimals
+    for decimals in range(fewest, most):
         if float(text := f"{value:.{decimals}f}"):
             return text
     if value == 0:
-        return f"{0:.{_FEWEST_DECIMALS}f}"
-    return f"{value:.{_MOST_DECIMALS}f}"
+        return f"{0:.{fewest}f}"
+    return f"{value:.{most}f}"

@@ -154,7 +154,7 @@ def _parameter(line: ParameterLine) -> str:
     nominal = f", nominally {line.nominal}" if line.nominal else ""
     described = _described(line.description)
     return (
-        f"- number {line.name}{_bracketed(line.unit)}{described}; {_values(line)}{nominal}; "
+        f"- parameter {line.name}{_bracketed(line.unit)}{described}; {_values(line)}{nominal}; "
         "one value for the whole simulation"
     )
 
@@ -207,6 +207,8 @@ def _first(budget: BudgetBlock | None) -> str:
 def _left(budget: BudgetBlock | None) -> str:
     if budget is None:
         return ""
+    if budget.used >= budget.limit:
+        return f"{counted(budget.used, 'simulation')} spent. "
     return (
         f"{budget.used} of {counted(budget.limit, 'simulation')} spent, {budget.limit - budget.used} left. "
     )

@@ -11,7 +11,7 @@ from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 
 _RATIONALE = "why these values"
-_ALL_NOTE = "Every input and parameter must be given in every reply, also those that stay as they were."
+_ALL_NOTE = "Every {} must be given in every reply, also those that stay as they were."
 _FREE_NOTES = (
     'If "times" is empty, the values are evenly spaced control points from 0 to the stop time, however many '
     "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
@@ -45,8 +45,10 @@ def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "js
         ]
     example = json.dumps(one if count == 1 else {"candidates": [one]})
     several = len(space.names) > 1
+    what = " and ".join(["input"] * bool(space.inputs) + ["parameter"] * bool(space.parameters))
     return ReplyBlock(
-        example=example, notes=(*([_ALL_NOTE] if several else ()), *(_FREE_NOTES if free else ()))
+        example=example,
+        notes=(*([_ALL_NOTE.format(what)] if several else ()), *(_FREE_NOTES if free else ())),
     )
 
 

@@ -20,6 +20,8 @@ class View:
         experiment: stop time and output grid.
         levels: values that something searched can take, by name, if they are levels without a type.
         tells_kinds: whether types of signals are told.
+        more_decimals: decimals that the published variants tell in addition to theirs, which are those of
+            signals in the hundreds.
     """
 
     info: ModelInfo
@@ -28,6 +30,7 @@ class View:
     experiment: Experiment
     levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     tells_kinds: bool = True
+    more_decimals: int = 0
 
     @classmethod
     def of(cls, problem: Problem) -> "View":

@@ -97,6 +97,16 @@ def test_parameters_alone_are_tried_at_their_corners_first() -> None:
         assert count is not None and count <= 4
 
 
+def test_a_constant_of_someone_else_near_an_extreme_stands_for_it() -> None:
+    problem = lag_problem("G[0,10] (x <= 9)", inputs=1)
+    for level, opposite in ((-0.95, 1.0), (0.9, -1.0)):
+        for seed in range(3):
+            engine = Surrogate(problem, seed=seed, settings=HASTY)
+            engine.tell([evaluate(problem, problem.space.decode([level] * 4))])
+            (candidate,) = engine.ask()
+            assert candidate.signals["u"].values == (opposite,) * 4
+
+
 def test_uses_the_budget_up_without_a_false_claim_where_nothing_can_be_violated() -> None:
     problem = lag_problem("G[0,10] (x <= 1.25)", free=FREE)
     assert simulations_until_violation(problem, seed=0, budget=12) is None

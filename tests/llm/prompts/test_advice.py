@@ -1,11 +1,13 @@
 from dataclasses import replace
 
 from falsifier.core.space import InputRange
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.variants import VARIANTS
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 from falsifier.testing import FREE, lag_problem
+from tests.llm.prompts.support import told
 
 
 def lines(variant: str, formula: str = "G[0,10] (x <= 0.9)", *, free: bool = False) -> list[str]:
@@ -24,6 +26,16 @@ def test_advice_on_samples_waits_for_the_first() -> None:
     found = advice(View.of(lag_problem()), VARIANTS["MP5"])
     assert "earlier samples" in found.on_samples[0]
     assert not any("sample" in line for line in found.lines if "first samples" not in line)
+
+
+def test_where_robustness_is_flat_what_decided_it_gives_no_direction() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)")
+    one = evaluate(problem, problem.space.decode([0.0] * 4))
+    other = evaluate(problem, problem.space.decode([0.5] * 4))
+    for second, is_flat in ((one, True), (other, False)):
+        _, changing = told(problem, "MP5", [one, second])
+        assert ("The robustness is flat" in changing) is is_flat
+        assert ("Look at the time that decided" in changing) is not is_flat
 
 
 def test_any_conjunct_is_enough_where_there_are_some() -> None:

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import pytest
@@ -6,6 +7,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
 from falsifier.llm.prompts.context import Context
 from falsifier.problem.requirement import Requirement
@@ -150,3 +152,13 @@ def test_a_critical_time_has_the_decimals_of_the_times_in_the_formula(formula: s
 def test_outputs_that_are_compared_alone_are_told_by_themselves() -> None:
     problem, evaluation = transmission("AT51")
     assert "\n  gear: 1.0 at 0.0 s, " in told(problem, "MP3", [evaluation])[1]
+
+
+def test_scaled_signals_get_more_digits() -> None:
+    problem, evaluation = transmission()
+    disguise = Disguise.of(View.of(problem)).fitted([evaluation])
+    prompt = build_prompt(disguise.view, VARIANTS["MP4"], [disguise.hidden(evaluation)])
+    changing = render(prompt)[1].content
+    real = told(problem, "MP4", [evaluation])[1]
+    assert "robustness 0.419" in real and "robustness 0.00268" in changing
+    assert re.search(r"y1: 0\.000 at 0\.0 s, 0\.\d{3} at", changing)

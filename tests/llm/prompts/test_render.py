@@ -70,7 +70,7 @@ def test_blocks_come_in_order_with_an_empty_line_between_them() -> None:
             "G (x <= 1)",
             "- x [m]",
             "- input signal u",
-            "- number p",
+            "- parameter p",
             "first advice\nsecond advice",
             "{}\na note on the form",
         )

@@ -135,7 +135,7 @@ class TestMP5:
         standing, changing = told(
             problem, "MP5", [evaluate(problem, problem.space.decode([0, 0, 0, 0, 0.25]))]
         )
-        assert "- number x0 [m]: start; from -0.5 to 0.3333333333, nominally 0; one value" in standing
+        assert "- parameter x0 [m]: start; from -0.5 to 0.3333333333, nominally 0; one value" in standing
         assert "x0 = 0.25" in changing
 
     def test_aliasing_is_said_and_shown_densely(self) -> None:
