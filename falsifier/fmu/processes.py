@@ -1,6 +1,6 @@
 """The processes that simulate FMUs, as the process that requests simulations sees them.
 
-The nursery is started once; workers are forked from it, one per FMU and interface.
+The nursery is started once; workers are forked from it, one per FMU, interface and thread.
 """
 
 import contextlib

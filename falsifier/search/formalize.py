@@ -151,13 +151,7 @@ class _Asked:
         self._subject = subject
 
     def count(self, exchange: Exchange) -> None:
-        usage = exchange.usage
-        self.spent = self.spent.plus_call(
-            prompt=usage.prompt_tokens,
-            completion=usage.completion_tokens,
-            reasoning=usage.reasoning_tokens,
-            cost=usage.cost,
-        )
+        self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
 
     def read(self, text: str) -> list[Reading]:
         """Return the readings of a reply.

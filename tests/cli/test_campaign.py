@@ -116,8 +116,12 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_run_and_bench_state_the_same_defaults(command: Any) -> None:
     for name, budget, parameterization in (
-        ("run", "[default: 100]", "[default: free]"),
-        ("bench", "[default: (100; with --suite 1500)]", "[default: (free; with --suite fixed)]"),
+        ("run", "[default: (100; with --objective time none)]", "[default: free]"),
+        (
+            "bench",
+            "[default: (100; with --suite 1500; with --objective time none)]",
+            "[default: (free; with --suite fixed)]",
+        ),
     ):
         text = " ".join(command(name, "--help").stdout.split())
         assert budget in text and parameterization in text
