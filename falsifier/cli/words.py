@@ -154,7 +154,8 @@ def _file(subject: Subject, out: Path | None) -> Path:
     if out is None and subject.spec is None:
         raise SpecError("a bundled spec stays as it is: give another file with --out")
     file = out or subject.spec or Path()
-    if file != subject.spec and file.exists():
+    is_same = subject.spec is not None and file.resolve() == subject.spec.resolve()
+    if not is_same and file.exists():
         raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
     return file
 
