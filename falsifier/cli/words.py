@@ -110,13 +110,18 @@ def formalize(
         say(json.dumps(formalized_json(found) | {"written": written and list(written)}, indent=2))
         return
     say(formalized_text(found))
-    if choose is None and sys.stdin.isatty():
+    if choose is None and _may_ask():
         choose = _asked(len(found.readings))
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
     else:
         file, given = _write(found, choose, name, out)
         say(f"{file}: [requirements.{given}] written; to search: falsifier run {file}:{given}")
+
+
+def _may_ask() -> bool:
+    """Whether somebody sits at a terminal."""
+    return sys.stdin.isatty()
 
 
 def _asked(count: int) -> int | None:
@@ -149,7 +154,8 @@ def _file(subject: Subject, out: Path | None) -> Path:
     if out is None and subject.spec is None:
         raise SpecError("a bundled spec stays as it is: give another file with --out")
     file = out or subject.spec or Path()
-    if file != subject.spec and file.exists():
+    is_same = subject.spec is not None and file.resolve() == subject.spec.resolve()
+    if not is_same and file.exists():
         raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
     return file
 

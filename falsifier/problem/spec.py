@@ -293,8 +293,9 @@ TemplateSection = (
 
 def _kind_of_requirement(section: object) -> str | None:
     """Return which section a requirement is; None if there is no such template."""
-    is_table = isinstance(section, Mapping)
-    name = section.get("template") if is_table else getattr(section, "template", None)  # type: ignore[attr-defined]
+    name = getattr(section, "template", None)
+    if isinstance(section, Mapping):
+        name = section.get("template")
     if name is None:
         return "<formula>"
     return f"<{name}>" if name in TEMPLATES else None

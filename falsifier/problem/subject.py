@@ -112,6 +112,14 @@ def _of_model(fmu: Path) -> Subject:
     return Subject(problem, path, path.parent, text, is_new=True, free_grid=True)
 
 
+def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
+    """Change relative paths of FMUs to those from another file's folder."""
+    for section in (document.get("model", {}), *document.get("components", {}).values()):
+        if "fmu" in section and not Path(str(section["fmu"])).is_absolute():
+            fmu = (folder / str(section["fmu"])).resolve()
+            section["fmu"] = Path(relpath(fmu, out.resolve().parent)).as_posix()
+
+
 def with_requirement(
     subject: Subject, out: Path, formula: str, *, name: str | None = None, description: str = ""
 ) -> tuple[str, str]:
@@ -128,11 +136,8 @@ def with_requirement(
         SpecError: if the spec has a requirement of this name.
     """
     document = tomlkit.parse(subject.text)
-    sections = [document.get("model", {}), *document.get("components", {}).values()]
-    for section in sections:
-        if "fmu" in section:
-            fmu = (subject.folder / str(section["fmu"])).resolve()
-            section["fmu"] = Path(relpath(fmu, out.resolve().parent)).as_posix()
+    if subject.folder.resolve() != out.resolve().parent:
+        _relocate(document, subject.folder, out)
     requirements: Any = document["requirements"]
     if subject.is_new:
         del requirements[_PLACEHOLDER]

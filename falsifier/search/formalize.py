@@ -17,6 +17,7 @@ from falsifier.llm.readings import (
     read_readings,
     readings_schema,
 )
+from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.subject import Subject, subject_of
@@ -26,6 +27,7 @@ from falsifier.search.leaders import open_chat
 from falsifier.search.lint import ranges_of
 from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, in_words
+from falsifier.stl.formula import And
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import decided
 from falsifier.stl.tell_apart import tell_apart
@@ -268,14 +270,18 @@ def _start(start: float | str | None, low: float, high: float) -> float:
 
 
 def _difference(first: int, second: int, one: Reading, other: Reading) -> Difference:
-    finer = min((one.problem, other.problem), key=lambda p: p.experiment.output_interval)
+    experiments = [reading.problem.experiment for reading in (one, other)]
+    stop, finest = experiments[0].stop_time, min(e.output_interval for e in experiments)
+    step = fitting_interval(And(one.formula, other.formula), stop, finest)
+    if step is None:  # no grid of a reasonable size fits the windows of both
+        return Difference(first, second, None, None)
     found = [
         tell_apart(
             a.formula,
             b.formula,
-            step=finer.experiment.output_interval,
-            samples=finer.experiment.samples,
-            ranges=ranges_of(finer),
+            step=step,
+            samples=round(stop / step) + 1,
+            ranges=ranges_of(one.problem),
         )
         for a, b in ((one, other), (other, one))
     ]

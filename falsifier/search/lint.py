@@ -80,7 +80,7 @@ def lint(target: str, *, profile: str | None = None, simulations: int = SIMULATI
         findings += static_findings(problem)
     for group in alike(problems):
         findings += _repeated(group)
-        findings += _unmoved(group, simulations)
+        findings += unmoved_findings(group, simulations)
     for problem in problems:
         problem.model.close()
     return findings
@@ -187,8 +187,16 @@ def _repeated(group: Sequence[Problem]) -> Iterator[LintFinding]:
             yield LintFinding(other.name, "duplicate", "", text, "leave one of them out")
 
 
-def _unmoved(group: Sequence[Problem], simulations: int) -> Iterator[LintFinding]:
-    """Yield requirements about signals on which nothing that is searched has an effect."""
+def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[LintFinding]:
+    """Yield requirements about signals on which nothing that is searched has an effect.
+
+    What the FMU declares counts only if no simulation contradicts it. Without a declaration, signals that are
+    continuous and the same in all simulations count.
+
+    Args:
+        group: problems that differ only in their requirement.
+        simulations: number of random simulations; 0: only what the FMU declares.
+    """
     suspects = [p for p in group if not set(p.requirement.formula.signals) & set(p.space.names)]
     declared = {p.name: _is_declared_independent(p) for p in suspects}
     asked = [p for p in suspects if declared[p.name] or _is_continuous(p)]

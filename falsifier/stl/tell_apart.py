@@ -1,11 +1,13 @@
 """Trajectories that tell two formulas apart: one of them satisfies a formula and violates the other."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.errors import MonitorError
 from falsifier.stl.expression import Number
 from falsifier.stl.formula import Formula
 from falsifier.stl.intervals import Interval
@@ -49,7 +51,7 @@ def tell_apart(
     for switches in range(_ROUNDS):
         cuts = {n: rng.choice(moments, size=(_PER_ROUND, switches)) for n in names}
         columns = {n: _steps(rng, levels[n], cuts[n], samples) for n in names}
-        kept, broken = wanted.batch(columns), -unwanted.batch(columns)
+        kept, broken = _robustness(wanted, columns), -_robustness(unwanted, columns)
         valid = np.flatnonzero((kept >= 0) & (broken > 0))
         if len(valid):
             # Long pieces first: a spike of one sample tells readers little.
@@ -59,6 +61,18 @@ def tell_apart(
             times = np.linspace(0.0, step * (samples - 1), samples)
             return Trajectory(times, {n: column[best].copy() for n, column in columns.items()})
     return None
+
+
+def _robustness(monitor: Monitor, columns: Mapping[str, Floats]) -> Floats:
+    """Return the robustness of each trajectory; NaN for those outside the domain of a division or root."""
+    try:
+        return monitor.batch(columns)
+    except MonitorError:
+        found = np.full(_PER_ROUND, np.nan)
+        for k in range(_PER_ROUND):
+            with suppress(MonitorError):
+                found[k] = monitor.batch({name: column[k : k + 1] for name, column in columns.items()})[0]
+        return found
 
 
 def _levels(formulas: tuple[Formula, ...], allowed: Interval) -> Floats:

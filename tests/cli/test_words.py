@@ -2,7 +2,13 @@ import json
 import shutil
 from pathlib import Path
 
+import pytest
+from click.testing import CliRunner
+
+from falsifier.cli import cli
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
+from falsifier.problem.spec import read_spec
 from tests.cli.support import ENV
 from tests.command import falsifier
 from tests.llm.server import Server, Step, serving
@@ -96,3 +102,17 @@ def test_without_a_language_model_a_template_is_proposed(tmp_path: Path) -> None
     assert done.code == 0, done.err
     assert 'template = "rise"\n  signal = "speed"' in done.out
     assert falsifier("formalize", "AT1", "x", "--choose", "1", cwd=tmp_path).code == 2
+
+
+@pytest.mark.parametrize(("typed", "written"), [("1\n", True), ("0\n", False), ("5\n1\n", True)])
+def test_on_a_terminal_it_asks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typed: str, *, written: bool
+) -> None:
+    monkeypatch.setattr("falsifier.cli.words._may_ask", lambda: True)
+    monkeypatch.setattr(
+        "falsifier.search.formalize.open_chat", lambda _settings: ScriptedChat([REPLY.content or ""])
+    )
+    path = spec(tmp_path, WIDE)
+    done = CliRunner().invoke(cli, ["formalize", path, SENTENCE, "--llm", "openai/gpt-5-mini"], input=typed)
+    assert done.exit_code == 0, done.output
+    assert ("R1" in read_spec(Path(path)).requirements) is written

@@ -136,7 +136,7 @@ def ramp(rate: float) -> Trajectory:
 
 @pytest.mark.parametrize(("rate", "violated"), [(0.5, False), (1.0, False), (1.9, True), (8.0, True)])
 def test_levels_never_call_a_slow_signal_fast(rate: float, *, violated: bool) -> None:
-    """Levels are 0.4 apart, so that changes of 1 + 0.4 in 0.5 s... are found for certain."""
+    """In 0.5 s 0.5 is allowed, and levels are 0.4 apart: from 1.8 per second on it is found for certain."""
     text = section("ramp_limit", signal="x", limit=1, over=0.5, range=[0, 4], levels=10).expanded(STOP, STEP)
     assert Monitor(parse(text), STEP, 101).evaluate(ramp(rate)).violated is violated
 

@@ -259,6 +259,17 @@ def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, targ
         ask(server, target, replying(bad), replying(bad), reasks=1)
 
 
+def test_readings_on_different_grids_are_told_apart(server: Server, target: str, tmp_path: Path) -> None:
+    free = tmp_path / "free.toml"
+    free.write_text(SPEC.replace("output_interval = 0.1\n", ""))
+    good = {"satisfied": LOW, "violated": HIGH}
+    texts = ["G[0,12.5] (speed <= 120)", "G[0,0.24] (speed <= 120)"]
+    found = ask(server, str(free), replying(*({"formula": text} | good for text in texts)))
+    assert [str(r.formula) for r in found.readings] == texts
+    assert found.differences[0].only_first is None
+    assert found.differences[0].only_second is not None
+
+
 def test_an_empty_sentence_is_not_sent(server: Server, target: str) -> None:
     with pytest.raises(SpecError, match="expected a sentence"):
         ask(server, target, sentence=" ")

@@ -1,13 +1,16 @@
 """Findings on requirements that say nothing, and none on the bundled specs."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from zipfile import ZipFile
 
+import numpy as np
 import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
-from falsifier.search.lint import lint, static_findings
-from falsifier.testing import lag_problem
+from falsifier.search.lint import lint, static_findings, unmoved_findings
+from falsifier.testing import Array, lag_problem
 from tests.problem.support import AT, spec
 
 SPEC = f"""
@@ -93,19 +96,34 @@ def test_requirements_that_repeat_others_are_found(tmp_path: Path) -> None:
     assert [f.requirement for f in lint(spec(tmp_path, other), simulations=0)] == ["B"]
 
 
-def test_what_no_input_moves_is_measured_and_says_so(tmp_path: Path) -> None:
-    still = SPEC.replace(
-        "[inputs.throttle]\nrange = [0, 100]\ncontrol_points = 3", "[inputs.throttle]\nvalue = 0"
+def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Not even look at the input."""
+    return {"x": np.sin(times)}
+
+
+def test_what_no_input_moves_is_measured_and_says_so() -> None:
+    (found,) = unmoved_findings([lag_problem(response=still)], 3)
+    assert (found.kind, found.place) == ("unmoved", "")
+    assert found.text.startswith("measured: x was the same in 3 random simulations; the FMU does not declare")
+    assert not list(unmoved_findings([lag_problem()], 3))
+    assert not list(unmoved_findings([lag_problem(response=still)], 0))
+
+
+def test_what_the_fmu_declares_counts_unless_a_simulation_contradicts_it(tmp_path: Path) -> None:
+    fmu = tmp_path / "car.fmu"
+    with ZipFile(AT) as old, ZipFile(fmu, "w") as new:
+        for item in old.infolist():
+            content = old.read(item)
+            if item.filename == "modelDescription.xml":
+                outputs, rest = content.split(b"</Outputs>")
+                content = outputs.replace(b'" />', b'" dependencies="" />') + b"</Outputs>" + rest
+            new.writestr(item, content)
+    text = (
+        SPEC.replace(AT.as_posix(), fmu.as_posix()) + "[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"
     )
-    still += (
-        "[parameters]\nfinalDrive.range = [3.0, 3.1]\n[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"
-    )
-    found = lint(spec(tmp_path, still), simulations=3)
-    moving = lint(
-        spec(tmp_path, SPEC + "[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"), simulations=3
-    )
-    assert moving == []
-    assert all(f.text.startswith("measured: ") for f in found)
+    (declared,) = lint(spec(tmp_path, text), simulations=0)
+    assert declared.text.startswith("declared: the FMU's structure has no path")
+    assert lint(str(tmp_path / "my.toml"), simulations=2) == []
 
 
 def test_a_spec_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:

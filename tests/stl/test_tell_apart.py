@@ -27,6 +27,13 @@ def test_an_example_satisfies_only_one(one: str, other: str) -> None:
     assert all(RANGES[n].low <= c.min() and c.max() <= RANGES[n].high for n, c in found.columns.items())
 
 
+def test_values_outside_the_domain_are_left_out() -> None:
+    a, b = parse("F[0,5] (x/b >= 3)"), parse("G[5,5] (x/b >= 3)")
+    found = tell_apart(a, b, step=0.5, samples=21, ranges=RANGES)
+    assert found is not None
+    assert Monitor(b, 0.5, 21).evaluate(found).violated
+
+
 def test_what_one_implies_has_no_example() -> None:
     narrow, wide = parse("G[0,10] (x <= 3)"), parse("G[0,5] (x <= 3)")
     assert tell_apart(narrow, wide, step=0.5, samples=21, ranges=RANGES) is None
