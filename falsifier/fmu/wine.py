@@ -115,12 +115,16 @@ class WineProcess:
         os.mkfifo(replies, 0o600)
         self._replies = os.open(replies, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         self._received = b""
+        # All that Wine starts holds the other end, so this one tells when the last of it has ended.
+        self._everything, theirs = os.pipe()
         self._process = subprocess.Popen(
             [wine, windows_path(WORKER)],
             stdin=subprocess.PIPE,
             env=_environment(self.folder, prefix),
             bufsize=0,
+            pass_fds=[theirs],
         )
+        os.close(theirs)
         self._life = posix.open_life(self._process.pid)
         self.request(_CONNECT, text(windows_path(replies)))
         self._connected = True
@@ -148,6 +152,11 @@ class WineProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        # Wine's server ends a little later; it complains if its folder is gone by then.
+        ending = select.poll()
+        ending.register(self._everything, select.POLLIN)
+        ending.poll(_CLOSING_SECONDS * 1e3)
+        os.close(self._everything)
         os.close(self._replies)
         if self._life is not None:
             os.close(self._life)

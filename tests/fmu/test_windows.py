@@ -18,6 +18,7 @@ from tests.fixtures.fmus.catalogue import FIXTURES, WINDOWS
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ME, run
 from tests.fmu.support import ABORT, CRASH, DISCARD, END, ERROR, EXIT, HANG, PRINT, TALK
+from tests.hostile.test_model_exchange import MISDEEDS
 
 needs_wine = pytest.mark.skipif(
     wine.find_wine() is None or not wine.can_run_windows(),
@@ -119,6 +120,30 @@ def test_errors_are_those_of_the_other_libraries(misdeeds: FmuModel, misdeed: in
         expected.time,
         expected.log,
     )
+
+
+# The solver's errors: a step that fails, a status that FMI does not define, numbers written past the end of
+# an array, events without end, and the FMU's wish to end.
+@needs_wine
+@pytest.mark.parametrize("misdeed", ["not a number", "odd status", "long indicators", "dense events", "end"])
+def test_errors_of_model_exchange_are_the_same_too(misdeed: str) -> None:
+    said = []
+    for model in (fixtures.isolated("Wild_2", ME), through_wine("Wild_2", ME)):
+        with pytest.raises(SimulationError) as caught:
+            run(model, ("x",), parameters={"misdeed": list(MISDEEDS).index(misdeed)})
+        said.append((str(caught.value), caught.value.status, caught.value.time))
+        model.close()
+    assert said[0] == said[1] and MISDEEDS[misdeed] in said[0][0]
+
+
+@needs_wine
+@pytest.mark.parametrize("interface", ["co-simulation", ME])
+def test_the_time_limit_is_watched_between_steps(interface: Interface) -> None:
+    model = FmuModel(FOLDER / "Lag_2.fmu", interface, isolate=False)
+    with pytest.raises(SimulationError, match=r"after the time limit of 1e-09 s; slow models") as caught:
+        run(model, ("y",), interval=0.001, time_limit=1e-9)
+    model.close()
+    assert caught.value.status == "timeout" and caught.value.time == pytest.approx(0.1, abs=1e-6)
 
 
 @needs_wine
