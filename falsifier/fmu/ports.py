@@ -45,6 +45,7 @@ class Ports:
             address and number of the values.
         places: one row per variable: storage code, address of the value, sign (-1 for a negated alias), and
             1 for a Boolean.
+        fixed: the same for elements that are fixed; see ``make_ports``.
         limits: smallest and largest number of each variable's type, shape (n, 2); infinite for floating
         point. memory: the arrays to which the addresses point; a reference keeps them alive. table: argument
         of the compiled loops: address and number of calls, address and number of places. is_limited: whether
@@ -53,26 +54,30 @@ class Ports:
 
     calls: Table
     places: Table
+    fixed: Table
     limits: NDArray[np.float64]
     memory: tuple[NDArray[np.generic], ...]
     table: Addresses
     is_limited: bool
 
 
-def make_ports(description: Description, names: Sequence[str], addresses: Mapping[str, int]) -> Ports:
+def make_ports(
+    description: Description, names: Sequence[str], addresses: Mapping[str, int], fixed: Sequence[str] = ()
+) -> Ports:
     """Return the calls and memory locations for the named variables.
 
     Args:
         description: description of the FMU.
         names: names of the variables, in the order of the rows of ``places``.
         addresses: addresses of either the get or the set functions, by type code.
+        fixed: other elements of the same arrays, which keep the value that is written to them once.
 
     Raises:
         ModelError: if the library does not export the function for a type.
     """
-    slots = [description.slot(name) for name in names]
-    places = np.zeros((len(names), 4), dtype=np.int64)
-    limits = np.tile(np.array([-np.inf, np.inf]), (len(names), 1))
+    slots = [description.slot(name) for name in (*names, *fixed)]
+    places = np.zeros((len(slots), 4), dtype=np.int64)
+    limits = np.tile(np.array([-np.inf, np.inf]), (len(slots), 1))
     calls, memory = [], []
     for code in dict.fromkeys(slot.type for slot in slots):
         members = [slot for slot in slots if slot.type == code]
@@ -102,12 +107,25 @@ def make_ports(description: Description, names: Sequence[str], addresses: Mappin
     rows = np.array(calls, dtype=np.int64).reshape(-1, 5)
     return Ports(
         calls=rows,
-        places=places,
-        limits=limits,
+        places=places[: len(names)],
+        fixed=places[len(names) :],
+        limits=limits[: len(names)],
         memory=tuple(memory),
-        table=(rows.ctypes.data, len(rows), places.ctypes.data, len(places)),
-        is_limited=bool(np.isfinite(limits).any()),
+        table=(rows.ctypes.data, len(rows), places.ctypes.data, len(names)),
+        is_limited=bool(np.isfinite(limits[: len(names)]).any()),
     )
+
+
+def fixed_elements(description: Description, inputs: Sequence[str], parameters: Sequence[str]) -> list[int]:
+    """Return the positions of the parameters that are other elements of the inputs' arrays (FMI 3).
+
+    Setting an input sets its whole array, and must not put these back to their start values.
+    """
+    slots = [description.slot(name) for name in inputs]
+    arrays = {slot.reference for slot in slots if slot.size > 1}
+    driven = {(slot.reference, slot.offset) for slot in slots}
+    found = [(k, description.slot(name)) for k, name in enumerate(parameters)]
+    return [k for k, s in found if s.reference in arrays and (s.reference, s.offset) not in driven]
 
 
 def _sizes(slots: Sequence[Slot]) -> dict[int, int]:

@@ -14,7 +14,7 @@ from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library, load_binding, status_name
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.ports import Ports, fixed_elements, make_ports
 from falsifier.fmu.strings import set_strings
 
 
@@ -40,8 +40,9 @@ class Stepper(ABC):
         kinds = {v.name: v for v in description.info.variables}
         held = np.array([is_held(description, library.interface, kinds[n]) for n in plan.inputs], dtype=bool)
         self._held_rows, self._other_rows = np.flatnonzero(held), np.flatnonzero(~held)
-        self._inputs = make_ports(description, [plan.inputs[k] for k in self._other_rows], setters)
-        self._held_inputs = make_ports(description, [plan.inputs[k] for k in self._held_rows], setters)
+        self._fixed: list[tuple[Ports, list[int]]] = []
+        self._inputs = self._input_ports(description, self._other_rows, setters)
+        self._held_inputs = self._input_ports(description, self._held_rows, setters)
 
     def set_parameters(self) -> None:
         """Set the plan's parameters and start values."""
@@ -50,6 +51,8 @@ class Stepper(ABC):
         if self._parameters.is_limited:
             check_range(self._name, self._plan.parameters, self._parameters, values[:, np.newaxis])
         self._write(self._parameters, values, "parameters")
+        for ports, rows in self._fixed:
+            write_fixed(ports, values[rows])
 
     def set_first_inputs(self) -> None:
         """Set the inputs at time 0."""
@@ -59,6 +62,16 @@ class Stepper(ABC):
             pieces = self._pieces(rows)
             check_input_range(self._name, [self._plan.inputs[k] for k in rows], ports, pieces)
             self._write(ports, pieces[:, 0, 1].copy(), "inputs")
+
+    def _input_ports(
+        self, description: Description, rows: NDArray[np.intp], setters: dict[str, int]
+    ) -> Ports:
+        names, parameters = [self._plan.inputs[k] for k in rows], self._plan.parameters
+        fixed = fixed_elements(description, names, parameters)
+        ports = make_ports(description, names, setters, [parameters[k] for k in fixed])
+        if fixed:
+            self._fixed.append((ports, fixed))
+        return ports
 
     def _pieces(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return the pieces of some inputs, shape (rows, pieces, 5), contiguous in memory."""
@@ -173,6 +186,12 @@ def check_input_range(model: str, names: Sequence[str], ports: Ports, pieces: ND
         # Interpolated values are always between those at the ends of a piece.
         values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
         check_range(model, names, ports, values)
+
+
+def write_fixed(ports: Ports, values: NDArray[np.float64]) -> None:
+    """Write the values of the fixed elements of arrays to where the calls that set them take them from."""
+    for place, value in zip(ports.fixed, values.tolist(), strict=True):
+        loops().put(int(place.ctypes.data), float(value))
 
 
 def loops() -> Any:

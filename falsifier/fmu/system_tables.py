@@ -1,6 +1,7 @@
 """The tables of a system that the compiled loops of coupled_stepping.py work on."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +12,9 @@ from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.ports import Ports, fixed_elements, make_ports
 from falsifier.fmu.saved_state import SavedState
-from falsifier.fmu.stepper import check_range, is_held
+from falsifier.fmu.stepper import check_range, is_held, write_fixed
 
 if TYPE_CHECKING:
     from falsifier.fmu.system_solver import SystemSolver
@@ -44,6 +45,7 @@ class SystemTables:
     def __init__(self, network: Network, parts: Sequence[FmuInstance], plan: Plan, room: Room) -> None:
         self._network, self._parts, self._plan, self._room = network, parts, plan, room
         self._memory: list[object] = []
+        self._fixed: list[tuple[Ports, list[int]]] = []
         self._checked: list[tuple[str, list[str], Ports, list[int]]] = []
         sources = sorted(
             {
@@ -97,6 +99,8 @@ class SystemTables:
             # Interpolated values are always between those at the ends of a piece.
             values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
             check_range(name, names, ports, values)
+        for ports, rows in self._fixed:
+            write_fixed(ports, self._room.parameters[rows])
         for solver, _, places in self._solvers.values():
             solver.start_again([self._pieces_of(place) for place in places])
 
@@ -198,7 +202,7 @@ class SystemTables:
         member: Member,
         setters: dict[str, int],
     ) -> Ports:
-        ports = self._ports_to(row, ports_column, member, places, setters)
+        ports = self._ports_to(row, ports_column, member, places, setters, self._parameters_of(member))
         row[feeds_column] = self._feeds.ctypes.data + self._fed * self._feeds.itemsize * loops.FEED_WIDTH
         for place in places:
             self._feed(self._feeds[self._fed], place)
@@ -238,11 +242,23 @@ class SystemTables:
         member: Member,
         places: Iterable[Place],
         addresses: dict[str, int],
+        parameters: Mapping[str, int] = MappingProxyType({}),
     ) -> Ports:
-        ports = make_ports(member.description, [place.name for place in places], addresses)
+        names = [place.name for place in places]
+        known = list(parameters)
+        fixed = [known[k] for k in fixed_elements(member.description, names, known)]
+        ports = make_ports(member.description, names, addresses, fixed)
+        if fixed:
+            self._fixed.append((ports, [parameters[name] for name in fixed]))
         self._memory.append(ports)
         row[column : column + 4] = ports.table
         return ports
+
+    def _parameters_of(self, member: Member) -> dict[str, int]:
+        """Return the positions in the plan of a component's parameters, by their names in the component."""
+        places = ((self._network.places[name], k) for k, name in enumerate(self._plan.parameters))
+        members = self._network.members
+        return {p.name: k for p, k in places if p.member != SYSTEM and members[p.member] is member}
 
     def _address_of_signal(self, k: int) -> int:
         return int(self.signals.ctypes.data) + k * self.signals.itemsize * loops.SIGNAL_WIDTH

@@ -89,6 +89,7 @@ class Manifest(_Strict):
         description="Hash of what is searched and how it is simulated, by requirement."
     )
     model: str = Field(description="Name of the model.")
+    components: tuple[str, ...] = Field((), description="Names of the components, if the model is a system.")
     parameterization: Searched = Field(
         description="free: the engine could choose the control points of at least one input; refined: only "
         "after a search with the spec's own."
@@ -164,6 +165,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
+        components=problem.info.components,
         parameterization="refined" if is_refined else parameterization_of(levels[0].space),
         levels=tuple(
             LevelRecord(first=level.first, searched=parameterization_note(level.space))

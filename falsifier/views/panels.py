@@ -3,7 +3,7 @@
 Both the matplotlib figures and the charts in reports are drawn from these panels.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -78,6 +78,8 @@ class Panel:
         limits: range of an input.
         steps: whether values are held until the next sample.
         labels: names of its numbers if these are whole, empty if they have none; None for real values.
+        component: component of a system that it belongs to; empty for other models, and for a quantity of
+            several components.
     """
 
     title: str
@@ -89,6 +91,7 @@ class Panel:
     limits: tuple[float, float] | None = None
     steps: bool = False
     labels: Mapping[int, str] | None = None
+    component: str = ""
 
 
 def panels(
@@ -98,8 +101,11 @@ def panels(
     inputs: Iterable[Range],
     verdict: Verdict | None,
     labels: Mapping[str, Mapping[int, str]] | None = None,
+    components: Sequence[str] = (),
 ) -> list[Panel]:
     """Make the panels of one simulation: one per compared quantity, then one per searched input.
+
+    Those of a system are grouped by component, after quantities of several components.
 
     Args:
         formula: the requirement.
@@ -108,10 +114,27 @@ def panels(
         inputs: the searched inputs.
         verdict: robustness, and what decided it.
         labels: names of the numbers of signals that are not real, by signal.
+        components: names of the components of a system.
     """
-    quantities = [_quantity(trajectory, predicates, verdict) for predicates in _compared(formula).values()]
-    drawn = quantities + [_input(r, trajectory, candidate) for r in inputs]
-    return [_discrete(panel, labels or {}) for panel in drawn]
+    quantities = [(_sides(judged[0][0])[0], judged) for judged in _compared(formula).values()]
+    drawn = [
+        replace(_quantity(trajectory, judged, verdict), component=_owner(quantity.signals, components))
+        for quantity, judged in quantities
+    ]
+    drawn += [
+        replace(_input(r, trajectory, candidate), component=_owner([r.name], components)) for r in inputs
+    ]
+    place = {name: k for k, name in enumerate(components)}
+    grouped = sorted(drawn, key=lambda panel: place.get(panel.component, -1))
+    return [_discrete(panel, labels or {}) for panel in grouped]
+
+
+def _owner(signals: Iterable[str], components: Sequence[str]) -> str:
+    """Return the component that all these signals belong to; empty if there is none."""
+    found = {
+        max((c for c in components if signal.startswith(f"{c}.")), key=len, default="") for signal in signals
+    }
+    return found.pop() if len(found) == 1 else ""
 
 
 def judged_windows(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import stepper
@@ -88,6 +89,19 @@ def test_elements_of_arrays_are_driven_set_and_recorded_alone() -> None:
     np.testing.assert_allclose(got["y[2]"], np.cos(got.times) - 1 + 20.0, atol=1e-9)
     got = run(local("Arrays_3"), ("y[1]", "y[2]", "A[2,1]"), parameters={"offset[2]": 5.0, "A[2,1]": 0.0})
     assert (got["y[1]"][-1], got["y[2]"][-1], got["A[2,1]"][-1]) == (10.0, 5.0, 0.0)
+
+
+@pytest.mark.parametrize("interface", ["co-simulation", "model-exchange"])
+def test_a_fixed_element_stays_if_another_one_is_driven(interface: Interface) -> None:
+    # x1' = x2 + u1, x2' = -x1 + u2 from rest: with u = (1, 2), x1 = sin t + 2 (1 - cos t).
+    model = local("Arrays_3", interface)
+    drive = {"u[1]": Signal((0.0,), (1.0,))}
+    for fixed in (2.0, -1.0):
+        got = run(model, ("x[1]",), signals=drive, parameters={"u[2]": fixed}, interval=0.01)
+        exact = np.sin(got.times) + fixed * (1.0 - np.cos(got.times))
+        np.testing.assert_allclose(got["x[1]"], exact, atol=1e-6)
+    got = run(model, ("x[1]",), signals=drive, interval=0.01)
+    np.testing.assert_allclose(got["x[1]"], np.sin(got.times), atol=1e-6)
 
 
 def test_event_mode_sets_discrete_inputs_at_events() -> None:

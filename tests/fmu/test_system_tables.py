@@ -1,15 +1,16 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.fmu import archive
+from falsifier.fmu import Component, archive
 from falsifier.fmu import coupled_stepping as loops
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.plan import make_plan
 from falsifier.fmu.system_tables import SystemTables
-from tests.fmu.systems import LOOP, component, system
+from tests.fmu.systems import LOOP, component, run, solved, system
 
 
 def test_rows_are_in_the_order_of_stepping_and_connected_outputs_are_copied(tmp_path: Path) -> None:
@@ -37,3 +38,12 @@ def test_rows_are_in_the_order_of_stepping_and_connected_outputs_are_copied(tmp_
     assert (tables.signals[:, loops.TIME] == -1.0).all(), "nothing is known yet"
     for part in parts:
         part.close()
+
+
+@pytest.mark.parametrize("arrays", ["Arrays_3", solved("Arrays_3")])
+def test_a_fixed_element_stays_if_another_one_is_connected(arrays: str | Component) -> None:
+    """x1' = x2 + u1, x2' = -x1 + u2 from rest, with u1 = 2 from the other component."""
+    model = system({"a": arrays, "pi": "Gain_2"}, {"a.u[1]": "pi.y"})
+    got = run(model, "a.x[1]", parameters={"a.u[2]": 3.0})
+    exact = 2.0 * np.sin(got.times) + 3.0 * (1.0 - np.cos(got.times))
+    np.testing.assert_allclose(got["a.x[1]"], exact, atol=1e-6)

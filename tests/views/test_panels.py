@@ -3,6 +3,8 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange
+from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
@@ -68,3 +70,23 @@ def test_an_input_is_drawn_with_its_control_points_and_its_range() -> None:
 def test_windows_without_an_end_are_drawn_to_the_end_of_the_simulation() -> None:
     (bound,) = drawn("G (x <= 0.9)")[0].bounds
     assert (bound.start, bound.end) == (0.0, 10.0)
+
+
+def test_panels_of_a_system_are_grouped_by_component() -> None:
+    times = np.linspace(0.0, 1.0, 3)
+    names = ("plant.y", "plant.inner.y", "pi.y", "pi.r")
+    trajectory = Trajectory(times, {name: times for name in names}, {})
+    formula = parse("G (pi.y <= 1 and plant.y <= 2 and plant.inner.y <= 3 and plant.y - pi.y <= 4)")
+    candidate = Candidate({"pi.r": Signal((0.0,), (1.0,), "constant")})
+    components = ("plant", "pi", "plant.inner")
+    ranges = (InputRange("pi.r", 0.0, 2.0),)
+    found = panels(formula, trajectory, candidate, ranges, None, components=components)
+    assert [(p.title, p.component) for p in found] == [
+        ("plant.y - pi.y", ""),
+        ("plant.y", "plant"),
+        ("pi.y", "pi"),
+        ("pi.r", "pi"),
+        ("plant.inner.y", "plant.inner"),
+    ]
+    single = panels(formula, trajectory, candidate, ranges, None)
+    assert [p.title for p in single][:2] == ["pi.y", "plant.y"] and not any(p.component for p in single)

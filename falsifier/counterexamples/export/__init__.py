@@ -7,6 +7,7 @@
     start_values.json, .ssv     parameters and start values, for scripts and for SSP tools
     MODEL.fmu                   copy of the FMU
     SYSTEM.ssp                  of a system of FMUs: its FMUs and connections, start values and inputs
+    components/                 of a system: what each component saw, to simulate it alone; see components.py
     replay.py                   simulates both with FMPy only; writes outputs.csv, prints the critical time
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
@@ -17,6 +18,7 @@ import shutil
 from pathlib import Path
 
 from falsifier.core.files import file_name
+from falsifier.counterexamples.export.components import write_components
 from falsifier.counterexamples.export.inputs import input_table, start_values
 from falsifier.counterexamples.export.package import write_package
 from falsifier.counterexamples.export.scripts import (
@@ -64,6 +66,7 @@ def export_counterexample(
         inside = {file.name: file for file in files if file.name in ("input.csv", "start_values.ssv")}
         target = directory / f"{file_name(problem.model.name)}.ssp"
         files.append(write_package(problem.model, problem.experiment.stop_time, inside, target))
+        files += write_components(problem, evaluation.candidate, directory / "components")
     scripts = {
         "replay.py": replay_script(problem, evaluation, file_columns(table, problem.model)),
         "replay.mos": openmodelica_script(problem, start),

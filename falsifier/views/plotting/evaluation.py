@@ -78,12 +78,17 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         problem.space.inputs,
         verdict,
         _labels(problem),
+        problem.info.components,
     )
     colour = _decided_colour(verdict)
     figure = Figure(figsize=(9, 1.2 + _PANEL_HEIGHT * len(drawn)), layout="constrained")
     axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    group = ""
     for ax, panel in zip(axes, drawn, strict=True):
         plot_panel(ax, panel, colour)
+        if panel.component != group:
+            group = panel.component
+            ax.set_title(caption(group), loc="left", fontsize=9, weight="bold")
         if panel.critical is not None and _is_hidden(ax, verdict):
             _plot_inset(ax, panel, verdict, _enlarged(panel, verdict))
         ax.axvline(verdict.critical_time, color=colour, linewidth=0.8, linestyle=":")

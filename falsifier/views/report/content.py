@@ -245,5 +245,6 @@ def _shown(run: Run) -> Shown:
         candidate,
         run.manifest.inputs,
         run.verdict,
+        components=run.manifest.components,
     )
     return Shown(run, candidate, drawn)

@@ -75,12 +75,16 @@ def simulation_figures(drawn: Sequence[Panel], critical_time: float | None, colu
     figures = [
         el(
             "figure",
-            el("figcaption", el("b", panel.title), *map(_bound_key, panel.bounds)),
+            el("figcaption", el("b", _headed(panel)), *map(_bound_key, panel.bounds)),
             _place(f"{panel.title} over time", "plot panel"),
         )
         for panel in drawn
     ]
     return _group(plots, figures, _values(drawn, critical_time))
+
+
+def _headed(panel: Panel) -> str:
+    return f"{panel.component}: {panel.title}" if panel.component else panel.title
 
 
 def _values(drawn: Sequence[Panel], critical_time: float | None) -> Html:

@@ -36,4 +36,4 @@ def test_without_late_wires_nothing_is_dashed_and_loops_are_named() -> None:
     model = system({"plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
     (axes,) = plot_diagram(diagram(model)).axes
     assert not [line for line in axes.get_lines() if line.get_linestyle() == "--"]
-    assert "pi, plant: repeated until the outputs agree" in [t.get_text() for t in axes.texts]
+    assert "plant, pi: repeated until the outputs agree" in [t.get_text() for t in axes.texts]

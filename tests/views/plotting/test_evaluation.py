@@ -9,10 +9,12 @@ from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import FunctionModel
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.testing import START, lag_problem
 from falsifier.views.panels import Panel
 from falsifier.views.plotting import plot, plot_evaluation, plot_panel, plot_requirement, png, save_figure
+from tests.fmu.systems import LOOP, system
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import hard, unusable
 from tests.views.plotting.support import simulated, xs, ys
@@ -146,3 +148,14 @@ def test_pictures_show_output_input_and_what_decided(tmp_path: Path) -> None:
     assert {OUTPUT, INPUT, CRITICAL} <= colours(tmp_path / "a.png")
     assert {OUTPUT, INPUT, CRITICAL} <= colours(png(figure, dpi=130))
     assert all(colour in (tmp_path / "a.svg").read_text() for colour in (OUTPUT, INPUT, CRITICAL))
+
+
+def test_the_panels_of_a_system_are_headed_by_their_components() -> None:
+    model = system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP)
+    formula, inputs = "G (pi.y <= 1 and plant.y <= 2)", {"pi.r": (0.0, 2.0)}
+    problem = Problem.from_system(model, formula, inputs=inputs, stop_time=1.0, output_interval=0.1)
+    evaluation = evaluate(problem, problem.space.decode(problem.space.bounds.T[1]))
+    heads = [(ax.get_title("left"), ax.get_ylabel()) for ax in plot_evaluation(problem, evaluation).axes]
+    named = [head for head in heads if head[1]]
+    assert [name for name, _ in named] == ["plant", "pi", ""]
+    assert named[0][1].startswith("plant.y") and named[2][1].startswith("pi.r")

@@ -49,3 +49,9 @@ def test_a_simulation_has_its_values_at_round_times_and_at_the_critical_time() -
     assert '<th scope="row">3.3 (critical)</th><td>10.89</td>' in text
     assert "from 2 s to 4 s" in text
     assert simulation_figures([], None, 100) == ""
+
+
+def test_a_panel_of_a_system_is_headed_by_its_component() -> None:
+    panel = Panel("plant.y [m]", TIMES, TIMES, component="plant")
+    text = simulation_figures([panel, replace(panel, title="time", component="")], None, 100)
+    assert "<b>plant: plant.y [m]</b>" in text and "<b>time</b>" in text

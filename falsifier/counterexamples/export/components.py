@@ -1,0 +1,260 @@
+"""What each component of a system saw at its ports, so that it can be simulated and debugged alone.
+
+::
+
+    components/NAME/MODEL.fmu           copy of the component's FMU
+    components/NAME/input.csv           its inputs, connected ones too
+    components/NAME/outputs.csv         its outputs in the system
+    components/NAME/start_values.json   its parameters and start values
+    components/NAME/NAME.toml           a spec of the FMU alone, for ``falsifier simulate``
+"""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.files import file_name
+from falsifier.core.model import Variable
+from falsifier.core.trajectory import Trajectory
+from falsifier.counterexamples.export.inputs import InputTable, start_values
+from falsifier.counterexamples.export.tables import write_csv, write_json
+from falsifier.fmu import FmuModel, System
+from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
+from falsifier.problem.defaults import DEFAULT_POINTS
+from falsifier.problem.problem import Problem
+
+# Names that formulas can use as they are.
+_PLAIN_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+# Share by which the outputs may leave the range that they had in the system.
+_MARGIN = 1e-6
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What one component saw and did.
+
+    Attributes:
+        inputs: its inputs, by their names in the component.
+        outputs: its outputs at the ends of its steps.
+        start: its parameters and start values.
+        step: time between its steps in s.
+    """
+
+    inputs: InputTable
+    outputs: InputTable
+    start: Mapping[str, float | str]
+    step: float
+
+
+def write_components(problem: Problem, candidate: Candidate, directory: Path) -> list[Path]:
+    """Write a folder per component of a problem's system; return the files.
+
+    Args:
+        problem: a problem whose model is a system.
+        candidate: the inputs to simulate.
+        directory: where to write the folders.
+    """
+    assert isinstance(problem.model, System), "only systems have components"
+    files = []
+    for member, seen in zip(problem.model.network.members, all_seen(problem, candidate), strict=True):
+        folder = directory / file_name(member.name)
+        folder.mkdir(parents=True, exist_ok=True)
+        model = FmuModel(member.path, member.interface)
+        fmu = folder / member.path.name
+        shutil.copyfile(member.path, fmu)
+        files += [fmu, write_json(seen.start, folder / "start_values.json", model)]
+        if seen.inputs.columns:
+            files.append(write_csv(seen.inputs, folder / "input.csv", model))
+        if seen.outputs.columns:
+            files.append(write_csv(seen.outputs, folder / "outputs.csv", model))
+        text = _spec(member, seen, problem.experiment.tolerance)
+        if text:
+            files.append(folder / f"{file_name(member.name)}.toml")
+            files[-1].write_text(text, encoding="utf-8")
+    return files
+
+
+def all_seen(problem: Problem, candidate: Candidate) -> list[Seen]:
+    """Simulate and return what each component saw, in the order of the network's members."""
+    model = problem.model
+    assert isinstance(model, System), "only systems have components"
+    network, experiment = model.network, problem.experiment
+    step = experiment.stop_time / round(
+        experiment.stop_time / (experiment.step_size or experiment.output_interval)
+    )
+    outputs = tuple(v.name for v in model.info.outputs if v.kind != "string")
+    sources = tuple(network.title(n.source) for n in network.links if n.source.member != SYSTEM)
+    recorded = model.simulate(
+        candidate.signals,
+        {**problem.parameters, **candidate.parameters},
+        replace(
+            experiment,
+            outputs=tuple(dict.fromkeys((*outputs, *sources))),
+            output_interval=step,
+            step_size=None,
+        ),
+    )
+    reader = _Reader(problem, candidate, network, recorded, step)
+    return [reader.seen(position) for position in range(len(network.members))]
+
+
+class _Reader:
+    """Finds what a component saw in what was recorded at all communication points."""
+
+    def __init__(
+        self, problem: Problem, candidate: Candidate, network: Network, recorded: Trajectory, step: float
+    ) -> None:
+        self._problem, self._candidate, self._network = problem, candidate, network
+        self._recorded, self._step = recorded, step
+        self._position = {member: k for k, member in enumerate(network.order)}
+        self._links = {n.target: n for n in network.links}
+
+    def seen(self, position: int) -> Seen:
+        member, own = self._network.members[position], self._every(position)
+        ends = np.arange(own, len(self._recorded.times), own)
+        times = self._recorded.times
+        columns = {}
+        for variable in member.description.info.inputs:
+            values = None if variable.kind == "string" else self._values(position, variable, ends, own)
+            if values is not None:
+                columns[variable.name] = np.stack(values, axis=1).ravel()
+        grid = np.stack((times[ends - own], times[ends]), axis=1).ravel()
+        at = np.concatenate(([0], ends))
+        titles = {
+            v.name: self._network.title(Place(position, v.name))
+            for v in member.description.info.outputs
+            if v.kind != "string"
+        }
+        outputs = {name: self._recorded[title][at] for name, title in titles.items()}
+        return Seen(
+            InputTable(grid, columns),
+            InputTable(times[at], outputs),
+            self._start(position),
+            own * self._step,
+        )
+
+    def _every(self, position: int) -> int:
+        step = self._network.members[position].step
+        return 1 if step is None else round(step / self._step)
+
+    def _start(self, position: int) -> dict[str, float | str]:
+        model = self._problem.model
+        assert isinstance(model, System), "only systems have components"
+        named = {**dict(model.frame.values), **start_values(self._problem, self._candidate)}
+        places = ((self._network.places.get(name), value) for name, value in named.items())
+        variables = self._network.members[position].description.info
+        return {
+            place.name: value
+            for place, value in places
+            if place and place.member == position and variables[place.name].causality != "input"
+        }
+
+    def _values(
+        self, position: int, variable: Variable, ends: NDArray[np.intp], own: int
+    ) -> tuple[Floats, Floats] | None:
+        """Return an input at the start and at the end of each step; None if it keeps its start value."""
+        link = self._links.get(Place(position, variable.name))
+        if link is not None and link.source.member != SYSTEM:
+            return self._fed(link, ends, own)
+        name = self._network.title(link.source if link else Place(position, variable.name))
+        given = self._given(name, self._recorded.times)
+        if given is None:
+            return None
+        values = given if link is None else link.factor * given + link.offset
+        follows = self._network.members[position].interface == "model-exchange" and variable.is_continuous
+        return values[ends - own], values[ends if follows else ends - own]
+
+    def _given(self, name: str, times: Floats) -> Floats | None:
+        if name in self._candidate.signals:
+            return self._candidate.signals[name].sample(times)
+        value = self._problem.parameters.get(name, self._problem.info[name].start)
+        return np.full(times.shape, float(value)) if isinstance(value, int | float) else None
+
+    def _fed(self, link: Link, ends: NDArray[np.intp], own: int) -> tuple[Floats, Floats]:
+        """Return a connected input as coupled_stepping.py computes it."""
+        title = self._network.title(link.source)
+        column, times = self._recorded[title], self._recorded.times
+        known = ends - own if self._network.coupling.method == "jacobi" else ends - self._lateness(link)
+        every = self._every(link.source.member)
+        last = known - known % every
+        before = np.maximum(last - every, 0)
+        slope = np.zeros(len(ends))
+        if link.is_linear:
+            slope = (column[last] - column[before]) / np.where(last > 0, every * self._step, np.inf)
+        value, since = column[known], times[last]
+        starts, stops = times[ends - own], times[ends]
+        if self._network.members[link.target.member].interface == "co-simulation":
+            starts = stops = 0.5 * (starts + stops)
+        first = link.factor * (value + slope * (starts - since)) + link.offset
+        return first, link.factor * (value + slope * (stops - since)) + link.offset
+
+    def _lateness(self, link: Link) -> int:
+        source, target = self._position[link.source.member], self._position[link.target.member]
+        iterates = any(
+            first <= min(source, target) and max(source, target) < last for first, last in self._network.loops
+        )
+        return 0 if source < target or iterates else 1
+
+
+def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
+    """Return a spec of the FMU alone; empty if formulas cannot use the names of its outputs as they are."""
+    parts = [
+        f"{name} >= {low!r} and {name} <= {high!r}"
+        for name, column in seen.outputs.columns.items()
+        if _PLAIN_NAME.fullmatch(name)
+        for low, high in [_around(column)]
+    ]
+    if not parts or not len(seen.inputs.times):
+        return ""
+    formula = f"G ({' and '.join(parts)})"
+    model = {
+        "fmu": member.path.name,
+        "interface": member.interface,
+        "stop_time": float(seen.outputs.times[-1]),
+        "output_interval": seen.step,
+        "tolerance": tolerance,
+    }
+    lines = [
+        f"# The component {member.name} alone, with what it saw in the system:",
+        f"#     falsifier simulate {file_name(member.name)}.toml --input-file input.csv",
+        "[model]",
+        *(f"{key} = {json.dumps(value)}" for key, value in model.items() if value is not None),
+        *_inputs(member, seen),
+    ]
+    if seen.start:
+        lines += ["", "[parameters]"]
+        lines += [f"{json.dumps(name)} = {json.dumps(value)}" for name, value in seen.start.items()]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            "[requirements.as_in_the_system]",
+            f"formula = {json.dumps(formula)}",
+            'description = "The outputs stay in the range that they had in the system."',
+            "",
+        ]
+    )
+
+
+def _inputs(member: Member, seen: Seen) -> Iterator[str]:
+    for name, column in seen.inputs.columns.items():
+        low, high = float(column.min()), float(column.max())
+        if low == high and member.description.info[name].kind == "real":
+            high = low + 1.0
+        if low < high:
+            yield from ("", f"[inputs.{json.dumps(name)}]", f"range = [{low!r}, {high!r}]")
+            yield f"control_points = {DEFAULT_POINTS}"
+
+
+def _around(column: Floats) -> tuple[float, float]:
+    low, high = float(column.min()), float(column.max())
+    return low - _MARGIN * max(1.0, abs(low)), high + _MARGIN * max(1.0, abs(high))
