@@ -1,13 +1,13 @@
 """Executors for evaluations: this process, local processes or a Dask cluster."""
 
 import logging
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from falsifier.core import operating_system
 from falsifier.core.candidate import Candidate
 from falsifier.errors import SpecError
 from falsifier.evaluation.cluster import connected
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
-# Filter in the format of python -W: warnings whose message starts with this word.
-_TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
@@ -114,28 +112,11 @@ def _process_pool(jobs: int) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    _start_silent_tracker()
+    operating_system.start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
         jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level,)
     )
-
-
-def _start_silent_tracker() -> None:
-    """Start multiprocessing's resource tracker, which frees a pool's semaphores, without its warnings.
-
-    It still frees semaphores left behind by a killed process. Its warning would reach the terminal after the
-    command has ended, and the user could do nothing about it.
-    """
-    if sys.platform == "win32":
-        return
-    from multiprocessing.resource_tracker import ensure_running
-
-    sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
-    try:
-        ensure_running()
-    finally:
-        sys.warnoptions.remove(_TRACKER_FILTER)
 
 
 def _prepare_worker(log_level: int) -> None:

@@ -28,6 +28,20 @@ def unpack(order: Order, folder: Path) -> None:
         _extract(member.path, member.sha256, folder / member.folder)
 
 
+def extracted(order: Order, root: Path) -> Path:
+    """Return the folder below a root to which the FMU or system is extracted; extract it if necessary.
+
+    Raises:
+        ModelError: as for ``unpack``.
+    """
+    folder = root / order.sha256[:16]
+    if not folder.is_dir():
+        partial = folder.with_suffix(".partial")
+        unpack(order, partial)
+        partial.rename(folder)
+    return folder
+
+
 def open_session(
     order: Order, folder: Path, log: LogSink, announce: Callable[[int], None] = lambda _: None
 ) -> Session:
