@@ -19,8 +19,8 @@ lint: .venv/test
 
 types: .venv/test
 	$(BIN)/mypy
-	$(BIN)/mypy --platform win32 falsifier
-	$(BIN)/mypy --platform darwin falsifier
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 falsifier
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin falsifier
 
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest -n 2 --dist worksteal

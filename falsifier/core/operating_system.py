@@ -16,7 +16,9 @@ else:
     from falsifier.core import posix_files as _files
 
 Child = _system.Child
-FORKS_BY_DEFAULT, HAS_FORK = _system.FORKS_BY_DEFAULT, _system.HAS_FORK
+FORKS_BY_DEFAULT = _system.FORKS_BY_DEFAULT
+HAS_FORK = _system.HAS_FORK
+SENDS_FILES = _system.SENDS_FILES
 close_life = _system.close_life
 exit_text = _system.exit_text
 flush_lines = _system.flush_lines

@@ -20,7 +20,7 @@ from falsifier.core import linux
 
 assert sys.platform != "win32"
 
-HAS_FORK = True
+HAS_FORK = SENDS_FILES = True
 FORKS_BY_DEFAULT = sys.platform == "linux"
 
 _LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin

@@ -18,7 +18,7 @@ from ctypes import wintypes
 
 assert sys.platform == "win32"
 
-HAS_FORK = False
+HAS_FORK = SENDS_FILES = False
 FORKS_BY_DEFAULT = False
 
 _SYNCHRONIZE, _WAIT_FINISHED = 0x00100000, 0

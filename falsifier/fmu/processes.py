@@ -70,13 +70,14 @@ class WorkerProcess:
 
     def kill(self) -> int:
         """End the process; return its exit code, negative for a signal."""
-        self.sock.close()
-        self._output.close()
-        if self._life is not None:
-            operating_system.close_life(self._life)
-            self._life = None
         try:
             return self._owner.end(self.pid)
         except ModelError:
             # The nursery has ended, so the exit code is unknown; the next worker comes from a new nursery.
             return 0
+        finally:
+            self.sock.close()
+            self._output.close()
+            if self._life is not None:
+                operating_system.close_life(self._life)
+                self._life = None

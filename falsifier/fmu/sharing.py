@@ -41,7 +41,10 @@ def share_unnamed(size: int) -> Shared:
 
 
 def share_named(size: int, folder: Path) -> Shared:
-    """Share this many bytes through a file in a folder, which works on all systems."""
+    """Share this many bytes through a file in a folder.
+
+    For Windows, where files cannot be sent, and cannot be shortened while a process has them mapped.
+    """
     with tempfile.NamedTemporaryFile(dir=folder, prefix="memory-", delete=False) as made:
         made.truncate(size)
     return Shared(Path(made.name).open("r+b", buffering=0), size, made.name)

@@ -1,10 +1,11 @@
 """Workers that are programs of their own: the side of the process that requests simulations.
 
-This needs nothing but what Linux, macOS and Windows all have: a program, a connection and a mapped file. The
+This needs nothing but what Linux, macOS and Windows all have: a program, a connection and mapped files. The
 program imports everything before it is told which FMU to load. Once a process has needed a second worker,
 the next one is started in advance, so that replacing a worker takes no longer than loading the FMU.
 """
 
+import contextlib
 import json
 import logging
 import os
@@ -72,7 +73,9 @@ class Spawner:
         return Started(program.pid, program.sock, program.output)
 
     def share(self, size: int) -> Shared:
-        """Return memory in a file in the workers' folder."""
+        """Return memory in a file that is sent; where files cannot be sent, in one in the workers' folder."""
+        if operating_system.SENDS_FILES:
+            return sharing.share_unnamed(size)
         return sharing.share_named(size, self._root)
 
     def end(self, pid: int) -> int:
@@ -106,7 +109,8 @@ class Spawner:
     def _keep_spare(self) -> None:
         with self._lock:
             if self._needed > 1 and self._spare is None:
-                self._spare = _Program(self._root)
+                with contextlib.suppress(OSError):  # reported when it is needed
+                    self._spare = _Program(self._root)
 
 
 class _Program:

@@ -6,8 +6,10 @@ import pytest
 
 from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, spawning
+from falsifier.fmu.isolation import REGISTRY
 from falsifier.fmu.simulator import _order
 from falsifier.fmu.spawning import Spawner
+from falsifier.fmu.ways import VARIABLE
 from falsifier.fmu.worker_order import Order
 from tests.fmu import fixtures
 
@@ -86,3 +88,15 @@ def test_a_program_that_becomes_no_worker_is_an_error(spawner: Spawner, says: st
 def test_what_it_says_while_it_compiles_is_logged(spawner: Spawner, caplog: pytest.LogCaptureFixture) -> None:
     spawner.start(order())
     assert [record.getMessage() for record in caplog.records] == ["compiling"]
+
+
+def test_trajectories_come_through_a_named_file_where_files_cannot_be_sent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, "spawn")
+    monkeypatch.setattr("falsifier.core.operating_system.SENDS_FILES", False)
+    monkeypatch.setattr("falsifier.core.operating_system.send_descriptors", None)
+    REGISTRY.close()
+    model = fixtures.isolated("Misdeeds_2")
+    assert fixtures.run(model, ("y",))["y"].tolist() == list(range(11))
+    REGISTRY.close()
