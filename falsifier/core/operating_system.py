@@ -23,6 +23,7 @@ close_life = _system.close_life
 exit_text = _system.exit_text
 flush_lines = _system.flush_lines
 guarded_memory = _system.guarded_memory
+interpreter = _system.interpreter
 limit_resources = _system.limit_resources
 limit_sending = _system.limit_sending
 memory_limits = _system.memory_limits

@@ -94,6 +94,11 @@ class Child:
         self._process.returncode = 0  # not this process's child, so it cannot be waited for
 
 
+def interpreter() -> str:
+    """Return the path of this Python, to start another one with."""
+    return sys.executable
+
+
 def receive_connection() -> tuple[socket.socket, int]:
     """Return the connection of a program that was started as a ``Child``, and a line to its parent.
 

@@ -172,6 +172,14 @@ class Child:
         """Leave the process to another one, of which this is a copy; there are none here."""
 
 
+def interpreter() -> str:
+    """Return the path of this Python, to start another one with.
+
+    That of a virtual environment would only start that of the installation, as another process.
+    """
+    return str(getattr(sys, "_base_executable", None) or sys.executable)
+
+
 def receive_connection() -> tuple[socket.socket, int]:
     """Return the connection of a program that was started as a ``Child``, and a line to its parent.
 

@@ -89,5 +89,8 @@ def remove_tree(path: Path) -> None:
             Path(name).chmod(stat.S_IWRITE)
             remove(name)
 
-    # Long paths need this prefix.
-    shutil.rmtree(f"\\\\?\\{path.absolute()}", onerror=unprotect)
+    whole = f"\\\\?\\{path.absolute()}"  # long paths need this prefix
+    if sys.version_info >= (3, 12):
+        shutil.rmtree(whole, onexc=unprotect)
+    else:
+        shutil.rmtree(whole, onerror=unprotect)

@@ -5,9 +5,10 @@ import platform
 import re
 import shutil
 import subprocess
+import sys
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
@@ -22,6 +23,7 @@ _MOST_BYTES = 512 << 20
 _FOLDERS = ("/lib64", "/usr/lib64", "/lib", "/usr/lib", "/usr/local/lib")
 _ORIGIN = re.compile(r"\$(ORIGIN|\{ORIGIN\})")
 _LISTING_SECONDS = 10.0
+_BITS = 64 if sys.maxsize > 1 << 32 else 32
 
 
 def binary_remarks(path: Path) -> tuple[str, ...]:
@@ -67,6 +69,9 @@ class _Look:
             elf = read_elf(self._packed.read(str(library)))
         except ValueError as error:
             yield f"{library.name} is {error}; export the FMU again for this platform"
+            return
+        if elf.bits != _BITS:
+            yield f"{library.name} has {elf.bits} bits and cannot be loaded here; export it for {_BITS} bits"
             return
         for name in elf.needed:
             inside = self._inside(name, elf, library)
@@ -124,18 +129,24 @@ def _installed(name: str, elf: Elf) -> Path | None:
     if "/" in name:
         return Path(name) if Path(name).is_file() else None
     given = [*elf.folders, *os.environ.get("LD_LIBRARY_PATH", "").split(":")]
-    folders = [folder for folder in given if folder.startswith("/")]
-    for folder in folders:
-        if (Path(folder) / name).is_file():
-            return Path(folder) / name
-    if name in _listed():
-        return _listed()[name]
-    return next((Path(f) / name for f in _FOLDERS if (Path(f) / name).is_file()), None)
+    places = [Path(folder) / name for folder in given if folder.startswith("/")]
+    places += [*_listed().get(name, ()), *(Path(folder) / name for folder in _FOLDERS)]
+    return next((place for place in places if _fits(place)), None)
+
+
+def _fits(place: Path) -> bool:
+    """Whether a file is a library for processes like this one, of 32 or 64 bits."""
+    try:
+        with place.open("rb") as file:
+            start = file.read(5)
+    except OSError:
+        return False
+    return start[:4] == b"\x7fELF" and start[4:] == (b"\2" if _BITS == 64 else b"\1")
 
 
 @lru_cache(maxsize=1)
-def _listed() -> Mapping[str, Path]:
-    """Return the libraries in the system's list, for this machine's processor."""
+def _listed() -> Mapping[str, Sequence[Path]]:
+    """Return the libraries in the system's list, by file name."""
     program = shutil.which("ldconfig") or "/sbin/ldconfig"
     try:
         done = subprocess.run(
@@ -143,13 +154,11 @@ def _listed() -> Mapping[str, Path]:
         )
     except (OSError, subprocess.TimeoutExpired):
         return {}
-    is_64 = platform.architecture()[0] == "64bit"
-    found: dict[str, Path] = {}
+    found: dict[str, list[Path]] = {}
     for line in done.stdout.splitlines():
         name, arrow, place = line.strip().partition(" => ")
-        # 64-bit libraries are marked (libc6,x86-64), (libc6,AArch64) or the like, 32-bit ones (libc6).
-        if arrow and ("64" in name.partition("(")[2]) == is_64:
-            found.setdefault(name.partition(" ")[0], Path(place))
+        if arrow:
+            found.setdefault(name.partition(" ")[0], []).append(Path(place))
     return found
 
 

@@ -41,7 +41,7 @@ class Nursery:
         self._root = self._folder.path
         self._sock, theirs = open_channel()
         paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
-        command = [sys.executable, "-I", "-c", _BOOT, paths, str(self._root)]
+        command = [operating_system.interpreter(), "-I", "-c", _BOOT, paths, str(self._root)]
         self._process = operating_system.Child(command, worker_environment(os.environ), theirs)
         self._ready = False
 

@@ -121,7 +121,7 @@ class _Program:
         self._scratch = Path(tempfile.mkdtemp(prefix="work-", dir=root))
         self.sock, theirs = open_channel()
         paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
-        command = [sys.executable, "-I", "-c", _BOOT, paths, str(root)]
+        command = [operating_system.interpreter(), "-I", "-c", _BOOT, paths, str(root)]
         self._child = Child(command, worker_environment(os.environ), theirs, self.output.fileno())
         self.pid = self._child.pid
         self._life = operating_system.open_life(self.pid)

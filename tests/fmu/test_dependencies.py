@@ -102,6 +102,14 @@ def test_what_is_no_library_of_linux_is_said(tmp_path: Path, installed: Path) ->
     )
 
 
+def test_a_library_of_the_other_size_is_not_taken(tmp_path: Path, installed: Path) -> None:
+    (installed / "libz.so.1").write_bytes(library(bits=32))
+    (said,) = binary_remarks(fmu(tmp_path, M__so=library(("libz.so.1",))))
+    assert "M.so needs libz.so.1, which is not installed" in said
+    (said,) = binary_remarks(fmu(tmp_path, M__so=library(bits=32)))
+    assert said == "M.so has 32 bits and cannot be loaded here; export it for 64 bits"
+
+
 def without_linux(tmp_path: Path, folder: str, *, sources: bool = False) -> str:
     packed = tmp_path / "my.fmu"
     with zipfile.ZipFile(packed, "w") as archive:
