@@ -113,6 +113,23 @@ def end_descendants_of(pid: int) -> None:
         time.sleep(0.0005)
 
 
+def end_marked(name: str, value: str) -> None:
+    """Kill all processes that were started with this variable in their environment (Linux).
+
+    So orphans are found whose ancestors have ended, in any process group.
+    """
+    mark = f"{name}={value}".encode()
+    until = time.monotonic() + _SWEEPING_SECONDS
+    while _IS_LINUX and time.monotonic() < until:
+        found = [pid for pid, _, _ in _all_processes() if mark in _environment(pid)]
+        if not found:
+            return
+        for pid in found:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        time.sleep(0.0005)
+
+
 def children() -> list[int]:
     """Return the process ids of this process's children, adopted ones included (Linux; else none)."""
     if not _IS_LINUX:
@@ -185,6 +202,14 @@ def _descendants(pid: int) -> list[int]:
     while grown := {child for child, parent in parents.items() if parent in found} - found:
         found |= grown
     return list(found - {pid})
+
+
+def _environment(pid: int) -> list[bytes]:
+    """Variables with which a process was started; none if it has ended or belongs to another user."""
+    try:
+        return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return []
 
 
 def _all_processes() -> Iterator[tuple[int, int, str]]:

@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from uuid import uuid4
 
 from falsifier.core import linux
 
@@ -23,6 +24,8 @@ assert sys.platform != "win32"
 HAS_FORK = SENDS_FILES = True
 FORKS_BY_DEFAULT = sys.platform == "linux"
 
+# What a child and its descendants have in their environment.
+_MARK = "FALSIFIER_PROCESS"
 _LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
 _TIMEVAL = struct.Struct("@ll")
 # Filter in the format of python -W: warnings whose message starts with this word.
@@ -46,10 +49,11 @@ class Child:
         connection: socket.socket,
         output: int | None = None,
     ) -> None:
+        self._mark = uuid4().hex
         with connection:
             self._process = subprocess.Popen(
                 command,
-                env=environment,
+                env={**environment, _MARK: self._mark},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL if output is None else output,
                 stderr=output,
@@ -86,7 +90,9 @@ class Child:
             end_group(self.pid)
             self._process.kill()
         self._line.close()
-        return self._process.wait()
+        code = self._process.wait()
+        linux.end_marked(_MARK, self._mark)
+        return code
 
     def forget(self) -> None:
         """Leave the process to another one, of which this is a copy."""

@@ -115,3 +115,24 @@ os.kill(me, signal.SIGKILL)
 """
     pid = int(in_child(code))
     wait_until(lambda: is_gone(pid))
+
+
+@LINUX
+def test_orphans_are_found_by_a_mark_in_their_environment() -> None:
+    code = """
+reading, writing = os.pipe()
+if not os.fork():
+    os.setsid()
+    if not os.fork():
+        os.close(1)
+        os.write(writing, f"{os.getpid()} ".encode())
+        time.sleep(1000)
+    os._exit(0)
+os.wait()
+print(os.read(reading, 100).decode(), flush=True)
+"""
+    pid = int(in_child(code, FALSIFIER_TEST_MARK="this-one"))
+    linux.end_marked("FALSIFIER_TEST_MARK", "this")
+    assert not is_gone(pid)
+    linux.end_marked("FALSIFIER_TEST_MARK", "this-one")
+    wait_until(lambda: is_gone(pid))

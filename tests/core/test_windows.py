@@ -10,6 +10,7 @@ from falsifier.core import operating_system
 CORE = Path(operating_system.__file__).parent
 # Used by the forked way alone.
 FORKING = {
+    "end_marked",
     "fork",
     "reap",
     "kill",
