@@ -5,7 +5,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test lint types pytest docs notebooks fmus windows-worker clean
+.PHONY: demo test lint types pytest test-spawn docs notebooks fmus windows-worker clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
@@ -19,9 +19,15 @@ lint: .venv/test
 
 types: .venv/test
 	$(BIN)/mypy
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 falsifier
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin falsifier
 
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest -n 2 --dist worksteal
+
+# The tests of simulations again, with each FMU worker started as on systems without fork. Takes several minutes.
+test-spawn: .venv/test
+	FALSIFIER_WORKERS=spawn $(BIN)/pytest -n 2 --dist worksteal tests/fmu tests/evaluation tests/hostile tests/search tests/problem
 
 docs: .venv/test
 	$(BIN)/mkdocs build --strict

@@ -41,8 +41,13 @@ _SLOW = (
 )
 # Packages of which commands import many modules one by one.
 _LARGE = ("falsifier", "openai.resources")
-# What runs when it is imported, and engines whose libraries are not installed.
-_NEVER = ("falsifier.__main__", "falsifier.engines.botorch_gp")
+# What runs when it is imported, engines whose libraries are not installed, and modules of other systems.
+_NEVER = (
+    "falsifier.__main__",
+    "falsifier.core.windows",
+    "falsifier.core.windows_files",
+    "falsifier.engines.botorch_gp",
+)
 _PROGRAM = """
 import sys
 from tests.forking import serve

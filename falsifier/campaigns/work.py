@@ -20,6 +20,7 @@ from time import monotonic, time
 from zipfile import ZipFile
 
 from falsifier.campaigns.directory import STOP, campaign_mark, run_directory
+from falsifier.core import operating_system
 from falsifier.fmu import fmu_files, with_local_files
 from falsifier.problem.problem import Problem
 from falsifier.search.events import Evaluated, Event
@@ -186,10 +187,10 @@ def _put(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_bytes(content)
-    partial.replace(path)
+    operating_system.replace(partial, path)
 
 
 def _store() -> Path:
     """Folder for files sent to this worker: FALSIFIER_STORE, or a temporary folder of this user."""
-    fallback = Path(gettempdir()) / f"falsifier-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+    fallback = Path(gettempdir()) / f"falsifier-{operating_system.user()}"
     return Path(os.environ.get("FALSIFIER_STORE") or fallback)

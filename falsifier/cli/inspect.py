@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+from dataclasses import replace
 from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,6 +73,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, drawn: bool, out: Path |
         _draw_diagram(source, out)
         return
     found = read_info(source) if isinstance(source, Path) else source.info
+    found = replace(found, notes=(*found.notes, *_binary_notes(source)))
     if as_json:
         say(info_json(found))
         return
@@ -250,6 +252,17 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
     if step == experiment.output_interval:
         return f"this step {kept}"
     return f"step_size = {step:g} {kept}; set it in [model]"
+
+
+def _binary_notes(source: "Path | System") -> tuple[str, ...]:
+    """Return why binaries cannot be loaded on this machine; of a system, those of each component."""
+    from falsifier.fmu.needs import binary_remarks
+
+    if isinstance(source, Path):
+        return binary_remarks(source)
+    return tuple(
+        f"{name}: {said}" for name, part in source.parts.items() for said in binary_remarks(part.fmu)
+    )
 
 
 def _named(given: Path) -> "Path | System":

@@ -6,6 +6,8 @@ from hashlib import sha256
 from pathlib import Path
 from unicodedata import normalize
 
+from falsifier.core import operating_system
+
 # Maximum length in bytes of what remains of a name; leaves room for the hash, prefixes and endings.
 _LONGEST_NAME = 120
 _HASH_DIGITS = 10
@@ -52,7 +54,7 @@ def write_whole(path: Path, content: str | bytes) -> Path:
         file.write(content.encode() if isinstance(content, str) else content)
         file.flush()
         os.fsync(file.fileno())
-    partial.replace(path)
+    operating_system.replace(partial, path)
     return path
 
 

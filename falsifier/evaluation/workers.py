@@ -1,7 +1,6 @@
 """Executors for evaluations: this process, local processes or a Dask cluster."""
 
 import logging
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -9,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from falsifier.core import operating_system
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
 from falsifier.errors import SpecError
@@ -23,8 +23,6 @@ T = TypeVar("T")
 
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
-# Filter in the format of python -W: warnings whose message starts with this word.
-_TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
@@ -152,28 +150,11 @@ def _process_pool(jobs: int) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    _start_silent_tracker()
+    operating_system.start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
         jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level,)
     )
-
-
-def _start_silent_tracker() -> None:
-    """Start multiprocessing's resource tracker, which frees a pool's semaphores, without its warnings.
-
-    It still frees semaphores left behind by a killed process. Its warning would reach the terminal after the
-    command has ended, and the user could do nothing about it.
-    """
-    if sys.platform == "win32":
-        return
-    from multiprocessing.resource_tracker import ensure_running
-
-    sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
-    try:
-        ensure_running()
-    finally:
-        sys.warnoptions.remove(_TRACKER_FILTER)
 
 
 def _prepare_worker(log_level: int) -> None:

@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from falsifier.core import operating_system
 from falsifier.core.words import counted
 from falsifier.errors import ModelError
 from falsifier.fmu import archive
@@ -117,7 +118,7 @@ def _write(path: Path, folder: Path, out: Path) -> None:
                 packed.write(file, file.relative_to(folder).as_posix())
         for interface in read_description(partial).info.interfaces:
             FmuModel(partial, interface).load()
-        partial.replace(out)
+        operating_system.replace(partial, out)
     except ModelError as error:
         raise ModelError(f"{path}: the sources compile, but the result cannot be used: {error}") from error
     finally:

@@ -7,13 +7,13 @@ pickles, and whatever does not look like a reply ends the connection.
 import contextlib
 import math
 import os
-import select
 import socket
 import struct
 import time
 from dataclasses import dataclass
 from typing import Literal
 
+from falsifier.core import operating_system
 from falsifier.core.printable import printable
 
 Status = Literal["ok", "failed", "crashed", "timeout", "unusable"]
@@ -31,7 +31,6 @@ _MOST_TEXT = 1 << 20
 _REST_SECONDS = 2.0
 # Requests fit into the socket's buffer unless a worker has stopped reading.
 _SENDING_SECONDS = 30.0
-_TIMEVAL = struct.Struct("@ll")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +63,7 @@ class Garbled(Closed):
 def open_channel() -> tuple[socket.socket, socket.socket]:
     """Return both ends of a new connection: for requests, and for replies."""
     ours, theirs = socket.socketpair()
-    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _time_limit(_SENDING_SECONDS))
+    operating_system.limit_sending(ours, _SENDING_SECONDS)
     return ours, theirs
 
 
@@ -79,7 +78,7 @@ def send_request(
     try:
         sock.sendall(_REQUEST.pack(kind, len(descriptors), len(payload)) + payload)
         if descriptors:
-            socket.send_fds(sock, [b"\0"], list(descriptors))
+            operating_system.send_descriptors(sock, descriptors)
     except OSError as error:
         raise Closed from error
 
@@ -93,7 +92,7 @@ def receive_request(sock: socket.socket) -> tuple[int, bytes, list[int]]:
     try:
         kind, count, length = _REQUEST.unpack(_exactly(sock, _REQUEST.size))
         payload = _exactly(sock, length) if length else b""
-        descriptors = socket.recv_fds(sock, 1, count)[1] if count else []
+        descriptors = operating_system.receive_descriptors(sock, count) if count else []
         return kind, payload, descriptors
     except ConnectionError as error:
         raise Closed from error
@@ -115,8 +114,8 @@ def receive_reply(sock: socket.socket, limit: float, life: int | None = None) ->
     Args:
         sock: connection to the process that replies.
         limit: number of seconds.
-        life: see ``posix.open_life``. What the other process has forked keeps the connection open, so its
-            end alone does not say that the process has ended.
+        life: see ``operating_system.open_life``. What the other process has forked keeps the connection open,
+            so its end alone does not say that the process has ended.
 
     Raises:
         TimeoutError: if there was none.
@@ -143,9 +142,9 @@ def watch(sock: socket.socket, seconds: float) -> None:
     until = time.perf_counter() + seconds
     while time.perf_counter() < until:
         try:
-            sock.recv(1, socket.MSG_DONTWAIT | socket.MSG_PEEK)
+            operating_system.receive_now(sock, 1, keep=True)
         except BlockingIOError:
-            os.sched_yield()
+            operating_system.yield_processor()
         except OSError:
             return  # the next receive reports the error
         else:
@@ -157,12 +156,6 @@ def close_all(descriptors: list[int]) -> None:
     for descriptor in descriptors:
         with contextlib.suppress(OSError):
             os.close(descriptor)
-
-
-def _time_limit(seconds: float) -> bytes:
-    # Zero would mean that there is no limit.
-    whole, rest = divmod(max(seconds, 1e-6), 1.0)
-    return _TIMEVAL.pack(int(whole), int(rest * 1e6))
 
 
 def _exactly(sock: socket.socket, count: int, limit: float | None = None, life: int | None = None) -> bytes:
@@ -195,15 +188,8 @@ def _exactly(sock: socket.socket, count: int, limit: float | None = None, life: 
 def _received(sock: socket.socket, count: int, limit: float | None, life: int | None = None) -> bytes:
     if limit is not None:
         with contextlib.suppress(BlockingIOError):
-            return _some(sock.recv(count, socket.MSG_DONTWAIT))
-        waiting = select.poll()
-        waiting.register(sock, select.POLLIN)
-        if life is not None:
-            waiting.register(life, select.POLLIN)
-        ready = [descriptor for descriptor, _ in waiting.poll(max(0.0, limit) * 1e3)]
-        if not ready:
-            raise TimeoutError
-        if sock.fileno() not in ready:
+            return _some(operating_system.receive_now(sock, count))
+        if not operating_system.wait_readable(sock, life, max(0.0, limit)):
             raise Closed
     return _some(sock.recv(count))
 

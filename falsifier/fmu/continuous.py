@@ -11,8 +11,8 @@ import numpy as np
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from falsifier.core.operating_system import guarded_memory
 from falsifier.fmu.ports import Addresses, Table
-from falsifier.fmu.posix import guarded_memory
 from falsifier.fmu.stepping import (
     DONE,
     EVENT,

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
+from falsifier.core import operating_system
 from falsifier.core.secrets import holds_secrets, scrubbed
-from falsifier.fmu import posix
 
 
 def protect_secrets(environment: Mapping[str, str]) -> None:
@@ -12,8 +12,8 @@ def protect_secrets(environment: Mapping[str, str]) -> None:
     On Linux, any process could otherwise read the environment of another one of the same user. Without
     secrets, or if FMUs can be confined, this process stays open to debuggers.
     """
-    if holds_secrets(environment) and not posix.can_confine():
-        posix.hide_memory()
+    if holds_secrets(environment) and not operating_system.can_confine():
+        operating_system.hide_memory()
 
 
 def worker_environment(environment: Mapping[str, str]) -> dict[str, str]:

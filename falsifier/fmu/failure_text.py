@@ -1,7 +1,5 @@
 """Failures of worker processes in words."""
 
-import signal
-
 from falsifier.errors import FailureStatus, SimulationError
 from falsifier.fmu.channel import Reply
 
@@ -22,13 +20,3 @@ def last_lines(log: tuple[str, ...]) -> str:
     if len(lines) > 1:
         return f"; its last messages: {'; '.join(lines)}"
     return f"; its last message: {lines[0]}" if lines else ""
-
-
-def how_it_ended(code: int) -> str:
-    """Describe the end of a process by its exit code, which is negative for a signal."""
-    if code >= 0:
-        return f"it exited with code {code}"
-    try:
-        return f"signal {signal.Signals(-code).name}"
-    except ValueError:
-        return f"signal {-code}"

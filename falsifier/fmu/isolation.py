@@ -1,13 +1,11 @@
 """Simulation in worker processes: the side of the process that requests it.
 
-Each requesting process has one nursery, from which its workers are forked, and one worker per FMU, interface
-and thread. A worker that crashes, hangs or leaks memory is replaced; the simulation that it was running
-raises a SimulationError.
+Each requesting process has one starter of workers, and one worker per FMU, interface and thread. A worker
+that crashes, hangs or leaks memory is replaced; the simulation that it was running raises a SimulationError.
 """
 
 import atexit
 import contextlib
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -16,6 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core import operating_system
+from falsifier.core.operating_system import exit_text
 from falsifier.errors import FailureStatus, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
@@ -24,10 +24,12 @@ from falsifier.fmu.channel import (
     Reply,
     send_request,
 )
-from falsifier.fmu.failure_text import how_it_ended, last_lines, simulation_error
+from falsifier.fmu.failure_text import last_lines, simulation_error
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.processes import GRACE_SECONDS, Nursery, WorkerProcess
+from falsifier.fmu.processes import GRACE_SECONDS, WorkerProcess
+from falsifier.fmu.starting import Starter
 from falsifier.fmu.trust import Trust
+from falsifier.fmu.ways import open_starter
 from falsifier.fmu.worker import RUN
 from falsifier.fmu.worker_order import REUSES, Order, Reuse
 
@@ -35,7 +37,7 @@ from falsifier.fmu.worker_order import REUSES, Order, Reuse
 class IsolatedFmu:
     """Simulates one FMU in a worker process, which is replaced when necessary."""
 
-    def __init__(self, owner: Callable[[], Nursery], order: Order) -> None:
+    def __init__(self, owner: Callable[[], Starter], order: Order) -> None:
         self._owner, self._order = owner, order
         self._worker: WorkerProcess | None = None
         self._has_loaded = False
@@ -211,7 +213,7 @@ class IsolatedFmu:
         code = self._drop()
         hangs = isinstance(error, TimeoutError)
         how = f"hung for {time_limit:g} s (time_limit)" if hangs else "crashed"
-        end = f"({how_it_ended(code)}){last_lines(log)}"
+        end = f"({exit_text(code)}){last_lines(log)}"
         text = f"{self._order.path}: the FMU {how} while it was loaded{during} {end}"
         if not self._has_loaded:
             return ModelError(text)
@@ -244,7 +246,7 @@ class IsolatedFmu:
         log, during = worker.take_log(), self._during(worker)
         code = self._drop()
         name = self._order.description.info.name
-        reason = reason or f"the FMU's process crashed{during}: {how_it_ended(code)}"
+        reason = reason or f"the FMU's process crashed{during}: {exit_text(code)}"
         return SimulationError(f"{name}: {reason}" + last_lines(log), status=status, log=log)
 
     def _during(self, worker: WorkerProcess) -> str:
@@ -266,30 +268,30 @@ def _reuse(reply: Reply) -> Reuse:
 
 
 class _Registry:
-    """Nursery and workers of this process; a forked copy of the process starts without any."""
+    """What starts this process's workers, and these; a forked copy of the process starts without any."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._nursery: Nursery | None = None
+        self._starter: Starter | None = None
         self._fmus: dict[tuple[str, str, bool, bool, int], IsolatedFmu] = {}
         atexit.register(self.close)
-        os.register_at_fork(after_in_child=self.forget)
+        operating_system.on_fork(self.forget)
 
-    def nursery(self) -> Nursery:
+    def starter(self) -> Starter:
         with self._lock:
-            if self._nursery is not None and not self._nursery.is_alive:
-                self._nursery.close()
-                self._nursery = None
-            if self._nursery is None:
-                self._nursery = Nursery()
-            return self._nursery
+            if self._starter is not None and not self._starter.is_alive:
+                self._starter.close()
+                self._starter = None
+            if self._starter is None:
+                self._starter = open_starter()
+            return self._starter
 
     def fmu(self, order: Order) -> IsolatedFmu:
         key = (order.sha256, order.interface, order.logging, order.through_wine, threading.get_ident())
         found = self._fmus.get(key)
         if found is None:
             with self._lock:
-                found = self._fmus.setdefault(key, IsolatedFmu(self.nursery, order))
+                found = self._fmus.setdefault(key, IsolatedFmu(self.starter, order))
         return found
 
     def drop(self, sha256: str, interface: str, *, logging: bool = False, through_wine: bool = False) -> None:
@@ -302,7 +304,7 @@ class _Registry:
     def close(self) -> None:
         with self._lock:
             fmus, self._fmus = self._fmus, {}
-            owner, self._nursery = self._nursery, None
+            owner, self._starter = self._starter, None
         for fmu in fmus.values():
             with contextlib.suppress(ModelError):
                 fmu.close()
@@ -313,9 +315,9 @@ class _Registry:
         self._lock = threading.Lock()
         for fmu in self._fmus.values():
             fmu.forget()
-        if self._nursery is not None:
-            self._nursery.forget()
-        self._fmus, self._nursery = {}, None
+        if self._starter is not None:
+            self._starter.forget()
+        self._fmus, self._starter = {}, None
 
 
 REGISTRY = _Registry()

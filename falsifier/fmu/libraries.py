@@ -36,6 +36,28 @@ def find_libraries(
     return libraries, tuple(dict.fromkeys(said))
 
 
+def missing_binary_text(name: str, platforms: Sequence[str], *, has_sources: bool) -> str:
+    """Say that an FMU has no binary for this platform, why those that it has do not help, and what does.
+
+    Args:
+        name: file name of the FMU.
+        platforms: platforms for which it contains binaries.
+        has_sources: whether it contains C sources.
+    """
+    here = archive.this_platform()
+    system = here.partition("-")[2]
+    text = f"no binary for {here}, " + (
+        f"only for {', '.join(platforms)}" if platforms else "nor for any other"
+    )
+    if f"x86-{system}" in platforms and here != f"x86-{system}":
+        text += "; a 32-bit binary cannot be loaded here"
+    elif platforms and all(p.endswith("-darwin") for p in platforms):
+        text += "; binaries for macOS run only there"
+    if has_sources:
+        return f"{text}; it contains C sources: compile them with `falsifier build {name}`"
+    return f"{text}; export it again for this platform"
+
+
 def _find(names: Iterable[str], expected: PurePosixPath) -> PurePosixPath | None:
     paths = (PurePosixPath(name) for name in names)
     found = [p for p in paths if p.parent == expected.parent and p.suffix == expected.suffix]

@@ -11,6 +11,7 @@ from falsifier.core.model import Interface
 from falsifier.errors import ModelError
 from falsifier.fmu import archive
 from falsifier.fmu.description import Description
+from falsifier.fmu.libraries import missing_binary_text
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
 # Type codes by FMI version; they name the functions that read and write values.
@@ -142,15 +143,8 @@ class Library:
                 "the model identifier tells which one to load: export the FMU again"
             )
         has_sources = any((folder / "sources").rglob("*.c"))
-        cure = (
-            "it contains C sources: compile them with `falsifier build`"
-            if has_sources
-            else "export it again for this platform"
-        )
-        raise ModelError(
-            f"{info.name}: no binary for {archive.this_platform()} ({expected} is missing), "
-            f"only {', '.join(info.platforms) or 'no binaries at all'}; {cure}"
-        )
+        said = missing_binary_text("FMU", info.platforms, has_sources=has_sources)
+        raise ModelError(f"{info.name}: {said} ({expected} is missing)")
 
     def _load(self, folder: Path, binary: Path) -> Any:
         from fmpy import fmi1, fmi2, fmi3

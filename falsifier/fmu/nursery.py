@@ -10,34 +10,33 @@ import os
 import pickle
 import signal
 import socket
+import sys
 import tempfile
 import traceback
-from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
+from falsifier.core import linux, posix, posix_files
 from falsifier.errors import FalsifierError
-from falsifier.fmu import posix, worker
+from falsifier.fmu import worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
-from falsifier.fmu.folders import remove_tree, remove_work_folder
-from falsifier.fmu.opening import unpack
+from falsifier.fmu.folders import remove_work_folder
+from falsifier.fmu.opening import extracted
+from falsifier.fmu.readiness import Loops, settle_in
 from falsifier.fmu.stepper import warm_up
 from falsifier.fmu.worker_order import Order
 
+assert sys.platform != "win32"
+
 START, REAP = 1, 2
 
-# Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
-_MEMORY_SHARE = 0.8
-_COMPILING_MASTER = "compiling the loop that steps systems of FMUs, once per installation"
-_COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
 
-
-def main(descriptor: int, root: Path) -> None:
-    """Serve the parent on a socket until it closes; FMUs are extracted below ``root``."""
+def main(root: Path) -> None:
+    """Serve the parent on a connection until it closes; FMUs are extracted below ``root``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Workers adopt what their FMUs fork; of a worker that has crashed, this process does.
-    posix.adopt_orphans()
-    sock = socket.socket(fileno=descriptor)
+    linux.adopt_orphans()
+    sock, _ = posix.receive_connection()
     nursery = _Nursery(sock, root)
     try:
         warm_up()
@@ -51,7 +50,7 @@ class _Nursery:
     def __init__(self, sock: socket.socket, root: Path) -> None:
         self._sock, self._root = sock, root
         self._scratch: dict[int, Path] = {}
-        self._loaded: set[str] = set()
+        self._loops = Loops()
 
     def serve(self) -> None:
         while True:
@@ -66,22 +65,19 @@ class _Nursery:
 
     def close(self) -> None:
         for pid in self._scratch:
-            posix.end_group(pid)
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
             with contextlib.suppress(ChildProcessError):
-                os.waitpid(pid, 0)
-        posix.end_descendants()
+                posix.reap(pid)
+        linux.end_descendants()
         remove_work_folder(self._root)
 
     def _start(self, order: Order, descriptors: list[int]) -> Reply:
         connection, log = descriptors
         try:
-            folder = self._extracted(order)
-            self._load_loops(order)
+            folder = extracted(order, self._root)
+            self._loops.load(order, lambda text: send_reply(self._sock, Reply(text=text, more=True)))
             scratch = Path(tempfile.mkdtemp(prefix="work-", dir=self._root))
             me = os.getpid()
-            pid = os.fork()
+            pid = posix.fork()
             if not pid:
                 self._sock.close()
                 _become_worker(me, connection, log, order, folder, scratch)
@@ -93,45 +89,12 @@ class _Nursery:
         self._scratch[pid] = scratch
         return Reply(text=str(pid))
 
-    def _load_loops(self, order: Order) -> None:
-        """Compile what an order needs before the first fork for it, outside any simulation's time limit."""
-        members = () if order.network is None else order.network.members
-        if order.interface == "model-exchange":
-            from falsifier.fmu import model_exchange
-
-            self._once("solver", _COMPILING, model_exchange.warm_up)
-        if members:
-            from falsifier.fmu import master
-
-            self._once("master", _COMPILING_MASTER, master.warm_up)
-        if any(member.interface == "model-exchange" for member in members):
-            from falsifier.fmu import system_solver
-
-            self._once("system solver", _COMPILING, system_solver.warm_up)
-
-    def _once(self, name: str, text: str, warm_up: Callable[[], None]) -> None:
-        from falsifier.fmu.compiling import on_long_compilation
-
-        if name not in self._loaded:
-            with on_long_compilation(lambda: send_reply(self._sock, Reply(text=text, more=True))):
-                warm_up()
-            self._loaded.add(name)
-
     def _reap(self, pid: int) -> Reply:
-        posix.end_group(pid)
-        _, status = os.waitpid(pid, 0)
+        code = posix.reap(pid)
         scratch = self._scratch.pop(pid)
-        posix.end_descendants(keep=self._scratch)
-        remove_tree(scratch)
-        return Reply(text=str(os.waitstatus_to_exitcode(status)))
-
-    def _extracted(self, order: Order) -> Path:
-        folder = self._root / order.sha256[:16]
-        if not folder.is_dir():
-            partial = folder.with_suffix(".partial")
-            unpack(order, partial)
-            partial.rename(folder)
-        return folder
+        linux.end_descendants(keep=self._scratch)
+        posix_files.remove_tree(scratch)
+        return Reply(text=str(code))
 
 
 def _become_worker(
@@ -140,16 +103,12 @@ def _become_worker(
     """Run this newly forked process as a worker and exit."""
     code = 1
     try:
-        posix.end_with_parent(parent)
-        posix.adopt_orphans()
-        os.setpgid(0, 0)
-        os.chdir(scratch)
+        linux.end_with_parent(parent)
+        posix.lead_group()
         for stream in (1, 2):
             os.dup2(log, stream)
         os.close(log)
-        posix.limit_resources(_MEMORY_SHARE)
-        posix.flush_lines()
-        posix.confine()
+        settle_in(scratch)
         with socket.socket(fileno=os.dup(connection)) as sock:
             os.close(connection)
             worker.serve(sock, order, folder)

@@ -1,5 +1,6 @@
 """Unpacking and loading what a worker simulates."""
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -28,6 +29,20 @@ def unpack(order: Order, folder: Path) -> None:
         _extract(member.path, member.sha256, folder / member.folder)
 
 
+def extracted(order: Order, root: Path) -> Path:
+    """Return the folder below a root to which the FMU or system is extracted; extract it if necessary.
+
+    Raises:
+        ModelError: as for ``unpack``.
+    """
+    folder = root / order.sha256[:16]
+    if not folder.is_dir():
+        partial = folder.with_suffix(".partial")
+        unpack(order, partial)
+        partial.rename(folder)
+    return folder
+
+
 def open_session(
     order: Order,
     folder: Path,
@@ -52,10 +67,10 @@ def open_session(
         from falsifier.fmu.system_instance import SystemInstance
 
         return Session(partial(SystemInstance, order.network, folder, log, announce, logging=order.logging))
-    if order.through_wine:
-        from falsifier.fmu.windows import WindowsInstance
+    if sys.platform != "win32" and order.through_wine:
+        from falsifier.fmu.wine_instance import WineInstance
 
-        make = partial(WindowsInstance, order.description, folder, scratch or folder, order.interface, log)
+        make = partial(WineInstance, order.description, folder, scratch or folder, order.interface, log)
         return Session(partial(make, logging=order.logging))
     return Session(
         partial(FmuInstance, order.description, folder, order.interface, log, logging=order.logging)

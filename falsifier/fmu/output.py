@@ -2,8 +2,8 @@
 
 import os
 
+from falsifier.core import operating_system
 from falsifier.core.printable import printable
-from falsifier.fmu import posix
 
 _MOST_BYTES = 1 << 20
 # The end of long output says most about what went wrong.
@@ -15,7 +15,7 @@ class Output:
     """A file for a process's output, with a position that it shares with this process."""
 
     def __init__(self) -> None:
-        self._file = posix.sealed_file(_MOST_BYTES)
+        self._file = operating_system.sealed_file(_MOST_BYTES)
 
     def fileno(self) -> int:
         """Descriptor of the file, for the process that prints."""
@@ -29,7 +29,7 @@ class Output:
         os.lseek(self.fileno(), 0, os.SEEK_SET)
         # The process may have moved the position, which would otherwise be the number of bytes.
         size = min(position, _MOST_BYTES)
-        text = os.pread(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
+        text = operating_system.read_at(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
         lines = tuple(printable(text.decode("utf-8", "replace")).splitlines())
         return lines if size < _MOST_BYTES else (*lines, _DROPPED)
 

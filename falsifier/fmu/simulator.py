@@ -91,7 +91,7 @@ class FmuModel:
             ModelError: if that fails.
         """
         order = replace(_order(self), logging=True)
-        fmu = IsolatedFmu(REGISTRY.nursery, order)
+        fmu = IsolatedFmu(REGISTRY.starter, order)
         try:
             fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
         finally:

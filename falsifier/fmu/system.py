@@ -177,7 +177,7 @@ class System:
         Raises:
             ModelError: if that fails.
         """
-        fmu = IsolatedFmu(REGISTRY.nursery, _order(self, logging=True))
+        fmu = IsolatedFmu(REGISTRY.starter, _order(self, logging=True))
         try:
             fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
         finally:

@@ -1,21 +1,19 @@
 """The process in which one FMU runs: receives requests, simulates, replies.
 
-It is forked from the nursery, has no secrets in its environment, and may crash at any time.
+It is forked from the nursery or is a program of its own (``spawned``), has no secrets in its environment, and
+may crash at any time.
 """
 
 import contextlib
-import mmap
 import os
 import pickle
-import resource
 import socket
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
+from falsifier.core import operating_system
 from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
@@ -30,6 +28,7 @@ from falsifier.fmu.channel import (
 from falsifier.fmu.opening import open_session
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.session import Session
+from falsifier.fmu.sharing import attach
 from falsifier.fmu.worker_order import Order, Reuse
 
 PREPARE, RUN = 1, 2
@@ -58,7 +57,8 @@ def serve(sock: socket.socket, order: Order, folder: Path) -> None:
         except Closed:
             return
         if kind == PREPARE:
-            send_reply(sock, worker.prepare(pickle.loads(payload), descriptors[0]))
+            plan, place = pickle.loads(payload)
+            send_reply(sock, worker.prepare(plan, place, descriptors))
             close_all(descriptors)
             continue
         started = time.perf_counter()
@@ -83,10 +83,9 @@ class _Worker:
         self._instances = 0
         self._first_size = 0
 
-    def prepare(self, plan: Plan, descriptor: int) -> Reply:
+    def prepare(self, plan: Plan, place: str, descriptors: list[int]) -> Reply:
         try:
-            memory = mmap.mmap(descriptor, 0)
-            self._plan, self._room = plan, Room.over(plan, np.frombuffer(memory, dtype=np.float64))
+            self._plan, self._room = plan, Room.over(plan, attach(place, descriptors))
             session = self._session or self._load()
             session.prepare(self._plan, self._room)
         except SimulationError as error:
@@ -136,7 +135,7 @@ class _Worker:
         """Whether this process should be replaced: too many instances, or too much memory."""
         if self._instances >= _MAX_INSTANCES or self._reuse == "process":
             return True
-        size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        size = operating_system.most_memory_used()
         self._first_size = self._first_size or (size if self._instances else 0)
         return bool(self._first_size) and size > self._first_size + _MAX_GROWTH_KIB
 

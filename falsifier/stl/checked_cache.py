@@ -6,7 +6,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.runtime import rtsys
 
 _SUM_LENGTH = sha256().digest_size
 
@@ -37,6 +38,20 @@ class _CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
         return super()._load_data(name)
 
 
+class _QuickCache(FunctionCache):  # type: ignore[misc]
+    """Cache of one function, which loads machine code without what is needed only to compile.
+
+    Before it looks into the cache, numba imports its implementations of Python's and numpy's functions. That
+    takes most of the time that a process needs to its first result. The compiler does it in any case.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            found = self._load_overload(sig, target_context)
+        return super().load_overload(sig, target_context) if found is None else found
+
+
 # Sources of the compiled functions of each module, with those of the compiled functions that it imports.
 _SOURCES: dict[str, frozenset[str]] = {}
 
@@ -46,7 +61,10 @@ def check_cache(function: Any) -> None:
 
     Numba looks at the function's own file, but the machine code contains functions and constants of others.
     """
-    file: Any = getattr(getattr(function, "_cache", None), "_cache_file", None)
+    cache: Any = getattr(function, "_cache", None)
+    file: Any = getattr(cache, "_cache_file", None)
+    if type(cache) is FunctionCache:
+        cache.__class__ = _QuickCache
     sources = _sources(function.py_func)
     if type(file) is IndexDataCacheFile:
         file.__class__ = _CheckedFile

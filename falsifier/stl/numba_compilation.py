@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from falsifier.core import operating_system
+
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
@@ -41,12 +43,10 @@ def compiled(function: _Function, *, forceinline: bool = False, fastmath: bool =
 
 def _own_temporary_folder() -> Path | None:
     """Return a temporary folder that no other user can write to, because machine code is loaded from it."""
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    folder = Path(tempfile.gettempdir()) / f"falsifier-numba-{user}"
+    folder = Path(tempfile.gettempdir()) / f"falsifier-numba-{operating_system.user()}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.stat()
+        is_private = operating_system.is_private(folder)
     except OSError:
         return None
-    is_own = not hasattr(os, "getuid") or (found.st_uid == user and found.st_mode & 0o022 == 0)
-    return folder if is_own and os.access(folder, os.W_OK) else None
+    return folder if is_private and os.access(folder, os.W_OK) else None

@@ -5,11 +5,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from falsifier.fmu.ways import workers_fork
 from tests import patience
 from tests.command import listen_to_interrupts
 from tests.fmu import fixtures
 
 NOTHING, CRASH, HANG, EXIT, ALLOCATE, NAN, DISCARD, END, ABORT, ERROR, TALK, PRINT = range(12)
+
+FORKED = pytest.mark.skipif(not workers_fork(), reason="about the nursery, from which workers are forked")
 
 SCRIPT = """
 import os, sys, time

@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.fmu import posix
+from falsifier.core import operating_system
 from falsifier.fmu.environment import protect_secrets, worker_environment
 
 
@@ -12,8 +12,8 @@ def test_memory_is_hidden_if_it_holds_secrets_and_fmus_are_not_confined(
     monkeypatch: pytest.MonkeyPatch, name: str, confines: bool, hides: int
 ) -> None:
     calls: list[None] = []
-    monkeypatch.setattr(posix, "can_confine", lambda: confines)
-    monkeypatch.setattr(posix, "hide_memory", lambda: calls.append(None))
+    monkeypatch.setattr(operating_system, "can_confine", lambda: confines)
+    monkeypatch.setattr(operating_system, "hide_memory", lambda: calls.append(None))
     protect_secrets({name: "value"})
     assert len(calls) == hides
 

@@ -1,17 +1,11 @@
 from falsifier.fmu.channel import Reply
-from falsifier.fmu.failure_text import how_it_ended, last_lines, simulation_error
+from falsifier.fmu.failure_text import last_lines, simulation_error
 
 
 def test_the_last_messages_are_told_once_each() -> None:
     assert last_lines(()) == last_lines(("", " ")) == ""
     assert last_lines(("error: a",)) == "; its last message: error: a"
     assert last_lines(("1", "2", "2", "3", "4")) == "; its last messages: 2; 3; 4"
-
-
-def test_an_exit_code_or_a_signal_is_named() -> None:
-    assert how_it_ended(3) == "it exited with code 3"
-    assert how_it_ended(-11) == "signal SIGSEGV"
-    assert how_it_ended(-250) == "signal -250" or how_it_ended(-250) == "signal 250"
 
 
 def test_an_error_keeps_status_time_and_messages() -> None:

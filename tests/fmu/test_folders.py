@@ -5,10 +5,8 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from falsifier.fmu.folders import WorkFolder, remove_tree, remove_work_folder, sweep
+from falsifier.fmu.folders import WorkFolder, remove_work_folder, sweep
 
 
 @pytest.fixture(autouse=True)
@@ -77,56 +75,3 @@ def test_a_lock_without_folder_is_swept_when_it_is_old(temporary: Path) -> None:
     os.utime(old, (time.time() - 10_000, time.time() - 10_000))
     sweep()
     assert list(temporary.iterdir()) == [young]
-
-
-def test_a_tree_deeper_than_recursion_goes_is_removed(temporary: Path) -> None:
-    root = temporary / "deep"
-    root.mkdir()
-    here = os.open(root, os.O_RDONLY)
-    for _ in range(1200):
-        os.mkdir("a", dir_fd=here)
-        below = os.open("a", os.O_RDONLY, dir_fd=here)
-        os.close(here)
-        here = below
-    os.close(here)
-    remove_tree(root)
-    assert not root.exists()
-
-
-def test_links_are_removed_and_not_followed(temporary: Path) -> None:
-    (temporary / "kept").mkdir()
-    (temporary / "kept" / "file").touch()
-    root = temporary / "tree"
-    root.mkdir()
-    (root / "link").symlink_to(temporary / "kept")
-    (root / "nowhere").symlink_to("nowhere")
-    remove_tree(root)
-    assert not root.exists() and (temporary / "kept" / "file").exists()
-
-
-def test_a_link_in_place_of_the_folder_is_not_followed(temporary: Path) -> None:
-    (temporary / "kept").mkdir()
-    (temporary / "kept" / "file").touch()
-    (temporary / "link").symlink_to(temporary / "kept")
-    remove_tree(temporary / "link")
-    assert (temporary / "kept" / "file").exists()
-
-
-TREES = st.lists(
-    st.tuples(st.lists(st.sampled_from("ab\n"), min_size=1, max_size=5), st.integers(0, 0o777)), max_size=8
-)
-
-
-@settings(max_examples=50, deadline=None)
-@given(TREES)
-def test_any_tree_with_any_permissions_is_removed(trees: list[tuple[list[str], int]]) -> None:
-    root = WorkFolder().path
-    for parts, mode in trees:
-        folder = root.joinpath(*parts)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "file").touch()
-        (folder / "file").chmod(mode)
-    for parts, mode in trees:
-        root.joinpath(*parts).chmod(mode)
-    remove_tree(root)
-    assert not root.exists()

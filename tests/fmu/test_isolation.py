@@ -11,7 +11,9 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
+from falsifier.fmu.forking import Nursery
 from falsifier.fmu.isolation import REGISTRY
+from falsifier.fmu.spawning import Spawner
 from tests import patience
 from tests.fmu.fixtures import isolated, run
 from tests.fmu.support import (
@@ -22,6 +24,7 @@ from tests.fmu.support import (
     END,
     ERROR,
     EXIT,
+    FORKED,
     HANG,
     NAN,
     PRINT,
@@ -105,13 +108,15 @@ def test_a_worker_that_dies_between_simulations_is_replaced_without_blame(misdee
     assert run(misdeeds, ("y",))["y"][-1] == 10
 
 
+@FORKED
 def test_a_nursery_that_dies_is_replaced(misdeeds: FmuModel) -> None:
     run(misdeeds, ("y",))
-    nursery = REGISTRY.nursery()
-    nursery._process.kill()
-    nursery._process.wait()
+    nursery = REGISTRY.starter()
+    assert isinstance(nursery, Nursery)
+    os.kill(nursery._process.pid, signal.SIGKILL)
+    nursery._process.wait(patience.HANG)
     assert commit(misdeeds, CRASH).status == "crashed"
-    assert REGISTRY.nursery() is not nursery
+    assert REGISTRY.starter() is not nursery
 
 
 def test_a_forked_copy_starts_workers_of_its_own(tmp_path: Path) -> None:
@@ -145,7 +150,9 @@ except KeyboardInterrupt:
 
 def test_closing_the_registry_removes_the_folder_of_this_process() -> None:
     run(isolated("Lag_2"), ("y",))
-    root = REGISTRY.nursery()._root
+    starter = REGISTRY.starter()
+    assert isinstance(starter, Nursery | Spawner)
+    root = starter._root
     assert root.is_dir()
     REGISTRY.close()
     assert not root.exists()

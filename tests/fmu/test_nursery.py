@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fmu.support import assert_nothing_is_left, script
+from tests.fmu.support import FORKED, assert_nothing_is_left, script
 
 
 @pytest.mark.parametrize("ending", ["", "go(1)", "os.kill(os.getpid(), 9)", "os._exit(3)"])
@@ -13,11 +13,12 @@ def test_folders_and_processes_are_gone_however_the_process_ends(tmp_path: Path,
     assert_nothing_is_left(tmp_path)
 
 
+@FORKED
 def test_fmu_processes_see_no_secrets(tmp_path: Path) -> None:
     body = """
 from falsifier.fmu.isolation import REGISTRY
 (fmu,) = REGISTRY._fmus.values()
-for pid in (fmu._worker.pid, REGISTRY._nursery._process.pid):
+for pid in (fmu._worker.pid, REGISTRY._starter._process.pid):
     print(Path(f"/proc/{pid}/environ").read_text().replace(chr(0), chr(10)))
 """
     with script(

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import FmuModel, processes
-from falsifier.fmu.nursery import REAP
-from falsifier.fmu.processes import Nursery, WorkerProcess
+from falsifier.fmu import FmuModel
+from falsifier.fmu.forking import Nursery
+from falsifier.fmu.processes import WorkerProcess
 from falsifier.fmu.worker_order import Order
 from tests.fmu import fixtures
 
@@ -45,26 +45,3 @@ def test_without_its_nursery_a_worker_ends_without_an_exit_code() -> None:
     worker = WorkerProcess(owner, order())
     owner.close()
     assert worker.kill() == 0
-
-
-# A nursery that says something, and then the exit code of the worker that it is asked for.
-TALKING = f"""
-import json, socket, sys
-sys.path[:] = json.loads(sys.argv[1])
-from falsifier.fmu.channel import Reply, receive_request, send_reply
-sock = socket.socket(fileno=int(sys.argv[2]))
-send_reply(sock, Reply())
-assert receive_request(sock)[0] == {REAP}
-send_reply(sock, Reply(text="compiling", more=True))
-send_reply(sock, Reply(text="7"))
-"""
-
-
-def test_what_the_nursery_says_is_logged_and_is_not_the_answer(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(processes, "_BOOT", TALKING)
-    nursery = processes.Nursery()
-    assert nursery.reap(1) == 7
-    nursery.close()
-    assert [record.getMessage() for record in caplog.records] == ["compiling"]

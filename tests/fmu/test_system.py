@@ -68,11 +68,8 @@ def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named
     for _ in range(3):
         found = run(model, "plant.x")["plant.x"]
         assert found == pytest.approx(sampled_loop(0), abs=1e-9)
-    nursery = REGISTRY._nursery
     (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.key]
-    assert nursery is not None and fmu._worker is not None
-    status = Path(f"/proc/{fmu._worker.pid}/status").read_text()
-    assert f"PPid:\t{nursery._process.pid}\n" in status, "its environment, without keys, is the nursery's"
+    assert fmu._worker is not None and fmu._worker.simulations == 3
     model.load()
     with pytest.raises(Exception, match=r"process crashed in component bad: signal SIGSEGV") as crash:
         run(model, "plant.x", parameters={"bad.misdeed": 1})

@@ -11,13 +11,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from falsifier.core import operating_system
 from falsifier.core.printable import printable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError
-from falsifier.fmu import FmuModel, posix
+from falsifier.fmu import FmuModel
 from falsifier.fmu.isolation import REGISTRY
 from tests import patience
 from tests.fmu.fixtures import isolated, local, path, run
+from tests.fmu.support import FORKED
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
 
@@ -188,11 +190,12 @@ def test_children_end_when_the_simulating_process_is_killed(tmp_path: Path) -> N
     assert have_ended(pids)
 
 
+@FORKED
 def test_the_folder_of_a_killed_nursery_is_swept_at_the_next_start(tmp_path: Path) -> None:
     body = """
 go()
 from falsifier.fmu.isolation import REGISTRY
-os.kill(REGISTRY._nursery._process.pid, 9)
+os.kill(REGISTRY._starter._process.pid, 9)
 os.kill(os.getpid(), 9)
 """
     script(body, tmp_path)
@@ -202,7 +205,8 @@ os.kill(os.getpid(), 9)
 
 
 @pytest.mark.skipif(
-    not posix.can_confine() and os.getuid() != 0, reason="processes of other programs cannot be protected"
+    not operating_system.can_confine() and os.getuid() != 0,
+    reason="processes of other programs cannot be protected",
 )
 def test_an_fmu_reads_no_secrets_of_other_processes(tmp_path: Path) -> None:
     environment = {"SOME_API_KEY": "hostile-test-secret-1", "LICENSE": "port@host"}
@@ -219,8 +223,8 @@ def test_an_fmu_reads_no_secrets_of_other_processes(tmp_path: Path) -> None:
 
 
 UNCONFINED = """
-from falsifier.fmu import posix
-posix.can_confine = lambda: False
+from falsifier.core import operating_system
+operating_system.can_confine = lambda: False
 import ctypes
 go()
 print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0))

@@ -77,3 +77,12 @@ def test_a_cache_that_cannot_be_written_is_no_failure(
     module = imported(path)
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._save_index", full)
     assert module.doubled(4.0) == 8.0
+
+
+def test_what_is_cached_is_loaded_without_what_only_compiling_needs(tmp_path: Path) -> None:
+    (tmp_path / "quick.py").write_text(CODE)
+    program = "import sys, quick; print(quick.doubled(4.0), 'numba.np.linalg' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    command = [sys.executable, "-c", program]
+    printed = [subprocess.check_output(command, text=True, env=environment) for _ in range(2)]
+    assert printed == ["8.0 True\n", "8.0 False\n"]

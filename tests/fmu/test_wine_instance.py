@@ -97,6 +97,18 @@ def test_the_bundled_windows_libraries_are_verified(name: str, interface: Interf
     assert apart(trajectory(FmuModel(path, interface, windows=True), stop), expected) < 1e-12
 
 
+@needs_wine
+def test_a_fixed_element_of_an_array_stays_if_another_one_is_driven() -> None:
+    model, drive = through_wine("Arrays_3"), {"u[1]": Signal((0.0,), (1.0,))}
+    try:
+        for fixed in (2.0, -1.0):
+            got = run(model, ("x[1]",), signals=drive, parameters={"u[2]": fixed}, interval=0.01)
+            exact = np.sin(got.times) + fixed * (1.0 - np.cos(got.times))
+            np.testing.assert_allclose(got["x[1]"], exact, atol=1e-6)
+    finally:
+        model.close()
+
+
 @pytest.fixture(scope="module")
 def misdeeds() -> Iterator[FmuModel]:
     model = through_wine("Misdeeds_2")
@@ -193,7 +205,7 @@ def test_string_parameters_name_files_of_this_machine(name: str, tmp_path: Path)
 
 
 def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wine, "find_wine", lambda: None)
+    monkeypatch.setattr("shutil.which", lambda _: None)
     if not wine.can_run_windows():
         pytest.skip("Windows libraries are not simulated on this machine, with or without Wine")
     model = FmuModel(FOLDER / "Lag_2.fmu", isolate=False)

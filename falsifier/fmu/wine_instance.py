@@ -1,7 +1,8 @@
-"""A Windows library that is simulated through Wine; the stepping is in windows_worker/, see wine.py."""
+"""A Windows library, simulated through Wine; the stepping is in windows_worker/, see wine_process.py."""
 
 import mmap
 import struct
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,9 +16,22 @@ from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import TYPES, LogSink, status_name
 from falsifier.fmu.plan import Plan, solver_tolerance
-from falsifier.fmu.ports import Ports, make_ports
-from falsifier.fmu.stepper import check_input_range, check_range, is_held, loops, out_of_time, what_stopped
-from falsifier.fmu.wine import Answer, WineProcess, block, text, windows_path
+from falsifier.fmu.ports import Ports, fixed_elements, make_ports
+from falsifier.fmu.stepper import (
+    check_input_range,
+    check_range,
+    is_held,
+    loops,
+    out_of_time,
+    what_stopped,
+    write_fixed,
+)
+from falsifier.fmu.wine import windows_path
+
+if sys.platform != "win32":
+    from falsifier.fmu.wine_process import Answer, WineProcess, block, text
+
+assert sys.platform != "win32"
 
 _LOAD, _PREPARE, _SIMULATE, _RESET, _TAKE, _RESTORE, _FORGET, _RENEW = range(1, 9)
 # Where a simulation stopped, besides the places in stepping.py; see ``enum where`` in worker.h.
@@ -25,7 +39,7 @@ _DONE = 0
 _CALLING, _WRITING, _TEXT, _TIMEOUT, _IMPOSSIBLE = range(20, 25)
 
 
-class WindowsInstance:
+class WineInstance:
     """One FMU, loaded and instantiated under Wine; see Instance.
 
     Args:
@@ -77,36 +91,59 @@ class WindowsInstance:
         if plan is self._plan:
             return
         self._plan = None
-        path = self._share(plan)
-        codes = {code: position for position, code in enumerate(TYPES[self._description.major], start=1)}
+        self._path = self._share(plan)
         kinds = {v.name: v for v in self._description.info.variables}
         held = [is_held(self._description, self._interface, kinds[name]) for name in plan.inputs]
         self._held_rows = [row for row, is_so in enumerate(held) if is_so]
         self._other_rows = [row for row, is_so in enumerate(held) if not is_so]
+        self._parameters, self._outputs = self._ports(plan.parameters), self._ports(plan.outputs)
+        self._inputs, others = self._input_ports(plan, self._other_rows)
+        self._held_inputs, held_others = self._input_ports(plan, self._held_rows)
+        self._fixed = [(self._inputs, others), (self._held_inputs, held_others)]
+        self._fixed_values = np.full(len(others) + len(held_others), np.nan)
+        self._send(plan)
 
-        def ports(names: Sequence[str]) -> Ports:
-            return make_ports(self._description, names, codes)
+    def _ports(self, names: Sequence[str], fixed: Sequence[str] = ()) -> Ports:
+        codes = {code: position for position, code in enumerate(TYPES[self._description.major], start=1)}
+        return make_ports(self._description, names, codes, fixed)
 
-        self._parameters = ports(plan.parameters)
-        self._inputs = ports([plan.inputs[row] for row in self._other_rows])
-        self._held_inputs = ports([plan.inputs[row] for row in self._held_rows])
-        parts = [text(windows_path(path)), self._numbers(plan)]
+    def _input_ports(self, plan: Plan, rows: Sequence[int]) -> tuple[Ports, list[int]]:
+        """Return the ports of some inputs, and which parameters are other elements of the same arrays."""
+        names = [plan.inputs[row] for row in rows]
+        fixed = fixed_elements(self._description, names, plan.parameters)
+        return self._ports(names, [plan.parameters[k] for k in fixed]), fixed
+
+    def _send(self, plan: Plan) -> None:
+        """Tell the worker what the next simulations have in common."""
+        parts = [text(windows_path(self._path)), self._numbers(plan)]
         slots = self._description.slots
         parts += [_integers(slots[name].reference) + text(value) for name, value in plan.strings]
         parts.append(self._table(self._parameters))
         parts += [self._table(self._inputs), _integers(*self._other_rows)]
         parts += [self._table(self._held_inputs), _integers(*self._held_rows)]
-        parts.append(self._table(ports(plan.outputs)))
+        parts.append(self._table(self._outputs))
         answer = self._wine.request(_PREPARE, b"".join(parts))
         if answer.where != _DONE:
             raise ModelError(f"{self._name}: {answer.text}")
         self._plan = plan
+
+    def _fix(self, plan: Plan) -> None:
+        """Send the worker the fixed elements of partly driven arrays, if it has others."""
+        values = self._room.parameters[[k for _, rows in self._fixed for k in rows]]
+        if np.array_equal(values, self._fixed_values):
+            return
+        for ports, rows in self._fixed:
+            write_fixed(ports, self._room.parameters[rows])
+        self._fixed_values = values
+        self._send(plan)
 
     def simulate(self, deadline: float) -> None:
         """See Instance."""
         plan, room, shared = self._plan, self._room, self._shared
         assert plan is not None, "prepare must be called before simulate"
         self._check_ranges(plan)
+        if self._fixed_values.size:
+            self._fix(plan)
         shared.parameters[:] = room.parameters
         shared.inputs[:] = room.inputs
         remaining = max(deadline - time.perf_counter(), 0.0)

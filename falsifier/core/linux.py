@@ -1,31 +1,29 @@
-"""What FMU processes need from the operating system; each function does as much as the system offers.
+"""Services that only Linux has: processes kept apart, descendants found, children that end with their parent.
 
-Linux has all of it: sealed memory, adoption of orphans, isolation of processes from each other. Elsewhere the
-functions do less, or nothing, and say so.
+On macOS each function does nothing, and those that can tell so do.
 """
 
 import contextlib
 import ctypes
-import fcntl
-import mmap
 import os
-import resource
+import select
 import signal
 import struct
 import sys
-import tempfile
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO
+from subprocess import PIPE, Popen
+
+assert sys.platform != "win32"
 
 _IS_LINUX = sys.platform == "linux"
 
 _SET_PARENT_DEATH_SIGNAL, _SET_DUMPABLE, _SET_CHILD_SUBREAPER, _SET_NO_NEW_PRIVILEGES = 1, 4, 36, 38
-_LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
 # System calls and constants of Landlock, the same on all architectures (linux/landlock.h).
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
 _ASK_VERSION, _RULE_PATH_BENEATH = 1, 1
+_OPEN_PATH = 0o10000000  # O_PATH of Linux
 _MOVE_BETWEEN_FOLDERS, _SCOPE_SIGNAL = 1 << 13, 1 << 1
 _VERSION_WITH_MOVES, _VERSION_WITH_SIGNALS = 2, 6
 # What lets root read the memory of other processes: SYS_MODULE, SYS_RAWIO, SYS_PTRACE, SYS_ADMIN, PERFMON,
@@ -34,50 +32,6 @@ _READING_CAPABILITIES = sum(1 << number for number in (16, 17, 19, 21, 38, 39, 4
 _CAPABILITY_VERSION = 0x20080522
 # Processes that fork faster than they are killed are left after this time.
 _SWEEPING_SECONDS = 2.0
-
-
-def sealed_file(size: int) -> IO[bytes]:
-    """Open a file without a name whose size no process can change, in memory if the system supports that.
-
-    A process that maps a file dies when another one shortens it, and a file that grows fills the memory.
-    """
-    if hasattr(os, "memfd_create"):
-        file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
-        file.truncate(size)
-        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
-        return file
-    with tempfile.TemporaryFile() as named:
-        file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
-    file.truncate(size)
-    return file
-
-
-def guarded_memory(size: int) -> memoryview:
-    """Allocate zeroed bytes that end where accessible memory ends.
-
-    Native code that writes past their end stops with a signal there, before it damages anything else.
-    """
-    page = mmap.PAGESIZE
-    usable = -(-size // page) * page
-    memory = mmap.mmap(-1, usable + page)
-    guard = ctypes.addressof(ctypes.c_char.from_buffer(memory)) + usable
-    ctypes.CDLL(None).mprotect(ctypes.c_void_p(guard), ctypes.c_size_t(page), 0)
-    return memoryview(memory)[usable - size : usable]
-
-
-def lock_file(path: Path) -> int | None:
-    """Create and lock a file; the lock ends with the last process that has the returned descriptor open.
-
-    Returns:
-        The descriptor; None if another process has locked the file.
-    """
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        return None
-    return descriptor
 
 
 def hide_memory() -> None:
@@ -122,25 +76,11 @@ def adopt_orphans() -> None:
     _control(_SET_CHILD_SUBREAPER, 1)
 
 
-def open_life(pid: int) -> int | None:
-    """Open a descriptor that becomes readable when a process ends; None where there is none (not Linux)."""
-    try:
-        return os.pidfd_open(pid) if hasattr(os, "pidfd_open") else None
-    except OSError:
-        return None
-
-
 def end_with_parent(parent: int) -> None:
     """Kill this process when its parent ends (Linux)."""
     _control(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:  # it has ended already
         os._exit(1)
-
-
-def end_group(group: int) -> None:
-    """Kill a process group: what a process has started, where its descendants cannot be found otherwise."""
-    with contextlib.suppress(OSError):
-        os.killpg(group, signal.SIGKILL)
 
 
 def end_descendants(keep: Collection[int] = ()) -> None:
@@ -162,6 +102,60 @@ def end_descendants(keep: Collection[int] = ()) -> None:
         time.sleep(0.0005)
 
 
+def end_descendants_of(pid: int) -> None:
+    """Kill everything that descends from another process (Linux); see adopt_orphans."""
+    until = time.monotonic() + _SWEEPING_SECONDS
+    while time.monotonic() < until:
+        found = _descendants(pid)
+        if not found:
+            return
+        for descendant in found:
+            with contextlib.suppress(OSError):
+                os.kill(descendant, signal.SIGKILL)
+        time.sleep(0.0005)
+
+
+def end_marked(name: str, value: str) -> None:
+    """Kill all processes that were started with this variable in their environment (Linux).
+
+    So orphans are found whose ancestors have ended, in any process group.
+    """
+    mark = f"{name}={value}".encode()
+    until = time.monotonic() + _SWEEPING_SECONDS
+    while _IS_LINUX and time.monotonic() < until:
+        found = [pid for pid, _, _ in _all_processes() if mark in _environment(pid)]
+        if not found:
+            return
+        for pid in found:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        time.sleep(0.0005)
+
+
+def open_pipe(path: Path) -> int:
+    """Make a named pipe for other programs to write to; return a descriptor that is read without waiting."""
+    os.mkfifo(path, 0o600)
+    return os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+
+
+def start_holding(command: Sequence[str], environment: Mapping[str, str], held: int) -> Popen[bytes]:
+    """Start a program, with a pipe to it, that holds a descriptor of this process open as long as it runs."""
+    return Popen(command, stdin=PIPE, env=environment, bufsize=0, pass_fds=[held])
+
+
+def wait_for_any(descriptors: Iterable[int], seconds: float | None = None) -> None:
+    """Wait until one of some descriptors can be read, or for this time."""
+    waiting = select.poll()
+    for descriptor in descriptors:
+        waiting.register(descriptor, select.POLLIN)
+    waiting.poll(None if seconds is None else seconds * 1e3)
+
+
+def end_by(number: int) -> None:
+    """Send this process a signal."""
+    os.kill(os.getpid(), number)
+
+
 def children() -> list[int]:
     """Return the process ids of this process's children, adopted ones included (Linux; else none)."""
     if not _IS_LINUX:
@@ -170,27 +164,7 @@ def children() -> list[int]:
     try:
         return [int(pid) for pid in Path(f"/proc/{me}/task/{me}/children").read_text().split()]
     except OSError:  # a kernel without this file
-        return [pid for pid, parent in _all_processes() if parent == me]
-
-
-def limit_resources(memory_share: float) -> None:
-    """Allow this process no core dumps, and only this share of the machine's memory (Linux)."""
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if _IS_LINUX:
-        # RLIMIT_DATA counts what a model allocates, not the address space that runtimes merely reserve.
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-        _, allowed = resource.getrlimit(resource.RLIMIT_DATA)
-        limit = int(memory * memory_share)
-        limit = limit if allowed == resource.RLIM_INFINITY else min(limit, allowed)
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
-
-
-def flush_lines() -> None:
-    """Make C's stdout line-buffered, so that what the FMU printed before a crash is not lost."""
-    libc = ctypes.CDLL(None)
-    with contextlib.suppress(AttributeError, ValueError):
-        stdout = ctypes.c_void_p.in_dll(libc, "stdout")
-        libc.setvbuf(stdout, None, _LINE_BUFFERED, 0)
+        return [pid for pid, parent, _ in _all_processes() if parent == me]
 
 
 def _control(option: int, value: int) -> None:
@@ -209,7 +183,7 @@ def _enter_landlock() -> None:
     attributes = struct.pack("=QQQ", _MOVE_BETWEEN_FOLDERS, 0, scope)
     rules = _system_call(_CREATE_RULESET, attributes, ctypes.c_size_t(len(attributes)), 0)
     try:
-        everything = os.open("/", os.O_PATH | os.O_CLOEXEC)
+        everything = os.open("/", _OPEN_PATH | os.O_CLOEXEC)
         try:
             rule = struct.pack("=Qi", _MOVE_BETWEEN_FOLDERS, everything)
             _system_call(_ADD_RULE, rules, _RULE_PATH_BENEATH, rule, 0)
@@ -245,10 +219,29 @@ def _system_call(*arguments: object) -> int:
     return found
 
 
-def _all_processes() -> Iterator[tuple[int, int]]:
-    """Process ids and those of the parents."""
+def _descendants(pid: int) -> list[int]:
+    """Process ids of all living descendants of a process; none except on Linux."""
+    parents = (
+        {child: parent for child, parent, state in _all_processes() if state != "Z"} if _IS_LINUX else {}
+    )
+    found = {pid}
+    while grown := {child for child, parent in parents.items() if parent in found} - found:
+        found |= grown
+    return list(found - {pid})
+
+
+def _environment(pid: int) -> list[bytes]:
+    """Variables with which a process was started; none if it has ended or belongs to another user."""
+    try:
+        return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return []
+
+
+def _all_processes() -> Iterator[tuple[int, int, str]]:
+    """Process ids, those of the parents, and states."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             with contextlib.suppress(OSError, ValueError, IndexError):
                 fields = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
-                yield int(entry.name), int(fields[1])
+                yield int(entry.name), int(fields[1]), fields[0]

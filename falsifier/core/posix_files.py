@@ -1,0 +1,147 @@
+"""Files and folders on Linux and macOS; ``windows`` offers the same, ``operating_system`` chooses."""
+
+import contextlib
+import fcntl
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import IO
+from uuid import uuid4
+
+assert sys.platform != "win32"
+
+
+def sealed_file(size: int) -> IO[bytes]:
+    """Open a file without a name whose size no process can change, in memory if the system supports that.
+
+    A process that maps a file dies when another one shortens it, and a file that grows fills the memory.
+    """
+    if sys.platform == "linux" and hasattr(os, "memfd_create"):
+        file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
+        file.truncate(size)
+        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+        return file
+    with tempfile.TemporaryFile() as named:
+        file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
+    file.truncate(size)
+    return file
+
+
+def lock_file(path: Path) -> int | None:
+    """Create and lock a file; the lock ends with the last process that has the returned descriptor open.
+
+    Returns:
+        The descriptor; None if another process has locked the file.
+    """
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def read_at(descriptor: int, most: int, position: int) -> bytes:
+    """Read at most this many bytes of a file from a position, without moving the file's own."""
+    return os.pread(descriptor, most, position)
+
+
+def replace(source: Path, target: Path) -> None:
+    """Put a file in the place of another one, atomically."""
+    source.replace(target)
+
+
+def user() -> str:
+    """Return what tells this user's temporary folders from those of others."""
+    return str(os.getuid())
+
+
+def is_own(path: Path) -> bool:
+    """Whether a file or folder belongs to this user."""
+    return path.lstat().st_uid == os.getuid()
+
+
+def is_private(folder: Path) -> bool:
+    """Whether a folder belongs to this user and no other user can write to it."""
+    found = folder.stat()
+    return found.st_uid == os.getuid() and found.st_mode & 0o022 == 0
+
+
+def remove_tree(path: Path) -> None:
+    """Remove a folder with all its contents, however deep and whatever its permissions; ignore errors."""
+    if os.scandir not in os.supports_fd or os.rename not in os.supports_dir_fd:
+        shutil.rmtree(path, ignore_errors=True)
+        return
+    try:
+        folder = _opened(path)
+    except OSError:
+        return
+    try:
+        _empty(folder)
+    finally:
+        os.close(folder)
+    with contextlib.suppress(OSError):
+        path.rmdir()
+
+
+def _opened(path: Path) -> int:
+    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+    try:
+        return os.open(path, flags)
+    except PermissionError:
+        path.chmod(0o700)
+        return os.open(path, flags)
+
+
+def _empty(folder: int) -> None:
+    """Remove the contents of an open folder.
+
+    Folders in folders are moved up into the open one. So paths stay short, few files are open, and nothing
+    recurs, even with thousands of folders in each other.
+    """
+    names = (f"{uuid4().hex}-{number}" for number in count())
+    seen: set[str] = set()
+    while entries := set(_names(folder)) - seen:
+        for entry in entries:
+            if not _unlinked(entry, folder):
+                _hoist(entry, folder, names)
+                with contextlib.suppress(OSError):
+                    os.rmdir(entry, dir_fd=folder)
+        # What is still there cannot be removed.
+        seen |= entries
+
+
+def _hoist(entry: str, folder: int, names: Iterator[str]) -> None:
+    """Remove the files in a folder of an open folder, and move its folders up."""
+    with contextlib.suppress(OSError):
+        os.chmod(entry, 0o700, dir_fd=folder)
+        inner = os.open(entry, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=folder)
+        try:
+            for name in _names(inner):
+                if not _unlinked(name, inner):
+                    with contextlib.suppress(OSError):
+                        os.chmod(name, 0o700, dir_fd=inner)
+                        os.rename(name, next(names), src_dir_fd=inner, dst_dir_fd=folder)
+        finally:
+            os.close(inner)
+
+
+def _names(folder: int) -> list[str]:
+    with os.scandir(folder) as entries:
+        return [entry.name for entry in entries]
+
+
+def _unlinked(name: str, folder: int) -> bool:
+    """Remove a file; return False for a folder."""
+    try:
+        os.unlink(name, dir_fd=folder)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,141 @@
+"""What a shared library for Linux says of itself, read from its file (ELF) without loading it.
+
+Names and numbers are those of the System V ABI and of the Linux Standard Base.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+_MAGIC = b"\x7fELF"
+_LOADED, _DYNAMIC = 1, 2  # PT_LOAD, PT_DYNAMIC
+_NEEDED, _STRINGS, _RPATH, _RUNPATH = 1, 5, 15, 29  # DT_NEEDED, DT_STRTAB, DT_RPATH, DT_RUNPATH
+_DEFINED, _REQUIRED = 0x6FFFFFFC, 0x6FFFFFFE  # DT_VERDEF, DT_VERNEED
+# Limits of what is read from a damaged file; real ones stay far below.
+_MOST_ENTRIES, _LONGEST_NAME = 10_000, 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Elf:
+    """Contents of an ELF file.
+
+    Attributes:
+        bits: 32 or 64.
+        needed: file names of the libraries that are loaded with it.
+        folders: where these are looked up first; ``$ORIGIN`` is the folder of the file.
+        required: versions that it needs, each with the file name of the library that defines it.
+        defined: versions that it defines.
+    """
+
+    bits: int
+    needed: tuple[str, ...]
+    folders: tuple[str, ...]
+    required: tuple[tuple[str, str], ...]
+    defined: frozenset[str]
+
+
+def read_elf(content: bytes) -> Elf:
+    """Read an ELF file.
+
+    Raises:
+        ValueError: if it is not one, or is damaged.
+    """
+    if content[:4] != _MAGIC or len(content) < 64 or content[4] not in (1, 2) or content[5] not in (1, 2):
+        raise ValueError("not an ELF file")
+    try:
+        return _File(content).read()
+    except (struct.error, IndexError, OverflowError) as error:
+        raise ValueError(f"a damaged ELF file ({error})") from error
+
+
+class _File:
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+        self._is_64 = content[4] == 2
+        self._order = "<" if content[5] == 1 else ">"
+        self._segments = list(self._read_segments())
+
+    def read(self) -> Elf:
+        entries = list(self._entries())
+        first = dict(reversed(entries))
+        strings = self._offset(first.get(_STRINGS, 0)) if _STRINGS in first else 0
+        names = {
+            tag: [self._name(strings, v) for t, v in entries if t == tag]
+            for tag in (_NEEDED, _RPATH, _RUNPATH)
+        }
+        # A RUNPATH replaces the RPATH.
+        paths = names[_RUNPATH] or names[_RPATH]
+        return Elf(
+            bits=64 if self._is_64 else 32,
+            needed=tuple(names[_NEEDED]),
+            folders=tuple(folder for path in paths for folder in path.split(":") if folder),
+            required=tuple(self._required(strings, first.get(_REQUIRED))),
+            defined=frozenset(self._defined(strings, first.get(_DEFINED))),
+        )
+
+    def _unpack(self, kinds: str, offset: int) -> tuple[int, ...]:
+        if offset < 0:
+            raise IndexError("a position before the file")
+        return struct.unpack_from(self._order + kinds, self._content, offset)
+
+    def _read_segments(self) -> Iterator[tuple[int, int, int, int]]:
+        """Kind, position in the file, address and size in the file of each segment."""
+        (start,) = self._unpack("Q" if self._is_64 else "I", 32 if self._is_64 else 28)
+        size, count = self._unpack("HH", 54 if self._is_64 else 42)
+        for k in range(count):
+            at = start + k * size
+            if self._is_64:
+                kind, _, offset, address, _, length = self._unpack("IIQQQQ", at)
+            else:
+                kind, offset, address, _, length = self._unpack("IIIII", at)
+            yield kind, offset, address, length
+
+    def _entries(self) -> Iterator[tuple[int, int]]:
+        """Tags and values of the dynamic section."""
+        size = 16 if self._is_64 else 8
+        for kind, offset, _, length in self._segments:
+            if kind == _DYNAMIC:
+                for k in range(min(length // size, _MOST_ENTRIES)):
+                    tag, value = self._unpack("QQ" if self._is_64 else "II", offset + k * size)
+                    if not tag:
+                        return
+                    yield tag, value
+
+    def _offset(self, address: int) -> int:
+        """Position in the file of an address."""
+        for kind, offset, start, length in self._segments:
+            if kind == _LOADED and start <= address < start + length:
+                return offset + address - start
+        raise IndexError("an address outside the file")
+
+    def _name(self, strings: int, at: int) -> str:
+        text = self._content[strings + at : strings + at + _LONGEST_NAME]
+        return text.partition(b"\0")[0].decode("utf-8", "replace")
+
+    def _required(self, strings: int, address: int | None) -> Iterator[tuple[str, str]]:
+        """Version names of the chain of Verneed records with those of the Vernaux chain of each."""
+        for at in self._chain(address, "HHIII", 4):
+            _, count, file, first, _ = self._unpack("HHIII", at)
+            inner = at + first
+            for _ in range(count):
+                *_, name, following = self._unpack("IHHII", inner)
+                yield self._name(strings, file), self._name(strings, name)
+                inner += following
+
+    def _defined(self, strings: int, address: int | None) -> Iterator[str]:
+        """Version names of the chain of Verdef records."""
+        for at in self._chain(address, "HHHHIII", 6):
+            first = self._unpack("HHHHIII", at)[5]
+            yield self._name(strings, self._unpack("I", at + first)[0])
+
+    def _chain(self, address: int | None, kinds: str, following: int) -> Iterator[int]:
+        """Positions of records, each of which contains the distance to the next."""
+        if address is None:
+            return
+        at = self._offset(address)
+        for _ in range(_MOST_ENTRIES):
+            yield at
+            distance = self._unpack(kinds, at)[following]
+            if not distance:
+                return
+            at += distance

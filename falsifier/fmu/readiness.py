@@ -1,0 +1,55 @@
+"""What a worker does before it simulates, however it was started."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from falsifier.core import operating_system
+from falsifier.fmu.worker_order import Order
+
+# Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
+_MEMORY_SHARE = 0.8
+_COMPILING_MASTER = "compiling the loop that steps systems of FMUs, once per installation"
+_COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
+
+
+class Loops:
+    """The compiled loops that this process has loaded beyond those that every simulation needs."""
+
+    def __init__(self) -> None:
+        self._loaded: set[str] = set()
+
+    def load(self, order: Order, tell: Callable[[str], None]) -> None:
+        """Load what an order needs, outside any time limit; ``tell`` hears of long compilations."""
+        if order.through_wine:  # its worker has loops of its own
+            return
+        members = () if order.network is None else order.network.members
+        if order.interface == "model-exchange":
+            from falsifier.fmu import model_exchange
+
+            self._once("solver", model_exchange.warm_up, lambda: tell(_COMPILING))
+        if members:
+            from falsifier.fmu import master
+
+            self._once("master", master.warm_up, lambda: tell(_COMPILING_MASTER))
+        if any(member.interface == "model-exchange" for member in members):
+            from falsifier.fmu import system_solver
+
+            self._once("system solver", system_solver.warm_up, lambda: tell(_COMPILING))
+
+    def _once(self, name: str, warm_up: Callable[[], None], tell: Callable[[], None]) -> None:
+        from falsifier.fmu.compiling import on_long_compilation
+
+        if name not in self._loaded:
+            with on_long_compilation(tell):
+                warm_up()
+            self._loaded.add(name)
+
+
+def settle_in(scratch: Path) -> None:
+    """Give this process its working folder and its limits; the FMU is loaded after that."""
+    operating_system.adopt_orphans()
+    os.chdir(scratch)
+    operating_system.limit_resources(_MEMORY_SHARE)
+    operating_system.flush_lines()
+    operating_system.confine()

@@ -1,0 +1,37 @@
+import sys
+
+import pytest
+
+from falsifier.fmu import FmuModel, master, model_exchange
+from falsifier.fmu.readiness import Loops
+from falsifier.fmu.simulator import _order
+from tests.core.children import in_child
+from tests.fmu.fixtures import ME, path
+
+
+def test_loops_are_loaded_once_and_only_if_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded: list[str] = []
+    monkeypatch.setattr(model_exchange, "warm_up", lambda: loaded.append("solver"))
+    monkeypatch.setattr(master, "warm_up", lambda: loaded.append("master"))
+    loops = Loops()
+    loops.load(_order(FmuModel(path("Lag_2"))), print)
+    assert not loaded
+    for _ in range(2):
+        loops.load(_order(FmuModel(path("Lag_2"), ME)), print)
+    assert loaded == ["solver"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux")
+def test_a_worker_settles_in_its_folder_with_limited_memory(tmp_path: object) -> None:
+    code = f"""
+from pathlib import Path
+from falsifier.fmu import readiness
+readiness._MEMORY_SHARE = 1e-3
+readiness.settle_in(Path({str(tmp_path)!r}))
+print(os.getcwd())
+try:
+    bytearray(1 << 33)
+except MemoryError:
+    print("refused")
+"""
+    assert in_child(code) == f"{tmp_path}\nrefused\n"

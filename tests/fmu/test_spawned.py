@@ -1,0 +1,35 @@
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.operating_system import Child
+from falsifier.fmu.channel import open_channel, receive_reply
+from tests.patience import HANG
+
+PROGRAM = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from pathlib import Path
+from falsifier.fmu import spawned
+spawned.warm_up = lambda: None
+spawned.main(Path(sys.argv[2]))
+"""
+
+
+@pytest.mark.parametrize("first", ["line", "connection"])
+def test_without_its_parent_it_removes_the_folder_and_ends(tmp_path: Path, first: str) -> None:
+    root = tmp_path / "root"
+    (root / "work").mkdir(parents=True)
+    ours, theirs = open_channel()
+    paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
+    child = Child([sys.executable, "-c", PROGRAM, paths, str(root)], os.environ, theirs)
+    assert receive_reply(ours, HANG).status == "ok"
+    child.settle()
+    for what in (child._line, ours) if first == "line" else (ours, child._line):
+        what.close()
+    child.wait(HANG)
+    assert child.end() == 1
+    assert not root.exists()

@@ -1,0 +1,85 @@
+import hashlib
+import struct
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import ModelError
+from falsifier.fmu import wine, wine_process
+from tests import patience
+from tests.fmu.test_wine_instance import needs_wine
+
+
+def test_the_worker_is_built_from_its_sources() -> None:
+    """`make windows-worker` writes the sums of both."""
+    folder = wine_process.WORKER.parent
+    lines = [line.split() for line in (folder / "SHA256SUMS").read_text().splitlines()]
+    sums = {name: digest for digest, name in lines}
+    assert sums.keys() == {path.name for path in folder.iterdir()} - {"SHA256SUMS"}
+    for name, expected in sums.items():
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == expected, name
+
+
+def test_places_and_requests_are_numbered_as_in_the_worker() -> None:
+    header = (wine_process.WORKER.parent / "worker.h").read_text()
+    names = [
+        line.split("/*")[0] for line in header.partition("enum where {")[2].partition("}")[0].splitlines()
+    ]
+    words = [word.strip() for word in "".join(names).split(",")]
+    assert words[:8] == [
+        "DONE",
+        "SETTING",
+        "STEPPING",
+        "GETTING",
+        "EVENT",
+        "TERMINATED",
+        "STUCK",
+        "TOO_SMALL",
+    ]
+    assert words[8:] == [
+        "CALLING = 20", "WRITING", "TEXT", "TIMEOUT", "IMPOSSIBLE", "REFUSED", "MESSAGE", "CRASHED",
+    ]  # fmt: skip
+
+
+def test_texts_are_padded() -> None:
+    assert wine_process.text("ä") == struct.pack("<Q", 3) + "ä\0".encode() + bytes(5)
+    assert wine_process.block(bytes(8)) == struct.pack("<Q", 8) + bytes(8)
+
+
+def test_wine_gets_no_keys_and_no_screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-secret")
+    monkeypatch.setenv("DISPLAY", ":0")
+    environment = wine_process._environment(tmp_path, tmp_path / "prefix")
+    assert not {"OPENAI_API_KEY", "DISPLAY"} & environment.keys()
+    assert environment["WINEPREFIX"] == str(tmp_path / "prefix")
+
+
+def test_no_wine_is_said_before_anything_is_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    with pytest.raises(ModelError, match="Wine, which is missing: install Wine"):
+        wine_process.WineProcess(tmp_path, print)
+    assert list(tmp_path.iterdir()) == []
+    assert "which is missing" in wine.windows_text()
+
+
+def processes_in(folder: Path) -> list[str]:
+    """Programs whose environment names a folder."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        try:
+            if str(folder).encode() in (entry / "environ").read_bytes():
+                found.append((entry / "comm").read_text().strip())
+        except OSError:
+            continue
+    return found
+
+
+@needs_wine
+def test_nothing_is_left_of_a_wine_that_was_closed(tmp_path: Path) -> None:
+    process = wine_process.WineProcess(tmp_path, print)
+    assert processes_in(process.folder)
+    unknown = process.request(99)
+    assert unknown.text == "request 99 is unknown"
+    process.close()
+    assert list(tmp_path.iterdir()) == []
+    patience.wait_until(lambda: not processes_in(process.folder))
