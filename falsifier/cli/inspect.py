@@ -11,6 +11,7 @@ import click
 
 from falsifier.cli.options import json_option, out_option, profile_option
 from falsifier.cli.output import say
+from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
@@ -38,7 +39,7 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
+@click.argument("fmu", metavar="FILE", type=click.Path(path_type=Path))
 @click.option("--all", "everything", is_flag=True, help="Show all variables, including internal ones.")
 @click.option(
     "--check",
@@ -46,15 +47,23 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
     is_flag=True,
     help="Simulate with the step and with half of it, and show the largest differences of the outputs.",
 )
+@click.option("--names", is_flag=True, help="Of a Simulink file: show only the names.")
 @json_option
-def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
+def info(*, fmu: Path, everything: bool, checked: bool, names: bool, as_json: bool) -> None:
     """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
-    FMU is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
-    two stand for their FMU or system.
+    FILE is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
+    two stand for their FMU or system. Of a Simulink file (.slx, .mdl) it shows the blocks, lines and charts.
     """
     from falsifier.fmu import read_info
 
+    if fmu.suffix.lower() in SIMULINK:
+        if everything or checked:
+            raise click.UsageError("--all and --check apply to FMUs only")
+        say(_diagram(fmu, names=names, as_json=as_json))
+        return
+    if names:
+        raise click.UsageError("--names applies to Simulink files only")
     source = _named(fmu)
     found = read_info(source) if isinstance(source, Path) else source.info
     if as_json:
@@ -63,6 +72,16 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool) -> None:
     say(info_text(found, everything=everything))
     if checked:
         _print_convergence(source, found)
+
+
+def _diagram(file: Path, *, names: bool, as_json: bool) -> str:
+    from falsifier.context.simulink import names_text, read_diagram
+    from falsifier.views.diagram_text import diagram_json, diagram_text
+
+    diagram = read_diagram(file)
+    if as_json:
+        return diagram_json(diagram)
+    return names_text(diagram) if names else diagram_text(diagram)
 
 
 @click.command()

@@ -5,6 +5,7 @@ from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.archive import this_platform
 from tests.command import ROOT, falsifier
+from tests.fixtures import simulink
 from tests.fmu.fixtures import path as fixture
 
 
@@ -105,3 +106,20 @@ def test_an_fmu_without_outputs_can_be_checked_and_searched(tmp_path: Path) -> N
     assert falsifier("init", str(fixture("NoOutputs_2dymola")), "--out", "my.toml", cwd=tmp_path).code == 0
     done = falsifier("run", "my.toml", "--stl", "G[0,10] (y <= 5)", "--budget", "5", "--quiet", cwd=tmp_path)
     assert done.code == 1, done.err
+
+
+def test_info_of_a_simulink_file(tmp_path: Path) -> None:
+    simulink.write_slx(tmp_path / "limphome.slx")
+    done = falsifier("info", "limphome.slx", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "Normal -> Limp [disagreement > 9.5]" in done.out
+    (tmp_path / "limphome.mdl").write_text(simulink.MDL)
+    assert falsifier("info", "limphome.mdl", cwd=tmp_path).out == done.out
+    assert "9.5" not in falsifier("info", "limphome.mdl", "--names", cwd=tmp_path).out
+    assert falsifier("info", "limphome.slx", "--json", cwd=tmp_path).json["name"] == "limphome"
+    assert falsifier("info", "limphome.slx", "--check", cwd=tmp_path).code == 2
+    assert falsifier("info", "AT.fmu", "--names", cwd=tmp_path).code == 2
+    (tmp_path / "bad.slx").write_bytes(b"PK")
+    bad = falsifier("info", "bad.slx", cwd=tmp_path)
+    assert bad.code == 3
+    assert "bad.slx: not a readable Simulink file" in bad.err
