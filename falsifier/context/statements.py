@@ -67,17 +67,23 @@ class Slice:
 
 
 def sliced(
-    statements: Iterable[Statement], values: Mapping[str, Collection[str]], seeds: Iterable[str]
+    statements: Iterable[Statement],
+    values: Mapping[str, Collection[str]],
+    seeds: Iterable[str],
+    *,
+    unknowns: Collection[str] = (),
 ) -> Slice:
     """Return what names depend on: every statement that sets one of them, and so on for what it uses.
 
-    Conditions around a statement count as used by it. A name that no statement sets is determined by the
+    Conditions around a statement count as used by it. An unknown that no statement sets is determined by the
     equations that contain it.
 
     Args:
         statements: all statements.
         values: names in the declared value of each name.
         seeds: the names.
+        unknowns: variables that equations determine: neither inputs nor parameters, without a value of their
+            own.
     """
     flat = [pair for statement in statements for pair in _flat(statement, frozenset())]
     setting: dict[str, list[int]] = {}
@@ -86,7 +92,7 @@ def sliced(
         for name in statement.sets:
             setting.setdefault(name, []).append(i)
         if statement.is_equation:
-            for name in statement.names:
+            for name in statement.names.intersection(unknowns):
                 containing.setdefault(name, []).append(i)
     wanted: set[str] = set()
     kept: set[Statement] = set()

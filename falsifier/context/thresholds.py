@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from falsifier.context.tokens import Token, tokens_of, written
 
 _RELATIONS = ("<", "<=", ">", ">=", "==", "!=", "<>")
+_SIGNS = ("<", ">", "==", "!=")
 # What ends an operand at its own depth of brackets.
 _BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop , ; ? : = := { } return"
 _BOUNDARIES = frozenset(_BOUNDING.split())
@@ -44,6 +45,8 @@ def thresholds(
     """
     seen = set()
     for text, line in texts:
+        if not any(sign in text for sign in _SIGNS):
+            continue
         tokens = tokens_of(text, file)
         for i, token in enumerate(tokens):
             if token.text in _RELATIONS:

@@ -29,7 +29,7 @@ MAX_CONTROL_POINTS = 10_000
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
 # Sections of which there is one, without a name of its own.
-_SINGLE = ("model", "free", "coupling")
+_SINGLE = ("model", "free", "coupling", "context")
 
 
 class _Strict(BaseModel):
@@ -174,6 +174,17 @@ class CouplingSection(_Strict):
     max_rounds: int = Field(100, ge=1, description="Maximum number of rounds of the initialisation.")
 
 
+class ContextSection(_Strict):
+    """What a language model may read about the model; nothing else is sent."""
+
+    files: tuple[str, ...] = Field(
+        (), description="Simulink files, sources and documents, relative to the spec file."
+    )
+    fmu: bool = Field(
+        default=False, description="Also documentation, sources, texts and annotations inside the FMU."
+    )
+
+
 Components = dict[str, ComponentSection]
 Connections = dict[str, Annotated[ConnectionSection, BeforeValidator(_bare_source)]]
 
@@ -213,6 +224,7 @@ class Spec(_Strict):
     components: Components = Field(default_factory=dict)
     connections: Connections = Field(default_factory=dict)
     coupling: CouplingSection = Field(default_factory=CouplingSection)
+    context: ContextSection = Field(default_factory=ContextSection)
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
     requirements: dict[str, RequirementSection] = Field(min_length=1)
@@ -353,6 +365,7 @@ def _fields(location: list[str]) -> dict[str, Any]:
         "components": ComponentSection,
         "connections": ConnectionSection,
         "coupling": CouplingSection,
+        "context": ContextSection,
         "inputs": InputSection,
         "parameters": ParameterSection,
         "requirements": RequirementSection,

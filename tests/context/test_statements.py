@@ -23,10 +23,11 @@ def test_a_slice_follows_uses_conditions_and_declared_values() -> None:
     assert found.kept == {A, B}
 
 
-def test_a_name_that_nothing_sets_is_found_in_equations() -> None:
+def test_an_unknown_that_nothing_sets_is_found_in_equations() -> None:
     equation = sets("u", "r", "i", equation=True)
-    assert sliced([equation], {}, ["i"]).names == {"u", "r", "i"}
-    assert sliced([sets("u", "i")], {}, ["i"]).names == {"i"}
+    assert sliced([equation], {}, ["i"], unknowns=["i"]).names == {"u", "r", "i"}
+    assert sliced([equation], {}, ["i"]).names == {"i"}  # an input or a parameter
+    assert sliced([sets("u", "i")], {}, ["i"], unknowns=["i"]).names == {"i"}
 
 
 def test_conditions_are_kept_around_what_is_kept() -> None:

@@ -106,7 +106,10 @@ def with_bases(found: ModelicaClass, classes: Iterable[ModelicaClass]) -> Modeli
 def slice_of(found: ModelicaClass, names: Iterable[str]) -> Slice:
     """Return what variables of a class depend on; ``a.b`` stands for the component ``a``."""
     values = {d.name: d.uses for d in found.declarations}
-    return sliced(found.statements, values, {name.partition(".")[0] for name in names})
+    given = {"input", "parameter", "constant"}
+    unknowns = frozenset(d.name for d in found.declarations if not d.value and not given & set(d.prefixes))
+    seeds = {name.partition(".")[0] for name in names}
+    return sliced(found.statements, values, seeds, unknowns=unknowns)
 
 
 def used_classes(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from falsifier.context.values import Context
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.space import SearchSpace
 from falsifier.problem.problem import Problem
@@ -20,6 +21,7 @@ class View:
         experiment: stop time and output grid.
         levels: values that something searched can take, by name, if they are levels without a type.
         tells_kinds: whether types of signals are told.
+        context: what the files say that the user named.
     """
 
     info: ModelInfo
@@ -28,11 +30,18 @@ class View:
     experiment: Experiment
     levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     tells_kinds: bool = True
+    context: Context = field(default_factory=Context)
 
     @classmethod
     def of(cls, problem: Problem) -> "View":
         """Make the view of a problem."""
-        return cls(problem.info, problem.requirement, problem.space, problem.experiment)
+        return cls(
+            problem.info,
+            problem.requirement,
+            problem.space,
+            problem.experiment,
+            context=problem.context,
+        )
 
     def unit(self, name: str) -> str:
         """Unit of a signal; empty if unknown or dimensionless."""
