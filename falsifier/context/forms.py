@@ -22,6 +22,7 @@ from falsifier.context.simulink.conditions import comparisons, constants
 from falsifier.context.simulink.upstream import upstream
 from falsifier.context.thresholds import Threshold, thresholds
 from falsifier.core.words import counted
+from falsifier.errors import SpecError
 
 C_SUFFIXES = (".c", ".h", ".cpp", ".hpp")
 MODELICA_SUFFIXES = (".mo",)
@@ -89,14 +90,17 @@ def of_source(
         signals: all signals of the model.
         is_named: whether the user named this file; others are told only as far as they concern the signals.
 
-    Raises:
-        SpecError: if a source is not closed or nested too deep.
+    A source that is not understood is told as text, and its form says so.
     """
     suffix = PurePosixPath(shown).suffix.lower()
-    if suffix in MODELICA_SUFFIXES:
-        return _of_modelica(text, shown, seeds, signals)
-    if suffix in C_SUFFIXES:
-        return _of_c(text, shown, seeds, is_named=is_named)
+    try:
+        if suffix in MODELICA_SUFFIXES:
+            return _of_modelica(text, shown, seeds, signals)
+        if suffix in C_SUFFIXES:
+            return _of_c(text, shown, seeds, is_named=is_named)
+    except SpecError as error:
+        found = _not_understood(text, f"not understood: {str(error).removeprefix(f'{shown}: ')}", signals)
+        return found if is_named else Readable(found.forms[-1:])
     if suffix in HTML_SUFFIXES:
         return _of_document(_without_tags(text), signals)
     if suffix == ".json":

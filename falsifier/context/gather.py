@@ -54,6 +54,8 @@ def gather(
             if len(found.readable.forms) > 1:  # otherwise it says nothing about the signals
                 sources.append(found)
     chosen = _fitting(sources)
+    for source, (_, text) in zip(sources, chosen, strict=True):
+        _refuse_secrets(text, f"{source.path}, as it is told")  # what encodings may have hidden before
     return Context(
         tuple(
             Excerpt(s.path, s.sha256, _shortened(s.readable.forms, i), text)

@@ -38,6 +38,15 @@ def test_c_that_sets_no_signal_is_told_only_if_it_is_named() -> None:
     assert [f.name for f in of_source(source, "a.c", ["o"], ["o"], is_named=False).forms] == ["size only"]
 
 
+def test_a_source_that_is_not_understood_is_text_and_that_is_said() -> None:
+    source = "#ifdef A\nvoid f(int a) {\n#else\nvoid f(void) {\n#endif\n  speed = 3;\n}\n"
+    first = of_source(source, "a.c", ["speed"], ["speed"]).forms[0]
+    assert first.name == "whole; not understood: the brace of line 2 is not closed"
+    assert "speed = 3;" in first.text()
+    hidden = of_source(source, "m.fmu: a.c", ["speed"], ["speed"], is_named=False)
+    assert len(hidden.forms) == 1
+
+
 def test_pages_lose_their_tags() -> None:
     told = texts(of_source(PAGE, "a.html", ["speed"], ["speed"]))
     assert "The value of speed stays < 3." in told["whole"]

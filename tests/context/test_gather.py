@@ -99,6 +99,15 @@ def test_a_secret_in_a_part_of_a_simulink_file_names_the_part(tmp_path: Path) ->
         read(simulink.write_slx(tmp_path / "limphome.slx", parts))
 
 
+def test_a_secret_behind_an_encoding_is_refused_as_well(tmp_path: Path) -> None:
+    parts: dict[str, str | bytes] = dict(simulink.newer_parts())
+    system = simulink.CONTROLLER.replace('Name="Proportional"', 'Name="sk-abcdefghijklmnop"')
+    system = system.replace('encoding="utf-8"', 'encoding="utf-16"')
+    parts["simulink/systems/system_4.xml"] = system.encode("utf-16")
+    with pytest.raises(SpecError, match=r"limphome\.slx, as it is told: line \d+ looks like a key"):
+        read(simulink.write_slx(tmp_path / "limphome.slx", parts))
+
+
 def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"none\.md: cannot be read"):
         read(tmp_path / "none.md")
