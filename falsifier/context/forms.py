@@ -110,26 +110,32 @@ def of_source(
 
 def _of_modelica(text: str, shown: str, seeds: Collection[str], signals: Collection[str]) -> Readable:
     classes = read_modelica(text, shown)
-    chosen = class_for(classes, {name.partition(".")[0] for name in (*seeds, *signals)})
+    chosen = class_for(classes, _roots((*seeds, *signals)))
     if chosen is None:
         return _not_understood(text, "no class declares a signal of the model", signals)
     found = with_bases(chosen, classes)
-    roots = {name.partition(".")[0] for name in seeds} & found.names
+    roots = _roots(seeds) & found.names
     kept = slice_of(found, roots) if roots else None
     others = used_classes(found, kept, classes)
     limits = list(thresholds(conditions(found, kept), found.constants, shown))
     for other in others:
         limits += thresholds(conditions(other, None), other.constants, shown)
     of_main = class_text(found, kept)
+    stated = {n: v for n, v in found.constants.items() if kept is None or n in kept.names}
     form = "what the requirement depends on" if roots else f"class {chosen.name}"
     forms = (
         Form(form, lambda: "\n".join([of_main, *(class_text(other, None) for other in others)])),
         Form(f"{form}, without other classes", lambda: of_main),
-        Form("parameters and comparisons", lambda: _parameters(found.constants, limits)),
+        Form("parameters and comparisons", lambda: _parameters(stated, limits)),
         Form("comparisons", lambda: _parameters({}, limits)),
         Form("name only", lambda: f"{found.kind} {found.name}"),
     )
     return Readable(forms, tuple(limits))
+
+
+def _roots(names: Collection[str]) -> set[str]:
+    """Names under which a source may declare signals: those of components or members, and the last ones."""
+    return {part for name in names for part in (name.partition(".")[0], name.rpartition(".")[2])}
 
 
 def _of_c(text: str, shown: str, seeds: Collection[str], *, is_named: bool) -> Readable:

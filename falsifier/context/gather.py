@@ -134,11 +134,13 @@ def _shortened(forms: tuple[Form, ...], i: int) -> str:
 
 def _compared(sources: list[_Source], signals: Collection[str]) -> Iterator[Compared]:
     """Return all thresholds, those of signals of the model first."""
-    ends = {name.rpartition(".")[2].strip("'"): name for name in signals}
+    ends: dict[str, list[str]] = {}  # components of a system may have signals of the same name
+    for name in signals:
+        ends.setdefault(name.rpartition(".")[2].strip("'"), []).append(name)
     modes = [m for s in sources for m in s.readable.modes if m[0] in ends]
-    yield from (Compared((ends[name],), text, "") for name, text in modes)
+    yield from (Compared(tuple(ends[name]), text, "") for name, text in modes)
     found = [t for s in sources for t in s.readable.found]
-    told = [(tuple(sorted({ends[n.strip("'")] for n in _plain(t) & ends.keys()})), t) for t in found]
+    told = [(tuple(sorted(name for end in _plain(t) & ends.keys() for name in ends[end])), t) for t in found]
     ordered = sorted(told, key=lambda pair: not pair[0])
     yield from (Compared(names, t.text, t.place) for names, t in ordered[:_MAX_COMPARISONS])
 

@@ -33,6 +33,13 @@ def test_thresholds_stand_with_their_signals(tmp_path: Path) -> None:
     assert second.form == "structure, as far as the requirement depends on it"
 
 
+def test_a_source_of_one_component_is_found_by_the_names_of_a_system(tmp_path: Path) -> None:
+    signals = ["bath.trips", "bath.disagreement", "other.disagreement"]
+    context = gather([str(LIMP)], [], seeds=["bath.trips"], signals=signals)
+    assert context.excerpts[0].form == "what the requirement depends on"
+    assert context.of("bath.disagreement") == context.of("other.disagreement") != ()
+
+
 def test_a_file_that_is_too_long_is_summarized(tmp_path: Path) -> None:
     path = tmp_path / "notes.md"
     path.write_text("# Title\n\nThe power is limited.\n\n" + "Many words. " * 2000)
