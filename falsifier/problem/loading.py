@@ -176,7 +176,7 @@ def load_source(source: ProblemSource) -> Problem:
         )
     else:
         problem = _of_spec(source)
-    if kind in ("python", "fmu"):
+    if kind in ("python", "fmu") and source.context:  # a problem made in Python may name its own
         problem = replace(problem, named_context=named_context(source))
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
