@@ -9,11 +9,12 @@
 
 Heavy dependencies (numba, fmpy, litellm, matplotlib) are imported on first use.
 
-The code is divided into twelve packages. Each imports only from itself and from those above it::
+The code is divided into thirteen packages. Each imports only from itself and from those above it::
 
     core/             signals, search spaces, candidates, trajectories, models
     stl/              formulas, robustness and critical time
     fmu/              reading and simulating FMUs
+    context/          what an engineer would read: Simulink files, sources, documents
     problem/          model, requirement and search space; spec files
     evaluation/       simulating and judging one candidate
     llm/              asking language models

@@ -41,6 +41,7 @@ _PARTS: Mapping[Part, str] = {
     "selection": "the best and the most different samples beside the most recent ones",
     "circumstances": "the budget and what is left of it, the outputs at time 0",
     "failures": "samples that could not be simulated, with the reason",
+    "context": "what named files say: excerpts, and constants beside the signals that they are compared with",
 }
 
 

@@ -19,6 +19,7 @@ from falsifier.campaigns.plan import CampaignRequest, method_of
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.schedule import Schedule
 from falsifier.campaigns.work import Done, Task, unpack
+from falsifier.context.values import Context
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import Workers, open_workers
@@ -27,8 +28,8 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import holds_run, open_journal, write_manifest
-from falsifier.search.leaders import check_names
-from falsifier.search.manifest import check_unchanged, describe, environment, file_hashes
+from falsifier.search.leaders import check_names, told_problems
+from falsifier.search.manifest import check_unchanged, describe, environment, file_hashes, read
 from falsifier.search.records import EndedRecord
 from falsifier.search.request import RunRequest
 from falsifier.search.tally import read_tally
@@ -123,6 +124,11 @@ def resume_campaign(
             return _work(directory, record, problems, workers, tuple(listeners))
 
 
+def _recorded(directory: Path) -> dict[str, Context]:
+    """Return what a run that has begun was told of context files."""
+    return read(directory).contexts if holds_run(directory) else {}
+
+
 def _work(
     directory: Path,
     record: CampaignRecord,
@@ -143,7 +149,8 @@ def _work(
     for name in unfinished:
         request = record.runs[name]
         problem = problems[request.problems[0]]
-        described = describe(request, [problem], method_of(request).label)
+        told = told_problems(request, [problem], _recorded(run_directory(directory, name)))
+        described = describe(request, told, method_of(request).label)
         tasks.append(Task(name, request, problem, described, directory.absolute(), mark))
 
     def report(task: Task, done: Done) -> None:

@@ -12,6 +12,7 @@ import click
 
 from falsifier.cli.options import json_option, out_option, profile_option
 from falsifier.cli.output import say
+from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
@@ -41,7 +42,7 @@ _PICTURES = (".svg", ".png", ".pdf")
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
+@click.argument("fmu", metavar="FILE", type=click.Path(path_type=Path))
 @click.option("--all", "everything", is_flag=True, help="Show all variables, including internal ones.")
 @click.option(
     "--check",
@@ -49,6 +50,7 @@ _PICTURES = (".svg", ".png", ".pdf")
     is_flag=True,
     help="Simulate with the step and with half of it, and show the largest differences of the outputs.",
 )
+@click.option("--names", is_flag=True, help="Of a Simulink file: show only the names.")
 @click.option(
     "--diagram",
     "drawn",
@@ -57,14 +59,30 @@ _PICTURES = (".svg", ".png", ".pdf")
 )
 @out_option("Picture to write with --diagram; its extension determines the format (.svg, .png, .pdf).")
 @json_option
-def info(*, fmu: Path, everything: bool, checked: bool, drawn: bool, out: Path | None, as_json: bool) -> None:
+def info(
+    *,
+    fmu: Path,
+    everything: bool,
+    checked: bool,
+    names: bool,
+    drawn: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
     """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
-    FMU is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
-    two stand for their FMU or system.
+    FILE is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
+    two stand for their FMU or system. Of a Simulink file (.slx, .mdl) it shows the blocks, lines and charts.
     """
     from falsifier.fmu import read_info
 
+    if fmu.suffix.lower() in SIMULINK:
+        if everything or checked:
+            raise click.UsageError("--all and --check apply to FMUs only")
+        say(_simulink(fmu, names=names, as_json=as_json))
+        return
+    if names:
+        raise click.UsageError("--names applies to Simulink files only")
     source = _named(fmu)
     if drawn or out:
         _check_diagram(fmu, drawn=drawn, alone=not (as_json or checked or everything), out=out)
@@ -107,6 +125,16 @@ def _draw_diagram(system: "System", out: Path | None) -> None:
     except OSError as error:
         raise SpecError(f"{out} cannot be written: {error.strerror}") from None
     say(f"picture: {out}")
+
+
+def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
+    from falsifier.context.simulink import names_text, read_diagram
+    from falsifier.views.simulink_text import simulink_json, simulink_text
+
+    diagram = read_diagram(file)
+    if as_json:
+        return simulink_json(diagram)
+    return names_text(diagram) if names else simulink_text(diagram)
 
 
 @click.command()

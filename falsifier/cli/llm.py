@@ -10,6 +10,7 @@ import click
 from falsifier.cli.options import (
     anonymous_option,
     api_base_option,
+    context_option,
     effort_option,
     json_option,
     problem_options,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 @variant_option()
 @anonymous_option
 @reply_option
+@context_option
 @click.option(
     "--after",
     "directory",

@@ -17,7 +17,7 @@ import click
 from falsifier.core.secrets import is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.messages import ReplyKind
-from falsifier.llm.prompts.variants import DEFAULT_VARIANT
+from falsifier.llm.prompts.variants import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS
@@ -140,10 +140,11 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the values of problem_options out of a command's keyword arguments."""
     varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
+    context = options.pop("context", ())
     stated = {
         name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")
     }
-    source = ProblemSource(**stated, changes=changes)
+    source = ProblemSource(**stated, changes=changes, context=context)
     template = options.pop("template")
     if template is None:
         return source
@@ -179,6 +180,18 @@ def llm_option(*, multiple: bool = False) -> Decorator:
     )
 
 
+def context_option(command: Function) -> Function:
+    return click.option(
+        "--context",
+        "context",
+        multiple=True,
+        metavar="FILE|fmu|none",
+        help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
+        "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names. "
+        "Repeatable.",
+    )(command)
+
+
 def effort_option(command: Function) -> Function:
     return click.option(
         "--effort", type=click.Choice(get_args(Effort)), help="Reasoning effort of the language model."
@@ -190,8 +203,11 @@ def variant_option(*, multiple: bool = False) -> Decorator:
         "--variant",
         "variants" if multiple else "variant",
         multiple=multiple,
-        metavar="MP1..MP5",
-        help=_repeatable(f"Prompt variant; default: {DEFAULT_VARIANT}.", multiple=multiple),
+        metavar="MP1..MP6",
+        help=_repeatable(
+            f"Prompt variant; default: {DEFAULT_VARIANT}, or {CONTEXT_VARIANT} with context files.",
+            multiple=multiple,
+        ),
     )
 
 

@@ -13,6 +13,7 @@ from falsifier.cli.campaign import resume_campaign
 from falsifier.cli.files import write_counterexample
 from falsifier.cli.options import (
     budget_option,
+    context_option,
     directory_argument,
     engine_option,
     executor_option,
@@ -74,6 +75,7 @@ class _OneTarget(click.Command):
 @problem_options
 @engine_option()
 @llm_options
+@context_option
 @budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --objective time none")
 @objective_option
 @limit_options()
@@ -123,6 +125,8 @@ def run(
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     source, llm = problem_source(options), llm_settings(options)
+    if source.context and llm is None:
+        raise click.UsageError("--context: applies to language models only; add --llm NAME, or drop it")
     logs = [FmuLog(fmu_log)] if fmu_log else []
     if fmu_log:
         changes = source.changes.model_copy(update={"logging": True})

@@ -43,6 +43,11 @@ _IN_TEXT = re.compile(
         )
     )
 )
+# A value given to something that is named like a secret, as in settings and scripts.
+_ASSIGNED = re.compile(
+    r"""(?ix) \b (?:\w*[_-])? (?:password|passwd|passphrase|secret|api[_-]?key|auth[_-]?token|access[_-]?token
+    |private[_-]?key|credentials?|authorization) ["']? \s* (?::?=|:) \s* ["']? [^\s"',;(){}]{6,}"""
+)
 # Environment variables whose values are removed from texts: fewer than those that are kept from FMUs, because
 # the values of others, such as a region or a path, may be part of any text.
 _KEY_VARIABLE = re.compile(
@@ -92,6 +97,20 @@ def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
         if len(secret) >= _SHORTEST:
             text = text.replace(secret, _REDACTED)
     return text
+
+
+def line_of_secret(text: str) -> int | None:
+    """Return the number of the first line, from 1, that holds or seems to hold a secret; None if none does.
+
+    >>> line_of_secret("api_key = abcdef123"), line_of_secret("gain = 3")
+    (1, None)
+    """
+    held = [v.strip() for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
+    held = [value for value in held if len(value) >= _SHORTEST]
+    for number, line in enumerate(text.splitlines(), start=1):
+        if _VALUE.search(line) or _ASSIGNED.search(line) or any(value in line for value in held):
+            return number
+    return None
 
 
 def holds_secrets(environment: Mapping[str, str]) -> bool:

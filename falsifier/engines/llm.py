@@ -13,7 +13,7 @@ from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
 from falsifier.engines.random_change import random_change
 from falsifier.engines.stand_ins import StandIns
-from falsifier.engines.told import doubts_told, reply_form, told_view
+from falsifier.engines.told import doubts_told, reply_form, told_context, told_view
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -29,9 +29,8 @@ from falsifier.llm.prompts import (
     choices,
     render,
     trimmed,
-    variant_named,
 )
-from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.llm.prompts.what_if import predicted
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
 from falsifier.problem.problem import Problem
@@ -97,7 +96,7 @@ class LLMEngine:
         self._evaluations: list[Evaluation] = []
         self._pending: list[Candidate] = []
         self._start = start
-        self._context: Context | None = None
+        self._known: Circumstances | None = None
         self._simulations: int | None = None
         self._doubts: dict[Hashable, str] = {}
         self._without_answer = 0
@@ -273,7 +272,7 @@ class LLMEngine:
             notes=notes,
             count=count,
             reply=self._reply,
-            context=self._circumstances(),
+            circumstances=self._circumstances(),
         )
         request = ChatRequest(
             messages=render(trimmed(prompt, self._prompt_tokens, self._chat.llm)),
@@ -296,14 +295,14 @@ class LLMEngine:
                 self._on_exchange(_unanswered(self._chat, request, error))
             raise
 
-    def _circumstances(self) -> Context:
-        if self._context is None:
+    def _circumstances(self) -> Circumstances:
+        if self._known is None:
             start = self._start() if self._variant.has("circumstances") else {}
             if self._disguise:
                 self._wear(self._disguise.fitted_to_start(start))
                 start = self._disguise.hidden_values(start)
-            self._context = Context(start=start)
-        return replace(self._context, simulations=self._simulations, doubts=self._doubts)
+            self._known = Circumstances(start=start)
+        return replace(self._known, simulations=self._simulations, doubts=self._doubts)
 
     def _wear(self, disguise: Disguise) -> None:
         self._disguise, self._view = disguise, disguise.view
@@ -352,12 +351,13 @@ def make_llm_engine(
         fallback: engine to switch to if the LLM fails.
 
     Raises:
-        SpecError: if the variant is unknown.
+        SpecError: if the variant is unknown, or context cannot be read or is to be sent anonymously.
     """
+    problem, told = told_context(problem, variant, anonymous=anonymous)
     return LLMEngine(
         View.of(problem),
         chat,
-        variant_named(variant),
+        told,
         reply=reply,
         on_exchange=on_exchange,
         sample=sample,

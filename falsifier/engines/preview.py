@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from falsifier.engines.told import doubts_told, reply_form, told_view
+from falsifier.engines.told import doubts_told, reply_form, told_context, told_view
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Message, ReplyKind, Tool
 from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, View, build_prompt, render, trimmed, variant_named
-from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.llm.prompts.what_if import what_if_tool
 from falsifier.llm.tools import MOST_CANDIDATES
 from falsifier.problem.problem import Problem
@@ -40,7 +40,7 @@ def preview(
         simulations: maximum number of simulations of the run; None: no limit.
         doubtful: violations among the evaluations that do not count.
     """
-    told = variant_named(variant)
+    problem, told = told_context(problem, variant, anonymous=anonymous)
     view = told_view(View.of(problem), reply)
     start = start_values(problem) if told.has("circumstances") else {}
     disguise = None
@@ -50,7 +50,12 @@ def preview(
         start = disguise.hidden_values(start)
     doubts = doubts_told(doubtful, disguise)
     prompt = build_prompt(
-        view, told, evaluations, count=count, reply=reply, context=Context(simulations, start, doubts)
+        view,
+        told,
+        evaluations,
+        count=count,
+        reply=reply,
+        circumstances=Circumstances(simulations, start, doubts),
     )
     return render(trimmed(prompt, prompt_tokens))
 

@@ -3,17 +3,50 @@
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
+from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import ReplyKind
-from falsifier.llm.prompts import Variant, View
-from falsifier.llm.prompts.context import in_doubt
+from falsifier.llm.prompts import CONTEXT_VARIANT, Variant, View, variant_named
+from falsifier.llm.prompts.circumstances import in_doubt
 from falsifier.llm.replies import ReplyForm
+from falsifier.problem.context import NOTHING, with_context
+from falsifier.problem.problem import Problem
 
 
 def told_view(view: View, reply: ReplyKind) -> View:
     """Return the view that can be asked about: lists of numbers have the control points of the spec."""
     return view if reply == "json" else replace(view, space=view.space.fixed)
+
+
+def told_context(
+    problem: Problem, variant: str | None, *, anonymous: bool = False
+) -> tuple[Problem, Variant]:
+    """Return the problem with the context that is told, if any, and the prompt variant.
+
+    Files are read only here, and only if the variant tells them.
+
+    Raises:
+        SpecError: if the variant is unknown, context cannot be read, would be sent anonymously, or was asked
+            for although the variant does not tell it.
+    """
+    named = problem.named_context
+    told = variant_named(variant, has_context=bool(named))
+    if not named:
+        return problem, told
+    if not told.has("context"):
+        if problem.source is not None and set(problem.source.context) - {NOTHING}:
+            raise SpecError(
+                f"--context: the prompt variant {told.name} does not tell it; use {CONTEXT_VARIANT}, or drop "
+                "--variant"
+            )
+        return problem, told
+    if anonymous:
+        raise SpecError(
+            "--anonymous hides what the system is, and context would tell it: drop --anonymous, or leave the "
+            f"files out with --context {NOTHING}"
+        )
+    return with_context(problem), told
 
 
 def reply_form(

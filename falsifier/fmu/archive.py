@@ -1,4 +1,4 @@
-"""FMU archives: checked before any of their contents are written to disk or loaded."""
+"""Archives of FMUs and other models: checked before any of their contents are written to disk or loaded."""
 
 import hashlib
 import platform
@@ -43,6 +43,8 @@ _OLD_PLATFORMS = {
 }
 # The platform whose libraries run on Linux too, through Wine.
 WINDOWS = "x86_64-windows"
+# What an archive is called, by the ending of its name; all others are taken for FMUs.
+_KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
@@ -61,7 +63,7 @@ def file_hash(path: Path) -> str:
 
 @contextmanager
 def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an FMU after checking its entries.
+    """Open an FMU, SSP package or Simulink file after checking its entries.
 
     Raises:
         ModelError: if it is not a zip archive, or would write outside its folder or fill the disk.
@@ -71,7 +73,7 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     except FileNotFoundError:
         raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
     except (zipfile.BadZipFile, OSError) as error:
-        what = "SSP package" if path.suffix == ".ssp" else "FMU"
+        what = _KINDS.get(path.suffix.lower(), "FMU")
         raise ModelError(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
     with archive:
         _check(path, archive.infolist())
@@ -193,9 +195,7 @@ def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
     if stat.S_ISLNK(entry.external_attr >> 16):
         raise ModelError(f"{path}: rejected because its entry {entry.filename!r} is a symbolic link")
     if entry.flag_bits & 0x1:
-        raise ModelError(
-            f"{path}: its entry {entry.filename!r} is encrypted; export the FMU without a password"
-        )
+        raise ModelError(f"{path}: its entry {entry.filename!r} is encrypted; save it without a password")
     dense = entry.file_size > _MAX_COMPRESSION * max(entry.compress_size, 1)
     if dense and entry.file_size > _DENSE_FROM_BYTES:
         raise ModelError(

@@ -16,6 +16,7 @@ from falsifier.core.model import Interface
 from falsifier.core.space import Freedom
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import is_package
+from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_fmu
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
@@ -75,6 +76,7 @@ def load_problem(
     output_interval: float | None = None,
     time_limit: float | None = None,
     interface: Interface | None = None,
+    context: Sequence[str] = (),
 ) -> Problem:
     """Load one problem.
 
@@ -92,6 +94,7 @@ def load_problem(
         output_interval: step of the monitored time grid in s.
         time_limit: maximum wall-clock time of one simulation in s.
         interface: interface with which the FMU is simulated.
+        context: files that a language model may read, ``fmu`` or ``none``; see ProblemSource.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -113,6 +116,7 @@ def load_problem(
             parameterization=parameterization,
             shortest_piece=shortest_piece,
             changes=changes,
+            context=tuple(context),
         )
     )
 
@@ -157,7 +161,7 @@ def load_source(source: ProblemSource) -> Problem:
     if kind == "python":
         freed = {name: InputSection(free=s.free) for name, s in source.changes.inputs.items() if s.free}
         allowed = ProblemSource(target=source.target, changes=ModelChanges(inputs=freed))
-        stated = source.model_copy(update={"parameterization": "free", "shortest_piece": None})
+        stated = source.model_copy(update={"parameterization": "free", "shortest_piece": None, "context": ()})
         if stated != allowed:
             raise SpecError(
                 f"{source.target}: a problem made in Python takes no options; change it where it is made"
@@ -172,6 +176,8 @@ def load_source(source: ProblemSource) -> Problem:
         )
     else:
         problem = _of_spec(source)
+    if kind in ("python", "fmu") and source.context:  # a problem made in Python may name its own
+        problem = replace(problem, named_context=named_context(source))
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
             raise SpecError("--free makes the inputs free; drop --parameterization fixed, or --free")
@@ -223,7 +229,7 @@ def _of_spec(source: ProblemSource) -> Problem:
         stl_name=source.stl_name,
         changes=source.changes,
     )
-    return _made(joined, source)
+    return replace(_made(joined, source), named_context=named_context(source, spec, path))
 
 
 def _made(joined: Joined, source: ProblemSource) -> Problem:

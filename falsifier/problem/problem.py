@@ -1,12 +1,13 @@
 """Problems: a model, a requirement, and what may be varied."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from math import inf
 from pathlib import Path
 from typing import Self
 
+from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
@@ -30,6 +31,8 @@ class Problem:
         parameters: fixed values of parameters, start values and constant inputs, by name.
         source: how it was loaded; None if it was made in Python, or changed after it was loaded.
         notes: what was chosen or ignored when it was loaded and the user should know, in words.
+        named_context: what the user named for a language model to read; it is read by ``with_context``.
+        context: what was read of it.
 
     Raises:
         SpecError: if the parts do not fit: the model has no such variable, the formula names a signal that is
@@ -43,6 +46,8 @@ class Problem:
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: ProblemSource | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
+    named_context: Named = field(default_factory=Named)
+    context: Context = field(default_factory=Context)
 
     def __post_init__(self) -> None:
         if self.space.stop_time != self.experiment.stop_time:
@@ -68,6 +73,7 @@ class Problem:
         tolerance: float | None = None,
         time_limit: float | None = None,
         interface: Interface | None = None,
+        context: Sequence[str] = (),
     ) -> Self:
         """Return the problem for an FMU and a formula.
 
@@ -85,6 +91,7 @@ class Problem:
             tolerance: relative tolerance of the solver; default: the FMU's.
             time_limit: maximum wall-clock time of one simulation in s; default: 60.
             interface: interface of the FMU; default: co-simulation if the FMU offers it.
+            context: files that a language model may read, and ``fmu`` for what lies inside the FMU.
 
         Raises:
             SpecError: naming what is wrong or unknown.
@@ -105,7 +112,9 @@ class Problem:
             interface=interface,
         )
         joined = join_fmu(Path(fmu), formula, changes=changes, name=name)
-        source = ProblemSource(target=str(fmu), stl=formula, stl_name=name, changes=changes)
+        source = ProblemSource(
+            target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
+        )
         return cls(
             joined.model,
             joined.requirement,
@@ -114,6 +123,7 @@ class Problem:
             joined.parameters,
             source,
             joined.notes,
+            named_context=Named(tuple(name for name in context if name != "fmu"), "fmu" in context),
         )
 
     @classmethod

@@ -63,6 +63,8 @@ class ProblemSource(BaseModel):
         shortest_piece: minimum time in s between two control points of every input, which makes all inputs
             free; None: the spec's or the default limits.
         changes: overrides for experiment, inputs and parameters.
+        context: files that a language model may read beside those that the spec names; ``fmu``: also what
+            lies inside the FMU; ``none``: not what the spec names.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -74,6 +76,7 @@ class ProblemSource(BaseModel):
     parameterization: Parameterization = "free"
     shortest_piece: float | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
+    context: tuple[str, ...] = ()
 
     @field_serializer("changes")
     def _stated_only(self, changes: ModelChanges) -> dict[str, Any]:

@@ -202,6 +202,17 @@ class CouplingSection(_Strict):
     )
 
 
+class ContextSection(_Strict):
+    """What a language model may read about the model; nothing else is sent."""
+
+    files: tuple[str, ...] = Field(
+        (), description="Simulink files, sources and documents, relative to the spec file."
+    )
+    fmu: bool = Field(
+        default=False, description="Also documentation, sources, texts and annotations inside the FMU."
+    )
+
+
 Components = dict[str, ComponentSection]
 Connections = dict[str, Annotated[ConnectionSection, BeforeValidator(_bare_source)]]
 
@@ -320,6 +331,7 @@ class Spec(_Strict):
     components: Components = Field(default_factory=dict)
     connections: Connections = Field(default_factory=dict)
     coupling: CouplingSection = Field(default_factory=CouplingSection)
+    context: ContextSection = Field(default_factory=ContextSection)
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
     requirements: dict[str, AnyRequirement] = Field(min_length=1)
@@ -341,6 +353,7 @@ _SECTIONS: Mapping[str, type[BaseModel]] = {
     "components": ComponentSection,
     "connections": ConnectionSection,
     "coupling": CouplingSection,
+    "context": ContextSection,
     "inputs": InputSection,
     "parameters": ParameterSection,
     "requirements": ModelChanges,

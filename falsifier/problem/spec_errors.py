@@ -11,7 +11,7 @@ from falsifier.problem.templates import TEMPLATES
 # Parts of pydantic's locations that are no keys.
 _STEPS = ("tuple", "function-before")
 # Sections of which there is one, without a name of its own.
-_SINGLE = ("model", "free", "coupling")
+_SINGLE = ("model", "free", "coupling", "context")
 
 
 def spec_error(

@@ -1,9 +1,11 @@
 """Makes the engines that lead a run from the names in a request."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from falsifier.context.values import Context
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.aiming import Aiming, can_aim
 from falsifier.engines.protocol import Engine
@@ -61,6 +63,28 @@ def make_scouts(request: RunRequest, problems: Sequence[Problem]) -> list[Engine
 
     seeds = [request.seed + _SCOUT_SEED + i * _SEED_STRIDE for i in range(len(problems))]
     return [Scout(problem, seed=seed) for problem, seed in zip(problems, seeds, strict=True)]
+
+
+def told_problems(
+    request: RunRequest, problems: Sequence[Problem], recorded: Mapping[str, Context]
+) -> list[Problem]:
+    """Return the problems with what their context files say, if a language model is asked.
+
+    Args:
+        request: what was requested.
+        problems: what is searched.
+        recorded: contexts that the run's record has, by requirement; their files are not read again.
+
+    Raises:
+        SpecError: if a file cannot be read, looks like it holds a secret, or must not be told.
+    """
+    llm = request.llm
+    if llm is None:
+        return list(problems)
+    from falsifier.engines.told import told_context
+
+    known = [replace(p, context=recorded[p.name]) if p.name in recorded else p for p in problems]
+    return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]
 
 
 def _numerical(name: str, problem: Problem, seed: int) -> Engine:

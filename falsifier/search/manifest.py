@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
+from falsifier.context.values import Context
 from falsifier.core.model import Variable
 from falsifier.core.space import InputRange, ParameterRange, ValueKind
 from falsifier.errors import JournalError, rejected
@@ -102,6 +103,9 @@ class Manifest(_Strict):
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
     stop_time: float = Field(description="End of each simulation in s.")
     hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec, by path.")
+    contexts: dict[str, Context] = Field(
+        {}, description="What the language model was told of context files, by requirement."
+    )
     sum: str = Field("", description="Checksum of the file up to here.")
 
     @property
@@ -176,6 +180,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         modes=tuple(_modes(problem)),
         stop_time=space.stop_time,
         hashes=file_hashes(problem),
+        contexts={p.name: p.context for p in problems if p.context != Context()},
     )
 
 

@@ -24,7 +24,7 @@ from falsifier.search import manifest
 from falsifier.search.budget import Budget, budget_of, what_counts
 from falsifier.search.events import Listener
 from falsifier.search.journal import holds_lines, holds_run, open_journal, write_manifest
-from falsifier.search.leaders import make_engines, make_scouts
+from falsifier.search.leaders import make_engines, make_scouts, told_problems
 from falsifier.search.levels import Level
 from falsifier.search.loop import search
 from falsifier.search.manifest import Manifest
@@ -297,7 +297,9 @@ def carry_out(
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         levels = levels_of(request, problems[0].space)
-        made = [engine] if engine is not None else _engines(request, problems, levels, chat)
+        recorded = manifest.read(directory).contexts if begun and directory else {}
+        told = told_problems(request, problems, described.contexts if described else recorded)
+        made = [engine] if engine is not None else _engines(request, told, levels, chat)
         scouts = make_scouts(request, problems)
         known = deque(map(Candidate.from_json, request.start_from))
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
@@ -307,7 +309,7 @@ def carry_out(
         steps: Steps = live
         all_listeners = tuple(listeners)
         if directory is not None:
-            described = described or manifest.describe(request, problems, engines[0].name)
+            described = described or manifest.describe(request, told, engines[0].name)
             if begun:
                 _check_same(directory, described)
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))

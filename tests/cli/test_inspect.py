@@ -7,6 +7,7 @@ from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.archive import this_platform
 from tests.command import ROOT, falsifier
+from tests.fixtures import simulink
 from tests.fmu.fixtures import path as fixture
 
 
@@ -132,3 +133,20 @@ def test_info_draws_a_system_as_text_and_as_a_picture(tmp_path: Path) -> None:
 def test_info_says_why_it_does_not_draw(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
     done = falsifier("info", *arguments, cwd=tmp_path)
     assert done.code == 2 and said in done.err and done.err.count("\n") == 1
+
+
+def test_info_of_a_simulink_file(tmp_path: Path) -> None:
+    simulink.write_slx(tmp_path / "limphome.slx")
+    done = falsifier("info", "limphome.slx", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "Normal -> Limp [disagreement > 9.5]" in done.out
+    (tmp_path / "limphome.mdl").write_text(simulink.MDL)
+    assert falsifier("info", "limphome.mdl", cwd=tmp_path).out == done.out
+    assert "9.5" not in falsifier("info", "limphome.mdl", "--names", cwd=tmp_path).out
+    assert falsifier("info", "limphome.slx", "--json", cwd=tmp_path).json["name"] == "limphome"
+    assert falsifier("info", "limphome.slx", "--check", cwd=tmp_path).code == 2
+    assert falsifier("info", "AT.fmu", "--names", cwd=tmp_path).code == 2
+    (tmp_path / "bad.slx").write_bytes(b"PK")
+    bad = falsifier("info", "bad.slx", cwd=tmp_path)
+    assert bad.code == 3
+    assert "bad.slx: not a readable Simulink file" in bad.err

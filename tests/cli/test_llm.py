@@ -91,3 +91,17 @@ def test_replies_as_points_are_asked_for_and_recorded(tmp_path: Path) -> None:
     assert '"reply": "points"' in json.dumps(manifest)
     unnamed = falsifier("run", "AT1", "--reply", "points", cwd=tmp_path)
     assert (unnamed.code, "--reply: applies to language models only" in unnamed.err) == (2, True)
+
+
+def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> None:
+    (tmp_path / "notes.md").write_text("The speed must not exceed 120 mph.")
+    text = falsifier("prompt", "AT1", "--context", "notes.md", cwd=tmp_path).out
+    assert "--- notes.md (whole) ---\nThe speed must not exceed 120 mph." in text
+    (tmp_path / "notes.md").write_text("token:\n  sk-abcdefghijklmnop")
+    done = falsifier("prompt", "AT1", "--context", "notes.md", cwd=tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert "context notes.md: line 2 looks like a key" in done.err
+    assert "sk-abc" not in done.err
+    assert "notes.md" not in falsifier("prompt", "AT1", cwd=tmp_path).out
+    useless = falsifier("run", "AT1", "--context", "notes.md", cwd=tmp_path)
+    assert (useless.code, "--context: applies to language models only" in useless.err) == (2, True)

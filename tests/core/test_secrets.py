@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.core.secrets import redact, scrubbed, without_secrets
+from falsifier.core.secrets import line_of_secret, redact, scrubbed, without_secrets
 
 KEYS = (
     "hf_abcdefghijklmnopqrst",
@@ -65,3 +65,12 @@ def test_options_that_may_hold_a_key_are_recorded_without_it() -> None:
         "aws_secret": "[redacted]",
         "max_tokens": 5,
     }
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_the_line_of_a_secret_is_found(key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert line_of_secret(f"gain = 3\n\nlimit = {key}") == 3
+    assert line_of_secret("The password must be given.\ntokens: 4000\nAPI_KEY=...\nkeys = [1, 2]") is None
+    assert line_of_secret('{"client_secret": "abcdefgh"}') == 1
+    monkeypatch.setenv("MY_TOKEN", "quite an ordinary value")
+    assert line_of_secret("a\nb = quite an ordinary value") == 2

@@ -1,12 +1,17 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 
-from falsifier.engines.told import doubts_told, reply_form, told_view
+from falsifier.context.values import Context, Named
+from falsifier.engines.told import doubts_told, reply_form, told_context, told_view
+from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import View, variant_named
+from falsifier.problem.source import ProblemSource
 from falsifier.testing import FREE, lag_problem
 
 VIEW = View.of(lag_problem(free=FREE))
@@ -36,3 +41,18 @@ def test_doubts_are_found_by_the_candidate_as_it_is_told() -> None:
     disguise = Disguise.of(View.of(problem)).fitted([confirmation.evaluation])
     (hidden,) = doubts_told([confirmation], disguise)
     assert hidden == disguise.hidden_candidate(high).key
+
+
+def test_context_is_read_only_if_it_is_told(tmp_path: Path) -> None:
+    named = replace(lag_problem(), named_context=Named((str(tmp_path / "a.md"),)))
+    (tmp_path / "a.md").write_text("y is limited to 3.")
+    problem, variant = told_context(named, None)
+    assert (problem.context.excerpts[0].text, variant.name) == ("y is limited to 3.", "MP6")
+    assert told_context(named, "MP5")[0].context == Context()
+    assert told_context(named, "MP5", anonymous=True)[1].name == "MP5"
+    assert told_context(lag_problem(), None, anonymous=True)[1].name == "MP5"
+    with pytest.raises(SpecError, match="--context none"):
+        told_context(named, None, anonymous=True)
+    asked = replace(named, source=ProblemSource(target="a", context=("a.md",)))
+    with pytest.raises(SpecError, match="variant MP5 does not tell it; use MP6"):
+        told_context(asked, "MP5")

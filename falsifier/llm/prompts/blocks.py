@@ -45,6 +45,7 @@ class SignalLine(_Block):
     kind: str = "real"
     items: tuple[str, ...] = Field(default=(), description="Numbers and names of an enumeration.")
     start: str = Field(default="", description="Its value at time 0.")
+    known: tuple[str, ...] = Field(default=(), description="What the context files say of it.")
 
 
 class OutputsBlock(_Block):
@@ -80,6 +81,7 @@ class InputLine(_Block):
     hold: float | None = None
     max_control_points: int | None = Field(default=None, description="None: the control points are fixed.")
     min_interval: float | None = None
+    known: tuple[str, ...] = Field(default=(), description="What the context files say of it.")
 
 
 class ParameterLine(_Block):
@@ -93,6 +95,24 @@ class ParameterLine(_Block):
     low: str
     high: str
     nominal: str = ""
+    known: tuple[str, ...] = Field(default=(), description="What the context files say of it.")
+
+
+class ExcerptLines(_Block):
+    """What is told of one file."""
+
+    path: str
+    form: str
+    text: str
+
+
+class ContextBlock(_Block):
+    """What the files say that the user named."""
+
+    comparisons: tuple[str, ...] = Field(
+        default=(), description="Comparisons of variables that are not among the signals."
+    )
+    files: tuple[ExcerptLines, ...]
 
 
 class CourseLine(_Block):
@@ -171,6 +191,7 @@ class Prompt(_Block):
     outputs: OutputsBlock | None = None
     inputs: InputsBlock
     history: HistoryBlock | None = None
+    context: ContextBlock | None = None
     budget: BudgetBlock | None = None
     advice: AdviceBlock | None = None
     reply: ReplyBlock

@@ -1,6 +1,7 @@
 """From a problem and its evaluations to a prompt: selects what is shown and arranges it in blocks."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange, ParameterRange
@@ -10,8 +11,10 @@ from falsifier.llm.prompts import choices, observations, selection
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.blocks import (
     BudgetBlock,
+    ContextBlock,
     CourseLine,
     DimensionLine,
+    ExcerptLines,
     HistoryBlock,
     InputLine,
     InputsBlock,
@@ -24,7 +27,7 @@ from falsifier.llm.prompts.blocks import (
     SystemBlock,
     TaskBlock,
 )
-from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.llm.prompts.numbers import bounds, number, signed
 from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, clock, published_facts
 from falsifier.llm.prompts.reply import reply_block
@@ -46,7 +49,7 @@ def build_prompt(
     notes: Sequence[str] = (),
     count: int = 1,
     reply: ReplyKind = "json",
-    context: Context | None = None,
+    circumstances: Circumstances | None = None,
 ) -> Prompt:
     """Build the prompt for the next candidates.
 
@@ -58,9 +61,9 @@ def build_prompt(
         notes: lines about the search as a whole, from the engine that leads it.
         count: number of candidates wanted.
         reply: what a reply is to consist of.
-        context: what is known of the run; default: nothing.
+        circumstances: what is known of the run; default: nothing.
     """
-    context = context or Context()
+    circumstances = circumstances or Circumstances()
     return Prompt(
         variant=variant.name,
         task=TaskBlock(
@@ -71,10 +74,11 @@ def build_prompt(
         ),
         system=_system(view) if variant.has("system") else None,
         requirement=_requirement(view, variant) if variant.has("requirement") else None,
-        outputs=_outputs(view, variant, context) if variant.has("outputs") else None,
+        outputs=_outputs(view, variant, circumstances) if variant.has("outputs") else None,
         inputs=_named_inputs(view, variant) if variant.has("system") else _dimensions(view, variant),
-        history=_history(view, variant, evaluations, pending, notes, context, reply),
-        budget=_budget(variant, evaluations, context),
+        context=_context(view) if variant.has("context") else None,
+        history=_history(view, variant, evaluations, pending, notes, circumstances, reply),
+        budget=_budget(variant, evaluations, circumstances),
         advice=advice(view, variant, is_flat=_is_flat(evaluations)),
         reply=reply_block(view, variant, count, reply),
     )
@@ -99,13 +103,15 @@ def _requirement(view: View, variant: Variant) -> RequirementBlock:
     )
 
 
-def _budget(variant: Variant, evaluations: Sequence[Evaluation], context: Context) -> BudgetBlock | None:
-    if context.simulations is None or not variant.has("circumstances"):
+def _budget(
+    variant: Variant, evaluations: Sequence[Evaluation], circumstances: Circumstances
+) -> BudgetBlock | None:
+    if circumstances.simulations is None or not variant.has("circumstances"):
         return None
-    return BudgetBlock(used=len(evaluations), limit=max(context.simulations, len(evaluations)))
+    return BudgetBlock(used=len(evaluations), limit=max(circumstances.simulations, len(evaluations)))
 
 
-def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
+def _outputs(view: View, variant: Variant, circumstances: Circumstances) -> OutputsBlock:
     if not variant.has("system"):
         return OutputsBlock(signals=tuple(SignalLine(name=name) for name in view.formula_outputs))
     others = [n for n in view.experiment.outputs if n not in view.formula_outputs]
@@ -117,7 +123,8 @@ def _outputs(view: View, variant: Variant, context: Context) -> OutputsBlock:
                 description=view.description(name),
                 kind=view.kind(name) if view.tells_kinds else "real",
                 items=view.items(name),
-                start=_start(view, variant, context, name),
+                start=_start(view, variant, circumstances, name),
+                known=_known(view, variant, name),
             )
             for name in (*view.formula_outputs, *others)
         ),
@@ -133,12 +140,26 @@ _LEGEND = (
 )
 
 
-def _start(view: View, variant: Variant, context: Context, name: str) -> str:
+def _start(view: View, variant: Variant, circumstances: Circumstances, name: str) -> str:
     """Value at time 0; a range if it depends on what is chosen."""
-    if name not in context.start or not variant.has("circumstances"):
+    if name not in circumstances.start or not variant.has("circumstances"):
         return ""
-    low, high = (view.labelled(name, value, number(value, 5)) for value in context.start[name])
+    low, high = (view.labelled(name, value, number(value, 5)) for value in circumstances.start[name])
     return low if low == high else f"{low} to {high}, depending on what you choose"
+
+
+def _known(view: View, variant: Variant, name: str) -> tuple[str, ...]:
+    """What the context files say of a signal."""
+    return view.context.of(name) if variant.has("context") else ()
+
+
+def _context(view: View) -> ContextBlock | None:
+    if not view.context.excerpts:
+        return None
+    return ContextBlock(
+        comparisons=tuple(c.text for c in view.context.comparisons if not c.signals),
+        files=tuple(ExcerptLines(path=e.path, form=e.form, text=e.text) for e in view.context.excerpts),
+    )
 
 
 def _dimensions(view: View, variant: Variant) -> InputsBlock:
@@ -160,14 +181,15 @@ def _dimensions(view: View, variant: Variant) -> InputsBlock:
 def _named_inputs(view: View, variant: Variant) -> InputsBlock:
     """The signals and parameters to choose, with everything known about them."""
     free = variant.has("freedom")
+    known = partial(_known, view, variant)
     return InputsBlock(
         stop_time=number(view.space.stop_time),
-        inputs=tuple(_input(view, r, free=free) for r in view.space.inputs),
-        parameters=tuple(_parameter(view, p) for p in view.space.parameters),
+        inputs=tuple(_input(view, r, known(r.name), free=free) for r in view.space.inputs),
+        parameters=tuple(_parameter(view, p, known(p.name)) for p in view.space.parameters),
     )
 
 
-def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
+def _input(view: View, r: InputRange, known: tuple[str, ...], *, free: bool) -> InputLine:
     low, high = bounds(r.low, r.high)
     times = tuple(number(round(t, 6)) for t in view.space.fixed_times(r))
     if len(times) > _MAX_TIMES:
@@ -191,10 +213,11 @@ def _input(view: View, r: InputRange, *, free: bool) -> InputLine:
         hold=r.hold,
         max_control_points=freedom and freedom.max_control_points,
         min_interval=freedom and freedom.min_interval,
+        known=known,
     )
 
 
-def _parameter(view: View, p: ParameterRange) -> ParameterLine:
+def _parameter(view: View, p: ParameterRange, known: tuple[str, ...]) -> ParameterLine:
     low, high = bounds(p.low, p.high)
     nominal = "" if p.nominal is None else number(p.nominal)
     return ParameterLine(
@@ -206,6 +229,7 @@ def _parameter(view: View, p: ParameterRange) -> ParameterLine:
         low=low,
         high=high,
         nominal=nominal,
+        known=known,
     )
 
 
@@ -221,7 +245,7 @@ def _history(
     evaluations: Sequence[Evaluation],
     pending: Sequence[Candidate],
     notes: Sequence[str],
-    context: Context,
+    circumstances: Circumstances,
     reply: ReplyKind,
 ) -> HistoryBlock | None:
     if variant.has("selection"):
@@ -236,7 +260,9 @@ def _history(
     numbers = {i: n for n, i in enumerate(chosen)} if variant.is_published else {i: i for i in chosen}
     return HistoryBlock(
         samples=tuple(
-            _sample(view, variant, numbers[i], mark, evaluations[i], depths.get(i, "close"), context, reply)
+            _sample(
+                view, variant, numbers[i], mark, evaluations[i], depths.get(i, "close"), circumstances, reply
+            )
             for i, mark in chosen.items()
         ),
         omitted=0 if variant.is_published else len(evaluations) - len(chosen),
@@ -252,7 +278,7 @@ def _sample(
     mark: str,
     evaluation: Evaluation,
     depth: selection.Depth,
-    context: Context,
+    circumstances: Circumstances,
     reply: ReplyKind,
 ) -> SampleLines:
     inputs = _chosen(view, variant, evaluation.candidate, reply)
@@ -268,7 +294,7 @@ def _sample(
         mark=mark,
         inputs=inputs,
         robustness=robustness,
-        doubt=context.doubts.get(evaluation.candidate.key, ""),
+        doubt=circumstances.doubts.get(evaluation.candidate.key, ""),
         facts=tuple(
             _observed(view, evaluation, depth) if rich else published_facts(view, variant, evaluation)
         ),

@@ -22,6 +22,7 @@ Part = Literal[
     "selection",  # the best and most different samples in addition to the most recent ones
     "circumstances",  # the budget and what is left of it, the outputs at time 0
     "failures",  # samples that could not be simulated, with the reason
+    "context",  # what named files say: thresholds beside the signals, excerpts
 ]
 
 
@@ -48,7 +49,7 @@ class Variant:
 
 
 def _variants() -> Mapping[str, Variant]:
-    # MP1 to MP4 follow the published prompts, each adding to the one before; MP5 is this project's own.
+    # MP1 to MP4 follow the published prompts, each adding to the one before; MP5 and MP6 are our own.
     # What is told at which place is compared line by line in design/published-prompts.md.
     mp1: frozenset[Part] = frozenset({"guidance"})
     mp2: frozenset[Part] = mp1 | {"names", "requirement", "outputs"}
@@ -58,21 +59,29 @@ def _variants() -> Mapping[str, Variant]:
         ("advice", "system", "reading", "freedom", "observations", "selection", "circumstances", "failures")
     )
     mp5 = (mp4 - {"values", "guidance"}) | more
-    parts = {"MP1": mp1, "MP2": mp2, "MP3": mp3, "MP4": mp4, "MP5": mp5}
+    context: frozenset[Part] = frozenset({"context"})
+    parts = {"MP1": mp1, "MP2": mp2, "MP3": mp3, "MP4": mp4, "MP5": mp5, "MP6": mp5 | context}
     return MappingProxyType({name: Variant(name, found) for name, found in parts.items()})
 
 
 VARIANTS = _variants()
 DEFAULT_VARIANT = "MP5"
+# The default if files are named for the language model to read.
+CONTEXT_VARIANT = "MP6"
 
 
-def variant_named(name: str | None) -> Variant:
+def variant_named(name: str | None, *, has_context: bool = False) -> Variant:
     """Variant of this name, in any case; None: the default one.
+
+    Args:
+        name: the name.
+        has_context: whether files are named, which makes the default the variant that tells them.
 
     Raises:
         SpecError: for an unknown name.
     """
-    name = DEFAULT_VARIANT if name is None else name.upper()
+    default = CONTEXT_VARIANT if has_context else DEFAULT_VARIANT
+    name = default if name is None else name.upper()
     if name not in VARIANTS:
         raise SpecError(f"unknown prompt variant {name!r}; {did_you_mean(name, VARIANTS)}")
     return VARIANTS[name]

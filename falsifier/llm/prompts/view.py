@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from falsifier.context.values import Context
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.space import SearchSpace
 from falsifier.problem.problem import Problem
@@ -22,6 +23,7 @@ class View:
         tells_kinds: whether types of signals are told.
         more_decimals: decimals that the published variants tell in addition to theirs, which are those of
             signals in the hundreds.
+        context: what the files say that the user named.
     """
 
     info: ModelInfo
@@ -31,11 +33,18 @@ class View:
     levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     tells_kinds: bool = True
     more_decimals: int = 0
+    context: Context = field(default_factory=Context)
 
     @classmethod
     def of(cls, problem: Problem) -> "View":
         """Make the view of a problem."""
-        return cls(problem.info, problem.requirement, problem.space, problem.experiment)
+        return cls(
+            problem.info,
+            problem.requirement,
+            problem.space,
+            problem.experiment,
+            context=problem.context,
+        )
 
     def unit(self, name: str) -> str:
         """Unit of a signal; empty if unknown or dimensionless."""

@@ -8,7 +8,7 @@ from falsifier.core.space import Freedom, InputRange
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts import VARIANTS, Prompt, View, build_prompt, render
 from falsifier.llm.prompts.blocks import SampleLines
-from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.testing import FREE, START, lag_problem
 
 PROBLEM = lag_problem(free=FREE, parameters=[START])
@@ -120,28 +120,28 @@ def test_freedom_is_told_as_far_as_it_goes() -> None:
 
 def test_start_budget_and_doubts_are_told_by_mp5() -> None:
     sample = evaluate(PROBLEM, PROBLEM.space.decode([0.5] * 4 + [0.25]))
-    context = Context(30, {"x": (0.0, 0.0)}, {sample.candidate.key: "does not count"})
-    prompt = build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [sample], context=context)
+    circumstances = Circumstances(30, {"x": (0.0, 0.0)}, {sample.candidate.key: "does not count"})
+    prompt = build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [sample], circumstances=circumstances)
     assert prompt.outputs is not None and prompt.history is not None
     assert [signal.start for signal in prompt.outputs.signals] == ["0"]
     assert prompt.history.samples[0].doubt == "does not count"
     _, changing = render(prompt)
     assert "1 of 30 simulations spent, 29 left." in changing.content
-    _, first = render(build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [], context=context))
+    _, first = render(build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [], circumstances=circumstances))
     assert first.content == (
         "Nothing has been simulated yet; 30 simulations may be spent. Propose the first sample."
     )
-    depends = replace(context, start={"x": (-0.5, 0.5)})
-    outputs = build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [], context=depends).outputs
+    depends = replace(circumstances, start={"x": (-0.5, 0.5)})
+    outputs = build_prompt(View.of(PROBLEM), VARIANTS["MP5"], [], circumstances=depends).outputs
     assert outputs is not None
     assert outputs.signals[0].start == "-0.5 to 0.5, depending on what you choose"
 
 
 def test_the_published_variants_tell_neither_start_nor_budget_but_what_does_not_count() -> None:
     sample = evaluate(PROBLEM, PROBLEM.space.decode([0.5] * 4 + [0.25]))
-    context = Context(30, {"x": (0.0, 0.0)}, {sample.candidate.key: "does not count"})
+    circumstances = Circumstances(30, {"x": (0.0, 0.0)}, {sample.candidate.key: "does not count"})
     for name in ("MP1", "MP2", "MP3", "MP4"):
-        prompt = build_prompt(View.of(PROBLEM), VARIANTS[name], [sample], context=context)
+        prompt = build_prompt(View.of(PROBLEM), VARIANTS[name], [sample], circumstances=circumstances)
         text = "\n".join(m.content for m in render(prompt))
         assert "30 simulations" not in text and "at t = 0:" not in text
         assert "does not count" in text

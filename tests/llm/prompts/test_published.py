@@ -9,7 +9,7 @@ from falsifier.core.space import Freedom, ParameterRange
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
-from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
@@ -93,8 +93,8 @@ def test_mp3_adds_output_values_and_mp4_what_decided() -> None:
 @pytest.mark.parametrize("variant", ["MP1", "MP2", "MP3", "MP4"])
 def test_nothing_of_the_default_variant_is_told(variant: str) -> None:
     problem, evaluation = transmission("AT6a")
-    context = Context(30, {"speed": (0.0, 0.0)})
-    prompt = build_prompt(View.of(problem), VARIANTS[variant], [evaluation] * 2, context=context)
+    circumstances = Circumstances(30, {"speed": (0.0, 0.0)})
+    prompt = build_prompt(View.of(problem), VARIANTS[variant], [evaluation] * 2, circumstances=circumstances)
     text = "\n".join(m.content for m in render(prompt))
     for word in ("mph", "Car with", "50 s", "simulations", "30 ", "In words", "exactly 0", "limits", "switch",
                  "implication", "flat", "gear", "strategy", "why:", "Alternatively"):  # fmt: skip

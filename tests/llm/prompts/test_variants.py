@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from falsifier.context.values import Compared, Context, Excerpt
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
@@ -39,7 +40,9 @@ def test_an_empty_history_is_not_described(variant: str) -> None:
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_zero_is_no_violation_and_ranges_are_told(variant: str) -> None:
     standing, _ = told(transmission()[0], variant)
-    assert ("exactly 0 is not" if variant == "MP5" else "below 0 the specification is violated") in standing
+    assert (
+        "exactly 0 is not" if variant in ("MP5", "MP6") else "below 0 the specification is violated"
+    ) in standing
     assert "from 0 to 325" in standing
 
 
@@ -217,3 +220,27 @@ def test_long_inputs_do_not_fill_the_prompt() -> None:
     problem = replace(lag_problem(), space=space, requirement=Requirement("R", parse("G[0,10] (x <= 0.9)")))
     standing, _ = told(problem, "MP5")
     assert "400 control points every 0.025 s from t = 0" in standing
+
+
+def test_context_makes_mp6_the_default() -> None:
+    assert variant_named(None).name == "MP5"
+    assert variant_named(None, has_context=True).name == "MP6"
+    assert variant_named("mp4", has_context=True).name == "MP4"
+    assert VARIANTS["MP6"].parts - VARIANTS["MP5"].parts == {"context"}
+
+
+def test_only_mp6_tells_context() -> None:
+    excerpt = Excerpt("a.md", "0" * 64, "whole", "THE TEXT")
+    compared = (Compared(("x",), "x > 3", "a:1"), Compared(("u",), "u < 1", "a:2"), Compared((), "z < 2", ""))
+    view = replace(View.of(lag_problem()), context=Context((excerpt,), compared))
+    standing = {name: render(build_prompt(view, v, []))[0].content for name, v in VARIANTS.items()}
+    assert [name for name, text in standing.items() if "THE TEXT" in text] == ["MP6"]
+    for part in (
+        "; in the files below: x > 3",
+        "; in the files below: u < 1",
+        "--- a.md (whole) ---\nTHE TEXT\n--- end of the files ---",
+        "Other comparisons with constants in them: z < 2",
+    ):
+        assert part in standing["MP6"]
+    bare = render(build_prompt(replace(view, context=Context()), VARIANTS["MP6"], []))
+    assert bare[0].content == standing["MP5"]

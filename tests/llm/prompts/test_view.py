@@ -3,7 +3,7 @@ from dataclasses import replace
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.prompts import VARIANTS, build_prompt, render
-from falsifier.llm.prompts.context import Context
+from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
@@ -51,7 +51,7 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     told = replace(
         evaluation, trajectory=replace(evaluation.trajectory, columns={"x": steps, "u": 0 * steps})
     )
-    prompt = build_prompt(view, VARIANTS["MP5"], [told], context=Context(start={"x": (0.0, 1.0)}))
+    prompt = build_prompt(view, VARIANTS["MP5"], [told], circumstances=Circumstances(start={"x": (0.0, 1.0)}))
     standing, changing = (m.content for m in render(prompt))
     assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle) to 1 (Run)" in standing
     assert "x: 0 (Idle), then 1 (Run) from 5 s" in changing

@@ -8,7 +8,7 @@ from falsifier.llm.prompts.numbers import signed
 
 
 @dataclass(frozen=True, slots=True)
-class Context:
+class Circumstances:
     """The circumstances of a question.
 
     Attributes:

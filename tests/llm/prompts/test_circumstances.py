@@ -2,7 +2,7 @@ from dataclasses import replace
 
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.prompts.context import in_doubt
+from falsifier.llm.prompts.circumstances import in_doubt
 from falsifier.stl import Verdict
 from falsifier.testing import lag_problem
 

@@ -1,0 +1,97 @@
+"""How many simulations context saves, how long reading takes, and how many tokens it costs.
+
+HeaterLimpHome shows its fault only if limp-home mode begins again 1.5 s to 4 s after it ended. A scripted
+language model aims at these thresholds if its prompt tells them; the surrogate has none to aim at. The
+Simulink files are the equivalent model of the tests.
+
+    nice -n 15 python -m bench.context
+    nice -n 15 python -m bench.context --seeds 0-4
+"""
+
+import argparse
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import mean, median
+from tempfile import TemporaryDirectory
+from time import process_time
+
+# For the engines' small matrices, threads of the linear algebra cost more than they save.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from falsifier import Result, falsify
+from falsifier.context.gather import gather
+from falsifier.engines.preview import preview
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.tokens import count_tokens
+from falsifier.problem.loading import load_source
+from falsifier.problem.source import ProblemSource
+from tests.fixtures import limp_home, simulink
+
+BUDGET = 300
+LINES = 10_000
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", default="0-9", help="first and last seed of the surrogate")
+    first, last = map(int, parser.parse_args().seeds.split("-"))
+    print("| search | context | falsified | simulations: mean | median | largest | tokens of the prompt |")
+    print("|---|---|---|---|---|---|---|")
+    print(_surrogate(range(first, last + 1)))
+    with TemporaryDirectory() as folder:
+        for row in _scripted(Path(folder)):
+            print(row, flush=True)
+        print(f"\n{_reading(Path(folder))}")
+
+
+def _surrogate(seeds: range) -> str:
+    results = [falsify("HeaterLimpHome", "surrogate", budget=BUDGET, seed=seed) for seed in seeds]
+    return _row("surrogate", "none", results, "")
+
+
+def _scripted(folder: Path) -> Iterator[str]:
+    slx, mdl, mo = folder / "limphome.slx", folder / "limphome.mdl", folder / "HeaterLimpHome.mo"
+    simulink.write_slx(slx)
+    mdl.write_text(simulink.MDL)
+    mo.write_text(limp_home.SOURCE.read_text())
+    for context in ((), (slx,), (mdl,), (mo,)):
+        source = ProblemSource(target="HeaterLimpHome", context=tuple(map(str, context)))
+        # Without thresholds it repeats itself, so one answer says all.
+        budget = BUDGET if context else 1
+        result = falsify(source, llm=ScriptedChat(limp_home.reads_thresholds), budget=budget)
+        sent = sum(count_tokens(m.content) for m in preview(load_source(source)))
+        yield _row("scripted LLM", context[0].name if context else "none", [result], str(sent))
+
+
+def _row(search: str, context: str, results: list[Result], tokens: str) -> str:
+    spent = [r.spent.simulations for r in results]
+    found = sum(r.status == "falsified" for r in results)
+    return (
+        f"| {search} | {context} | {found}/{len(results)} | {mean(spent):.1f} | {median(spent):g} | "
+        f"{max(spent)} | {tokens} |"
+    )
+
+
+def _reading(folder: Path) -> str:
+    """Return how long a long model takes, and what is left of it."""
+    count = (LINES - 10) // 2
+    lines = [f"  Real x{i};" for i in range(count)]
+    equations = [f"  x{i} = if x{i - 1} > {i} then 1 else u;" for i in range(1, count)]
+    head = "model Big\n  input Real u;\n  output Real y;\n  Real w;\n"
+    text = head + "\n".join([*lines, "equation", *equations])
+    path = folder / "big.mo"
+    path.write_text(f"{text}\n  w = 2 * u;\n  y = if w > 7.25 then 1 else 0;\nend Big;\n")
+    begin = process_time()
+    (excerpt,) = gather([str(path)], [], seeds=["y"], signals=["y", "u"]).excerpts
+    took = process_time() - begin
+    return (
+        f"A Modelica model of {len(path.read_text().splitlines())} lines took {took:.1f} s of processor "
+        f"time; {len(excerpt.text.splitlines())} lines were told ({excerpt.form})."
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What an engineer would read about a model: Simulink files, sources and documents."""

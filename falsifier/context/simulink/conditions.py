@@ -1,0 +1,81 @@
+"""Comparisons in a block diagram: in the labels of charts, and in blocks that compare a signal."""
+
+from collections.abc import Collection, Iterator, Mapping
+
+from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram
+from falsifier.context.simulink.upstream import Place
+
+
+def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[tuple[str, str]]:
+    """Return comparisons as text with the block or chart that makes them.
+
+    Args:
+        diagram: the model.
+        only: paths of the blocks to look at; None: all.
+    """
+    for path, system in diagram.root.walk():
+        leading = _sources(system)
+        for block in system.blocks:
+            place = (*path, block.name)
+            if not block.is_off and (only is None or place in only):
+                for text in _compared(block, leading.get(block.name, {})):
+                    yield text, "/".join(place)
+    for chart in diagram.charts:
+        if only is None or tuple(chart.name.split("/")) in only:
+            texts = [t.label for t in chart.transitions] + [s.actions for s in chart.states] + [chart.script]
+            yield from ((text, chart.name) for text in texts if text)
+
+
+def constants(diagram: Diagram) -> Mapping[str, str]:
+    """Return the values of variables of charts that do not change."""
+    return {
+        data.name: data.initial
+        for chart in diagram.charts
+        for data in chart.data
+        if data.initial and data.scope in ("constant", "parameter")
+    }
+
+
+def _sources(system: BlockSystem) -> Mapping[str, Mapping[str, str]]:
+    """For each block, what leads to each input: a constant's value, or the name of a signal or block."""
+    values = {b.name: b.parameter("Value") for b in system.blocks if b.type == "Constant"}
+    outports = set(system.ports("Outport"))
+    found: dict[str, dict[str, str]] = {}
+    for wire in system.wires:
+        if wire.source is not None:
+            outport = next((end.block for end in wire.targets if end.block in outports), "")
+            name = values.get(wire.source.block) or wire.name or outport or wire.source.block
+            for target in wire.targets:
+                found.setdefault(target.block, {})[target.port] = _quoted(name)
+    return found
+
+
+def _quoted(name: str) -> str:
+    """Write a name of several words in quotes, so that it stays one name; numbers stay as they are."""
+    if name.isidentifier() or name.replace(".", "").replace("-", "").replace("e", "").isdigit():
+        return name
+    return "'" + name.replace("'", " ").replace("\\", "/") + "'"
+
+
+def _compared(block: Block, inputs: Mapping[str, str]) -> Iterator[str]:
+    first = inputs.get("1", "u")
+    if block.type == "RelationalOperator":
+        yield f"{first} {_relation(block.parameter('Operator'))} {inputs.get('2', 'u2')}"
+    elif block.type == "Switch":
+        criteria = block.parameter("Criteria").replace("u2", inputs.get("2", "u2"))
+        threshold = block.parameter("Threshold") or "0"
+        yield criteria.replace("Threshold", threshold).replace("~=", "!=")
+    elif block.type == "Relay":
+        yield f"{first} >= {block.parameter('OnSwitchValue')}"
+        yield f"{first} <= {block.parameter('OffSwitchValue')}"
+    elif block.type in ("Saturate", "Saturation"):
+        yield f"{first} < {block.parameter('UpperLimit')}"
+        yield f"{first} > {block.parameter('LowerLimit')}"
+    elif block.type == "Reference" and block.parameter("relop"):  # Compare To Constant
+        yield f"{first} {_relation(block.parameter('relop'))} {block.parameter('const')}"
+    elif block.type in ("If", "Fcn"):
+        yield block.parameter("IfExpression") or block.parameter("Expr")
+
+
+def _relation(operator: str) -> str:
+    return operator.replace("~=", "!=")

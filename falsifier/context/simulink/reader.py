@@ -1,0 +1,175 @@
+"""From a file's sections to a diagram: blocks, lines, charts and settings."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram, End, Wire
+from falsifier.context.simulink.mdl import is_text_package, parse_mdl, text_parts
+from falsifier.context.simulink.parameters import meaningful
+from falsifier.context.simulink.parts import as_tree, read_parts
+from falsifier.context.simulink.stateflow import read_charts
+from falsifier.context.simulink.tree import Node
+from falsifier.errors import SpecError
+
+SUFFIXES = (".slx", ".mdl")
+_MAX_TEXT_BYTES = 128 << 20
+_SETTINGS = ("StartTime", "StopTime", "Solver", "SolverName", "FixedStep", "MaxStep", "SampleTime")
+# 5#out:1, 7#in:2, 7#enable
+_END = re.compile(r"(?P<block>.+?)#(?P<kind>\w+)(?::(?P<port>.+))?$")
+
+
+def read_diagram(path: Path) -> Diagram:
+    """Read a ``.slx`` or ``.mdl`` file; libraries and referenced models are named, not followed.
+
+    Raises:
+        SpecError: if it cannot be read; names the part, or the line.
+        ModelError: if a ``.slx`` file is not a zip archive, or a dangerous one.
+    """
+    return diagram_of(_tree(path), str(path))
+
+
+def diagram_of(tree: Node, shown: str) -> Diagram:
+    """Return the diagram that a file's sections describe.
+
+    Raises:
+        SpecError: if there is no model or library among them.
+    """
+    top = tree.first("Model") or tree.first("Library") or tree.first("Subsystem")
+    if top is None:
+        kinds = ", ".join(dict.fromkeys(child.kind for child in tree.children)) or "nothing"
+        raise SpecError(f"{shown}: expected a model or library, found {kinds}; is it a Simulink file?")
+    root = top.first("System")
+    if root is None:
+        raise SpecError(f"{shown}: {top.kind} {top.get('Name')!r} has no system of blocks; save it again")
+    made = _Systems(_defaults(tree), shown)
+    return Diagram(
+        name=top.get("Name") or root.get("Name") or Path(shown).stem,
+        root=made.system(root),
+        charts=tuple(read_charts(tree)),
+        settings=tuple(_settings(tree, top)),
+        is_library=top.kind == "Library",
+    )
+
+
+def _tree(path: Path) -> Node:
+    if path.suffix.lower() == ".slx":
+        return as_tree(read_parts(path), str(path))
+    try:
+        size = path.stat().st_size
+        if size > _MAX_TEXT_BYTES:
+            raise SpecError(f"{path}: has {size >> 20} MiB, more than {_MAX_TEXT_BYTES >> 20}")
+        # Old files are in the code page of the machine that wrote them; names in ASCII are read in any case.
+        text = path.read_bytes().decode("utf-8", errors="replace")
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be read ({error.strerror or error})") from None
+    if "\0" in text:
+        raise SpecError(f"{path}: expected text, found binary data; save the model as .mdl or .slx again")
+    if is_text_package(text):
+        return as_tree(text_parts(text), str(path))
+    return parse_mdl(text, str(path))
+
+
+def _defaults(tree: Node) -> Mapping[str, Mapping[str, str]]:
+    sections = (node for node in tree.walk() if node.kind == "BlockParameterDefaults")
+    return {block.get("BlockType"): block.values for each in sections for block in each.all("Block")}
+
+
+def _settings(tree: Node, top: Node) -> Iterator[tuple[str, str]]:
+    solver = next((n for n in tree.walk() if "SolverCC" in (n.kind + n.get("ClassName", "$ClassName"))), None)
+    values = {**top.values, **(solver.values if solver else {})}
+    for name in _SETTINGS:
+        if values.get(name):
+            yield name, values[name]
+
+
+@dataclass(frozen=True, slots=True)
+class _Systems:
+    """Makes blocks and lines from sections.
+
+    Attributes:
+        defaults: values of all blocks of a type, by type.
+        shown: what errors call the file.
+    """
+
+    defaults: Mapping[str, Mapping[str, str]]
+    shown: str
+
+    def system(self, node: Node, path: str = "") -> BlockSystem:
+        where = path or "the model"
+        nodes = [block for block in node.children if block.kind in ("Block", "Reference")]
+        names = {block.get("SID"): in_one_line(block.get("Name")) for block in nodes if block.get("SID")}
+        known = {in_one_line(block.get("Name")) for block in nodes}
+        blocks = tuple(self._block(block, path) for block in nodes)
+        wires = []
+        for line in node.all("Line"):
+            wire = _wire(line, names)
+            for end in (wire.source, *wire.targets):
+                if end is not None and end.block not in known:
+                    raise SpecError(
+                        f"{self.shown}: a line of {where} ends at {end.block!r}, which is no block there"
+                    )
+            wires.append(wire)
+        return BlockSystem(blocks, tuple(wires))
+
+    def _block(self, node: Node, path: str) -> Block:
+        kind = node.get("BlockType") or ("Reference" if node.kind == "Reference" else "")
+        name = in_one_line(node.get("Name"))
+        if not kind or not node.get("Name"):
+            missing = "type" if not kind else "name"
+            raise SpecError(
+                f"{self.shown}: a block of {path or 'the model'} has no {missing} ({name or kind})"
+            )
+        instance = node.first("InstanceData")
+        stated = {**node.values, **(instance.values if instance else {})}
+        below = node.first("System")
+        is_chart = node.get("SFBlockType") not in ("", "NONE") or _is_old_chart(node)
+        return Block(
+            type=kind,
+            name=name,
+            parameters=meaningful(kind, stated, self.defaults.get(kind, {})),
+            reference=in_one_line(
+                node.get("SourceBlock", "ModelNameDialog", "ModelFile", "ModelName", "ReferencedSubsystem")
+            ),
+            number=_number(node.get("Port")) if kind in ("Inport", "Outport") else 0,
+            system=None if below is None or is_chart else self.system(below, f"{path}/{name}".lstrip("/")),
+            is_chart=is_chart,
+            is_off=node.get("Commented") == "on",
+        )
+
+
+def _is_old_chart(node: Node) -> bool:
+    """Whether a block of an older file is a chart: these are masked subsystems around an S-function."""
+    return "Stateflow" in node.get("MaskType") or node.get("ErrorFcn").startswith("Stateflow")
+
+
+def _wire(line: Node, names: Mapping[str, str]) -> Wire:
+    source = _end(line, "Src", names)
+    return Wire(source, tuple(_targets(line, names)), in_one_line(line.get("Name")))
+
+
+def _targets(line: Node, names: Mapping[str, str]) -> Iterator[End]:
+    target = _end(line, "Dst", names)
+    if target is not None:
+        yield target
+    for branch in line.all("Branch"):
+        yield from _targets(branch, names)
+
+
+def _end(line: Node, side: str, names: Mapping[str, str]) -> End | None:
+    """One end of a line: ``SID#out:1`` in newer files, a name and a port in older ones."""
+    if found := _END.match(line.get(side)):
+        sid = found["block"]
+        return End(names.get(sid, f"SID {sid}"), found["port"] or found["kind"])
+    block = line.get(f"{side}Block")
+    return End(in_one_line(block), line.get(f"{side}Port") or "1") if block else None
+
+
+def in_one_line(name: str) -> str:
+    """Return a name without the line breaks with which it is drawn."""
+    return " ".join(name.split())
+
+
+def _number(text: str) -> int:
+    return int(text) if text.isdecimal() else 1

@@ -1,0 +1,146 @@
+"""State charts: states, transitions and data, whether the file nests them or lists them one by one."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from falsifier.context.simulink.diagram import Chart, ChartData, State, Transition
+from falsifier.context.simulink.tree import Node
+
+_KINDS = ("state", "transition", "data", "junction")
+_SCOPE = re.compile(r"(?P<scope>\w+?)(_DATA)?$")
+_INTEGER = re.compile(r"-?\d+")
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """A state, transition, junction or variable with the section that it is in.
+
+    Attributes:
+        node: its own section.
+        key: its number within the chart.
+        parent: number of the state around it; empty if there is none.
+    """
+
+    node: Node
+    key: str
+    parent: str
+
+
+def read_charts(tree: Node) -> Iterator[Chart]:
+    """Return the charts of a file in the order in which it has them."""
+    flat = _listed(tree)
+    for node in tree.walk():
+        if node.kind == "chart":
+            items = [*_nested(node, ""), *flat.get(node.get("id"), ())]
+            yield _chart(node, items)
+
+
+def _nested(node: Node, parent: str) -> Iterator[_Item]:
+    for child in node.children:
+        if child.kind in _KINDS:
+            key = child.get("SSID", "id")
+            yield _Item(child, key, parent)
+            yield from _nested(child, key)
+
+
+def _listed(tree: Node) -> Mapping[str, list[_Item]]:
+    """Items of older files, which stand beside their charts and name what they are in by its number."""
+    charts = {node.get("id") for node in tree.walk() if node.kind == "chart"}
+    beside = [
+        child for node in tree.walk() if node.kind == "Stateflow" for child in node.children
+        if child.kind in _KINDS and child.get("id")
+    ]  # fmt: skip
+    parents = {child.get("id"): _parent(child) for child in beside}
+    found: dict[str, list[_Item]] = {}
+    for child in beside:
+        parent = around = parents[child.get("id")]
+        for _ in parents:  # from state to state, up to the chart; at most as often as there are items
+            if around in charts or around not in parents:
+                break
+            around = parents[around]
+        item = _Item(child, child.get("id"), "" if parent in charts else parent)
+        found.setdefault(child.get("chart") or around, []).append(item)
+    return found
+
+
+def _parent(node: Node) -> str:
+    """Number of what an item of an older file is in: the first number of its position in the tree."""
+    found = _INTEGER.search(node.get("treeNode", "linkNode"))
+    return found[0] if found else ""
+
+
+def _chart(node: Node, items: list[_Item]) -> Chart:
+    states = {item.key: item for item in items if item.node.kind == "state" and not _is_note(item.node)}
+    names = {key: _full_name(key, states) for key in states}
+    junctions = [item.key for item in items if item.node.kind == "junction"]
+    names |= {key: f"junction {i}" for i, key in enumerate(junctions, start=1) if key not in names}
+    code = next((text for item in items if (text := _script(item.node)) and _is_kernel(item.node)), "")
+    sample = node.get("sampleTime")
+    return Chart(
+        name=" ".join(node.get("name").split()),
+        states=() if code else tuple(_state(item, names[key]) for key, item in states.items()),
+        transitions=() if code else tuple(_transitions(items, names)),
+        data=tuple(_data(item.node) for item in items if item.node.kind == "data" and _is_own(item.node)),
+        script=code,
+        sample_time="" if sample == "-1" else sample,
+    )
+
+
+def _full_name(key: str, states: Mapping[str, _Item]) -> str:
+    names: list[str] = []
+    while key in states and len(names) <= len(states):
+        names.append(_first_line(states[key].node))
+        key = states[key].parent
+    return ".".join(reversed(names))
+
+
+def _first_line(node: Node) -> str:
+    return node.get("labelString", "name").strip().split("\n")[0].strip().rstrip("/")
+
+
+def _state(item: _Item, name: str) -> State:
+    rest = item.node.get("labelString").strip().split("\n")[1:]
+    actions = "\n".join(line.strip() for line in rest if line.strip()) or _script(item.node)
+    return State(name, actions, item.node.get("type") == "AND_STATE")
+
+
+def _transitions(items: list[_Item], names: Mapping[str, str]) -> Iterator[Transition]:
+    for item in items:
+        if item.node.kind != "transition":
+            continue
+        source, target = (_where(item.node.first(side), names) for side in ("src", "dst"))
+        label = item.node.get("labelString").strip()
+        if target:
+            yield Transition(source, target, "" if label == "?" else " ".join(label.split()))
+
+
+def _where(end: Node | None, names: Mapping[str, str]) -> str:
+    key = "" if end is None else end.get("SSID", "id")
+    return names.get(key, "")
+
+
+def _data(node: Node) -> ChartData:
+    scope = _SCOPE.match(node.get("scope") or "LOCAL_DATA")
+    initial = next((n.get("initialValue") for n in node.walk() if n.get("initialValue")), "")
+    return ChartData(node.get("name"), scope["scope"].lower() if scope else "", initial)
+
+
+def _is_own(node: Node) -> bool:
+    """Whether a variable belongs to the chart or one of its states, not to a graphical function."""
+    return not node.get("scope").startswith("FUNCTION_")
+
+
+def _script(node: Node) -> str:
+    inner = node.first("eml")
+    return ("" if inner is None else inner.get("script")).strip()
+
+
+def _is_kernel(node: Node) -> bool:
+    """Whether this is the one state of a MATLAB Function block."""
+    return node.get("labelString").startswith("eML_blk_kernel")
+
+
+def _is_note(node: Node) -> bool:
+    inner = node.first("noteBox")
+    return node.get("isNoteBox") == "1" or (inner is not None and inner.get("isNoteBox") == "1")

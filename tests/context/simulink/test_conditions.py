@@ -1,0 +1,36 @@
+from pathlib import Path
+
+from falsifier.context.simulink.conditions import comparisons, constants
+from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, ChartData, Diagram, End, Wire
+from falsifier.context.simulink.reader import read_diagram
+from falsifier.context.simulink.upstream import upstream
+from tests.fixtures import simulink
+
+
+def test_blocks_and_charts_that_compare(tmp_path: Path) -> None:
+    diagram = read_diagram(simulink.write_slx(tmp_path / "a.slx"))
+    found = list(comparisons(diagram))
+    assert ("temperature >= 64", "Safety switch") in found
+    assert ("Command < 30", "Controller/Limit") in found
+    assert ("limp >= 0", "Controller/Limited") in found
+    assert ("[age < 1.5 || age >= 4]", "Mode logic") in found
+    behind = {place for _, place in comparisons(diagram, upstream(diagram, ["power"]))}
+    assert "Safety switch" not in behind
+    assert "Mode logic" in behind
+
+
+def test_constants_and_names_of_several_words() -> None:
+    blocks = (
+        Block("Constant", "c", (("Value", "2.5"),)),
+        Block("Gain", "my gain"),
+        Block("RelationalOperator", "r", (("Operator", "~="),)),
+        Block("Reference", "cmp", (("relop", "<="), ("const", "7"))),
+    )
+    wires = (
+        Wire(End("my gain", "1"), (End("r", "1"), End("cmp", "1"))),
+        Wire(End("c", "1"), (End("r", "2"),)),
+    )
+    chart = Chart("C", data=(ChartData("limit", "constant", "3"), ChartData("x", "local", "1")))
+    diagram = Diagram("m", BlockSystem(blocks, wires), (chart,))
+    assert list(comparisons(diagram)) == [("'my gain' != 2.5", "r"), ("'my gain' <= 7", "cmp")]
+    assert constants(diagram) == {"limit": "3"}

@@ -1,0 +1,65 @@
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from falsifier.context.simulink import parts
+from falsifier.context.simulink.parts import as_tree, read_parts
+from falsifier.errors import FalsifierError, ModelError, SpecError
+from tests.fixtures import simulink
+
+
+def tree_of(path: Path) -> None:
+    as_tree(read_parts(path), path.name)
+
+
+def test_only_parts_that_describe_the_model_are_read(tmp_path: Path) -> None:
+    found = read_parts(simulink.write_slx(tmp_path / "a.slx"))
+    assert "simulink/blockdiagram.xml" in found
+    assert "metadata/thumbnail.png" not in found
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("simulink/systems/system_4.xml", "<System><Block", "system_4.xml: not well-formed XML"),
+        ("simulink/systems/system_4.xml", None, "the part system_4.xml is missing"),
+        ("simulink/blockdiagram.xml", None, "the part simulink/blockdiagram.xml is missing"),
+        (
+            "simulink/systems/system_4.xml",
+            '<System><System Ref="system_root"/></System>',
+            "which contains it",
+        ),
+        ("simulink/stateflow/chart_14.xml", '<!DOCTYPE x><chart id="14"/>', "chart_14.xml: refused"),
+    ],
+)
+def test_errors_name_the_part(tmp_path: Path, name: str, text: str | None, message: str) -> None:
+    changed = simulink.newer_parts()
+    if text is None:
+        del changed[name]
+    else:
+        changed[name] = text
+    with pytest.raises(SpecError, match=f"a.slx: .*{message}"):
+        tree_of(simulink.write_slx(tmp_path / "a.slx", changed))
+
+
+def test_damaged_archives_are_named(tmp_path: Path) -> None:
+    path = simulink.write_slx(tmp_path / "a.slx")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:200])
+    with pytest.raises(ModelError, match="not a readable Simulink file"):
+        tree_of(path)
+    start = whole.index(b"simulink/systems/system_root.xml") + 32
+    path.write_bytes(whole[:start] + bytes(40) + whole[start + 40 :])
+    with pytest.raises(FalsifierError, match=r"system_root\.xml is damaged"):
+        tree_of(path)
+
+
+def test_bombs_and_parts_that_are_too_large_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(parts, "_MAX_PART_BYTES", 1 << 20)
+    with zipfile.ZipFile(tmp_path / "a.slx", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("simulink/blockdiagram.xml", bytes(3 << 20))
+    with pytest.raises(SpecError, match=r"blockdiagram\.xml has 3 MiB, more than 1"):
+        tree_of(tmp_path / "a.slx")

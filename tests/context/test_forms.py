@@ -1,0 +1,70 @@
+from falsifier.context.forms import Readable, of_source
+
+PAGE = """<html><head><title>no</title><style>p {}</style></head><body><h1>1 Limits</h1>
+<p>The value of <b>speed</b> stays &lt; 3.</p><script>x()</script><p>Other.</p></body></html>"""
+MODEL = """model M
+ parameter Real p = 3;
+ input Real u;
+ Real y;
+equation
+ y = if u > p then 1 else 0;
+end M;"""
+
+
+def texts(readable: Readable) -> dict[str, str]:
+    return {form.name: form.text() for form in readable.forms}
+
+
+def test_modelica_has_shorter_and_shorter_forms() -> None:
+    readable = of_source(MODEL, "a.mo", ["y"], ["y", "u"])
+    told = texts(readable)
+    assert "y = if u > p" in told["what the requirement depends on"]
+    assert told["parameters and comparisons"] == "p = 3\nu > p (p = 3)  [a.mo:6]"
+    assert told["comparisons"] == "u > p (p = 3)  [a.mo:6]"
+    assert told["name only"] == "model M"
+    assert [t.text for t in readable.found] == ["u > p (p = 3)"]
+
+
+def test_a_class_of_other_signals_is_text_and_that_is_said() -> None:
+    readable = of_source(MODEL, "a.mo", ["other"], ["other"])
+    assert readable.forms[0].name == "whole; no class declares a signal of the model"
+
+
+def test_c_that_sets_no_signal_is_told_only_if_it_is_named() -> None:
+    source = "void f(M *m) { if (m->a > 3) m->b = 1; }"
+    assert texts(of_source(source, "a.c", ["b"], ["b"]))["comparisons"] == "m->a > 3  [a.c:1]"
+    named = of_source(source, "a.c", ["other"], ["other"])
+    assert named.forms[0].name == "whole, since no function sets a signal of the requirement"
+    assert [f.name for f in of_source(source, "a.c", ["o"], ["o"], is_named=False).forms] == ["size only"]
+
+
+def test_a_source_that_is_not_understood_is_text_and_that_is_said() -> None:
+    source = "#ifdef A\nvoid f(int a) {\n#else\nvoid f(void) {\n#endif\n  speed = 3;\n}\n"
+    first = of_source(source, "a.c", ["speed"], ["speed"]).forms[0]
+    assert first.name == "whole; not understood: the brace of line 2 is not closed"
+    assert "speed = 3;" in first.text()
+    hidden = of_source(source, "m.fmu: a.c", ["speed"], ["speed"], is_named=False)
+    assert len(hidden.forms) == 1
+
+
+def test_pages_lose_their_tags() -> None:
+    told = texts(of_source(PAGE, "a.html", ["speed"], ["speed"]))
+    assert "The value of speed stays < 3." in told["whole"]
+    assert "x()" not in told["whole"]
+    assert told["paragraphs that name a signal"] == "The value of speed stays < 3."
+
+
+def test_documents_keep_headings_and_paragraphs_that_name_a_signal() -> None:
+    text = "# One\n\nNothing.\n\n## Two\n\nThe plant.speed is\nlimited.\n"
+    told = texts(of_source(text, "a.md", ["plant.speed"], ["plant.speed"]))
+    assert (
+        told["headings, and paragraphs that name a signal"] == "# One\n## Two\n\nThe plant.speed is limited."
+    )
+    assert told["headings"] == "# One\n## Two"
+    assert told["size only"] == "8 lines"
+
+
+def test_json_is_told_by_its_keys_if_it_is_long() -> None:
+    told = texts(of_source('{"a": [1, 2], "b": 3}', "a.json", [], []))
+    assert told["keys"] == "a, b"
+    assert "size only" in texts(of_source("[1", "a.json", [], []))

@@ -1,0 +1,128 @@
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from falsifier.context.gather import MAX_CHARACTERS, MAX_TOTAL, gather
+from falsifier.context.values import Context
+from falsifier.core.files import bundled
+from falsifier.errors import SpecError
+from tests.fixtures import simulink
+
+SIGNALS = ("trips", "temperature", "power", "limp", "disagreement")
+LIMP = bundled("fmus").parent / "modelica" / "Faults" / "HeaterLimpHome.mo"
+
+
+def read(*files: Path) -> Context:
+    return gather(map(str, files), [], seeds=["trips"], signals=SIGNALS)
+
+
+def test_thresholds_stand_with_their_signals(tmp_path: Path) -> None:
+    context = read(LIMP, simulink.write_slx(tmp_path / "limphome.slx"))
+    assert "disagreement > enterAbove (enterAbove = 9.5)" in context.of("disagreement")
+    assert "disagreement > 9.5" in context.of("disagreement")
+    assert "temperature >= 64" in context.of("temperature")
+    assert "set by the chart Mode logic with the states Normal, Limp" in context.of("limp")[0]
+    others = [c.text for c in context.comparisons if not c.signals]
+    assert "pause * period < valid (period = 0.1, valid = 1.5)" in others
+    first, second = context.excerpts
+    assert (first.form, first.sha256) == (
+        "what the requirement depends on",
+        sha256(LIMP.read_bytes()).hexdigest(),
+    )
+    assert second.form == "structure, as far as the requirement depends on it"
+
+
+def test_a_source_of_one_component_is_found_by_the_names_of_a_system(tmp_path: Path) -> None:
+    signals = ["bath.trips", "bath.disagreement", "other.disagreement"]
+    context = gather([str(LIMP)], [], seeds=["bath.trips"], signals=signals)
+    assert context.excerpts[0].form == "what the requirement depends on"
+    assert context.of("bath.disagreement") == context.of("other.disagreement") != ()
+
+
+def test_a_file_that_is_too_long_is_summarized(tmp_path: Path) -> None:
+    path = tmp_path / "notes.md"
+    path.write_text("# Title\n\nThe power is limited.\n\n" + "Many words. " * 2000)
+    (excerpt,) = read(path).excerpts
+    assert excerpt.form == "headings, and paragraphs that name a signal, because the rest is too long"
+    assert excerpt.text == "# Title\n\nThe power is limited."
+
+
+def test_a_long_model_fits(tmp_path: Path) -> None:
+    lines = [f"  Real x{i};" for i in range(600)]
+    equations = [f"  x{i} = if x{i - 1} > {i} then 1 else u;" for i in range(1, 600)]
+    path = tmp_path / "big.mo"
+    path.write_text(
+        "model Big\n  input Real u;\n  output Real y;\n  Real w;\n"
+        + "\n".join(lines)
+        + "\nequation\n"
+        + "\n".join(equations)
+        + "\n  w = 2 * u;\n  y = if w > 7.25 then 1 else 0;\nend Big;\n"
+    )
+    context = gather([str(path)], [], seeds=["y"], signals=["y", "u"])
+    assert context.excerpts[0].form == "what the requirement depends on"
+    assert "w > 7.25" in context.excerpts[0].text
+    assert "x17" not in context.excerpts[0].text
+    deep = gather([str(path)], [], seeds=["x599"], signals=["x599", "u"]).excerpts[0]
+    assert deep.form.endswith("because the rest is too long")
+    assert len(deep.text) <= MAX_CHARACTERS
+
+
+def test_all_files_together_fit(tmp_path: Path) -> None:
+    paths = [tmp_path / f"{i}.md" for i in range(4)]
+    for path in paths:
+        path.write_text(f"# {path.name}\n\n" + "Words. " * 1500)
+    context = read(*paths)
+    assert sum(len(e.text) for e in context.excerpts) <= MAX_TOTAL
+    assert len(context.excerpts) == 4
+    assert context.excerpts[-1].form == "whole"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "-----BEGIN RSA PRIVATE KEY-----",
+        "key: sk-abcdefghijklmnop",
+        "db_password = 'hunter22x'",
+        "https://me:secret1@example.org/a",
+        "Authorization: Bearer abcdefgh",
+        "# AKIAABCDEFGHIJKLMNOP",
+    ],
+)
+def test_secrets_are_refused_with_file_and_line(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "notes.md"
+    path.write_text(f"fine\n{line}\n")
+    with pytest.raises(SpecError, match=r"notes\.md: line 2 looks like a key") as error:
+        read(path)
+    assert line not in str(error.value)
+
+
+def test_a_secret_in_a_part_of_a_simulink_file_names_the_part(tmp_path: Path) -> None:
+    parts = simulink.newer_parts()
+    parts["simulink/systems/system_4.xml"] = parts["simulink/systems/system_4.xml"].replace(
+        'Name="Gain"', 'Name="Gain" note="sk-abcdefghijklmnop"'
+    )
+    with pytest.raises(SpecError, match=r"limphome\.slx: simulink/systems/system_4\.xml: line \d+ looks"):
+        read(simulink.write_slx(tmp_path / "limphome.slx", parts))
+
+
+def test_a_secret_behind_an_encoding_is_refused_as_well(tmp_path: Path) -> None:
+    parts: dict[str, str | bytes] = dict(simulink.newer_parts())
+    system = simulink.CONTROLLER.replace('Name="Proportional"', 'Name="sk-abcdefghijklmnop"')
+    system = system.replace('encoding="utf-8"', 'encoding="utf-16"')
+    parts["simulink/systems/system_4.xml"] = system.encode("utf-16")
+    with pytest.raises(SpecError, match=r"limphome\.slx, as it is told: line \d+ looks like a key"):
+        read(simulink.write_slx(tmp_path / "limphome.slx", parts))
+
+
+def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"none\.md: cannot be read"):
+        read(tmp_path / "none.md")
+    (tmp_path / "a.bin").write_bytes(b"\0\1\2")
+    with pytest.raises(SpecError, match=r"a\.bin: expected text or a Simulink file"):
+        read(tmp_path / "a.bin")
+
+
+def test_the_inside_of_an_fmu_is_told_as_far_as_it_concerns_the_signals() -> None:
+    fmu = bundled("fmus") / "HeaterLimpHome.fmu"
+    assert gather([], [fmu], seeds=["trips"], signals=SIGNALS) == Context()  # generated code with arrays

@@ -1,0 +1,33 @@
+from falsifier.context.thresholds import number_in, thresholds
+
+
+def found(text: str, **constants: str) -> list[str]:
+    return [t.text for t in thresholds([(text, 3)], constants, "a.mo")]
+
+
+def test_comparisons_with_numbers_and_named_constants() -> None:
+    assert found("u > 9.5 and not v < limit", limit="0.2") == ["u > 9.5", "v < limit (limit = 0.2)"]
+    assert found("(calm - 1) * period < leave / 2", period="0.1") == [
+        "(calm - 1) * period < leave / 2 (period = 0.1)"
+    ]
+    assert found("y = if pre(x) == 0 then 1 else 2") == ["pre(x) == 0"]
+    assert found("if (m->u >= 3.0f && f(x, 2 < w))") == ["m->u >= 3.0f", "2 < w"]
+
+
+def test_what_has_no_constant_or_no_variable_is_not_told() -> None:
+    assert found("a > b") == []
+    assert found("1 < 2") == []
+    assert found("a > b", b="c + d") == []
+    assert found("> 3") == []
+
+
+def test_names_values_and_place() -> None:
+    (one,) = thresholds([("m->pause * period < valid", 40), ("m->pause * period < valid", 50)],
+                        {"valid": "1.5", "period": "0.1"}, "a.c")  # fmt: skip
+    assert (one.names, one.values, one.place) == (frozenset({"pause"}), (0.1, 1.5), "a.c:40")
+
+
+def test_numbers() -> None:
+    assert [number_in(t) for t in ("1.5", "(2)", "3f", "-1e3", "a", "1 + 2", "")] == [
+        1.5, 2.0, 3.0, -1000.0, None, None, None
+    ]  # fmt: skip
