@@ -6,6 +6,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecu
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from falsifier.core import operating_system
@@ -18,6 +19,7 @@ from falsifier.problem.problem import Problem
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing.connection import Connection
 
 T = TypeVar("T")
 
@@ -30,7 +32,8 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
     """Open an executor for so many simulations of a model at a time; None for one, in this thread.
 
     A model that simulates in processes of its own needs only threads, each with its own such process: other
-    Python processes would take seconds to start. They are there for models in Python.
+    Python processes would take seconds to start. They are there for models in Python. Simulations that are
+    still under way at the end are stopped.
 
     Raises:
         SpecError: if jobs is not positive.
@@ -39,12 +42,38 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    is_apart = getattr(model, "isolate", False)
-    executor = ThreadPoolExecutor(jobs) if is_apart else Renewing(lambda: _process_pool(jobs))
+    with _threads(jobs) if getattr(model, "isolate", False) else _processes(jobs) as executor:
+        yield executor
+
+
+@contextmanager
+def _threads(jobs: int) -> Iterator[Executor]:
+    from falsifier.fmu import stop_simulations
+
+    started: list[int] = []
+    executor = ThreadPoolExecutor(jobs, initializer=lambda: started.append(get_ident()))
     try:
         yield executor
     finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+        stop_simulations(started)
+        executor.shutdown()
+
+
+@contextmanager
+def _processes(jobs: int) -> Iterator[Executor]:
+    from multiprocessing import Pipe
+
+    ending, end = Pipe(duplex=False)
+    executor = Renewing(lambda: _process_pool(jobs, ending))
+    try:
+        yield executor
+    finally:
+        if executor.is_busy():
+            end.close()
         executor.shutdown(cancel_futures=True)
+        end.close()
+        ending.close()
 
 
 @dataclass(slots=True)
@@ -106,15 +135,23 @@ class Renewing(Executor):
     def __init__(self, make: Callable[[], Executor]) -> None:
         self._make = make
         self._executor = make()
+        self._futures: set[Future[Any]] = set()
+
+    def is_busy(self) -> bool:
+        """Whether a task is being carried out; what waits for a process is cancelled."""
+        return any(not (future.cancel() or future.done()) for future in list(self._futures))
 
     def submit(self, function: Callable[..., T], /, *args: Any, **options: Any) -> "Future[T]":
         """Start a task."""
         try:
-            return self._executor.submit(function, *args, **options)
+            future = self._executor.submit(function, *args, **options)
         except BrokenExecutor:
             self._executor.shutdown(wait=False)
             self._executor = self._make()
-            return self._executor.submit(function, *args, **options)
+            future = self._executor.submit(function, *args, **options)
+        self._futures.add(future)
+        future.add_done_callback(self._futures.discard)
+        return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - as in the base class
         """End the present executor."""
@@ -146,26 +183,28 @@ def _check_jobs(jobs: int) -> None:
         raise SpecError(f"jobs must be at least 1, got {jobs}")
 
 
-def _process_pool(jobs: int) -> "ProcessPoolExecutor":
+def _process_pool(jobs: int, ending: "Connection | None" = None) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     operating_system.start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level,)
+        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending)
     )
 
 
-def _prepare_worker(log_level: int) -> None:
+def _prepare_worker(log_level: int, ending: "Connection | None") -> None:
     """Make a worker end with its parent, however that ends, and ignore Ctrl-C, which the parent handles.
 
     Args:
         log_level: the parent's level of the logger for simulations.
+        ending: closed at the other end if the worker is to end in the middle of a simulation.
     """
     import os
     import signal
     from multiprocessing import parent_process
+    from multiprocessing.connection import wait
     from threading import Thread
 
     logging.getLogger(_FMU_LOGGER).setLevel(log_level)
@@ -175,7 +214,7 @@ def _prepare_worker(log_level: int) -> None:
         return
 
     def follow() -> None:
-        parent.join()
+        wait([parent.sentinel] if ending is None else [parent.sentinel, ending])
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()

@@ -2,6 +2,7 @@
 
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
+from falsifier.fmu.isolation import stop_simulations
 from falsifier.fmu.network import Coupling, Frame
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.ssp import is_package, read_package
@@ -21,5 +22,6 @@ __all__ = [
     "is_packaged",
     "read_info",
     "read_package",
+    "stop_simulations",
     "with_local_files",
 ]

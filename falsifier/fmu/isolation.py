@@ -8,7 +8,7 @@ import atexit
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -43,6 +43,7 @@ class IsolatedFmu:
         self._has_loaded = False
         self._trust = Trust()
         self._lock = threading.Lock()
+        self._is_stopped = False
 
     def simulate(
         self, plan: Plan, fill: Callable[[Room], None]
@@ -92,7 +93,7 @@ class IsolatedFmu:
             self._worker_for(plan)
 
     def _should_repeat(self, error: SimulationError, *, is_reused: bool) -> bool:
-        if error.status == "timeout" or (self._order.logging and not is_reused):
+        if self._is_stopped or error.status == "timeout" or (self._order.logging and not is_reused):
             return False
         return (is_reused and error.status == "crashed") or self._trust.is_worth_repeating()
 
@@ -149,6 +150,14 @@ class IsolatedFmu:
         with self._lock:
             self._drop()
 
+    def stop(self) -> None:
+        """End the worker and, in whatever thread, a simulation under way; it fails there."""
+        self._is_stopped = True
+        worker = self._worker
+        if worker is not None:
+            worker.hang_up()
+        self.close()
+
     def forget(self) -> None:
         """Close the connection in a forked copy of this process; the worker belongs to the original."""
         if self._worker is not None:
@@ -157,6 +166,7 @@ class IsolatedFmu:
 
     def _started(self, worker: WorkerProcess, plan: Plan, fill: Callable[[Room], None]) -> WorkerProcess:
         """Start the simulation, in a new worker if this one has died since its last simulation."""
+        self._check_wanted()  # it may have been stopped while the worker was being started
         try:
             send_request(worker.sock, RUN)
         except Closed:
@@ -166,7 +176,12 @@ class IsolatedFmu:
             send_request(worker.sock, RUN)
         return worker
 
+    def _check_wanted(self) -> None:
+        if self._is_stopped:
+            raise SimulationError("stopped, because its result is no longer needed")
+
     def _worker_for(self, plan: Plan) -> WorkerProcess:
+        self._check_wanted()
         if self._worker is not None and self._worker.awaits_test:
             self._await_test(self._worker)
         worker = self._worker
@@ -301,6 +316,13 @@ class _Registry:
         for fmu in found:
             fmu.close()
 
+    def stop(self, threads: Collection[int]) -> None:
+        with self._lock:
+            keys = [key for key in self._fmus if key[-1] in threads]
+            found = [self._fmus.pop(key) for key in keys]
+        for fmu in found:
+            fmu.stop()
+
     def close(self) -> None:
         with self._lock:
             fmus, self._fmus = self._fmus, {}
@@ -321,3 +343,12 @@ class _Registry:
 
 
 REGISTRY = _Registry()
+
+
+def stop_simulations(threads: Collection[int]) -> None:
+    """End the workers of threads of this process, also in the middle of a simulation.
+
+    Args:
+        threads: their identifiers (threading.get_ident); they start no other simulation.
+    """
+    REGISTRY.stop(threads)

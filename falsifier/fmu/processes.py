@@ -1,6 +1,8 @@
 """One worker process, as the process that requests simulations sees it."""
 
+import contextlib
 import pickle
+import socket
 import time
 
 import numpy as np
@@ -67,6 +69,11 @@ class WorkerProcess:
     def take_log(self) -> tuple[str, ...]:
         """Return the lines that the FMU has written since the last call; only the end of long output."""
         return self._output.take()
+
+    def hang_up(self) -> None:
+        """End the connection: whichever thread waits for a reply finds it closed."""
+        with contextlib.suppress(OSError):
+            self.sock.shutdown(socket.SHUT_RDWR)
 
     def kill(self) -> int:
         """End the process; return its exit code, negative for a signal."""

@@ -175,7 +175,7 @@ class _Loop:
                 self.settle(self.waiting.popleft(), standing)
                 continue
             self.tell(standing)
-            limit = self.budget.exceeded(self.clock())
+            limit = self.limit_reached()
             if limit is not None:
                 return limit
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
@@ -185,6 +185,13 @@ class _Loop:
             except LimitReached as reached:
                 return self.failure_text() if self.all_failed() else str(reached)
         return "all requirements are falsified"
+
+    def limit_reached(self) -> str | None:
+        """Which limit is reached, in words. The record of a run is repeated even if its time is used up."""
+        spent = self.clock()
+        if self.count < self.steps.replayed:
+            spent = replace(spent, seconds=0.0)
+        return self.budget.exceeded(spent)
 
     def decide(self, jobs: int, *, in_batches: bool) -> Move:
         """Decide on the next move."""

@@ -81,7 +81,7 @@ def results_text(results: Sequence[Result]) -> str:
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
         lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
     falsified = sum(result.counterexample is not None for result in results)
-    total = max((result.spent for result in results), key=lambda spent: spent.simulations)
+    total = max((result.spent for result in results), key=lambda spent: (spent.simulations, spent.seconds))
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
     directories = {result.directory for result in results}
     if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):

@@ -9,16 +9,18 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from threading import Barrier
+from time import sleep
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from falsifier.campaigns import run_campaign
-from falsifier.errors import ModelError, SpecError
+from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.evaluation.workers import Renewing, local_executor, open_workers
 from falsifier.fmu.isolation import REGISTRY
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
+from tests.fmu import support
 from tests.fmu.fixtures import isolated, ramp, run
 from tests.patience import HANG, wait_until
 from tests.problems import BEGUN, HOLD, RELEASE
@@ -78,7 +80,12 @@ def level() -> int:
     return logging.getLogger("falsifier.fmu").level
 
 
-def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
+def hang(begun: Path) -> None:
+    begun.touch()
+    sleep(HANG)
+
+
+def test_processes_are_as_quiet_as_their_parent_and_end_in_the_middle_of_a_task(tmp_path: Path) -> None:
     logger = logging.getLogger("falsifier.fmu")
     before = logger.level
     logger.setLevel(logging.ERROR)
@@ -86,6 +93,10 @@ def test_processes_that_simulate_are_as_quiet_as_their_parent() -> None:
         with local_executor(2, lag_problem().model) as executor:
             assert executor is not None
             assert executor.submit(level).result() == logging.ERROR
+            hanging = executor.submit(hang, tmp_path / "begun")
+            wait_until((tmp_path / "begun").exists)
+        with pytest.raises(BrokenProcessPool):
+            hanging.result()
     finally:
         logger.setLevel(before)
 
@@ -108,6 +119,22 @@ def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:
         assert workers() == 2
     model.close()
     assert workers() == 0
+
+
+def test_a_simulation_in_a_thread_is_stopped_at_the_end() -> None:
+    model = isolated("Misdeeds_2")
+
+    def workers() -> list[int]:
+        found = [fmu._worker for key, fmu in REGISTRY._fmus.items() if key[0] == model.sha256]
+        return [worker.pid for worker in found if worker is not None and worker.plan is not None]
+
+    with local_executor(2, model) as executor:
+        assert executor is not None
+        hanging = executor.submit(run, model, ("y",), parameters={"misdeed": support.HANG}, time_limit=HANG)
+        wait_until(lambda: bool(workers()))
+    with pytest.raises(SimulationError, match=r"crashed|stopped"):
+        hanging.result()
+    assert not workers()
 
 
 class Mortal(ThreadPoolExecutor):

@@ -13,6 +13,7 @@ from falsifier.engines import make_engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.search.budget import Budget
 from falsifier.search.journal import read_journal
 from falsifier.search.records import AskedRecord
 from falsifier.search.result import Result
@@ -45,6 +46,19 @@ def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
     run(problem, tmp_path, budget=3)
     with pytest.raises(JournalError, match="candidate 0 of the engine 'uniform' differs from the journal"):
         resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
+
+
+def test_a_run_whose_time_is_used_up_is_still_repeated(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    whole = run(problem, tmp_path, budget=5)
+    (resumed,) = resume(
+        tmp_path,
+        problems=[problem],
+        engine=make_engine("uniform", problem, seed=1),
+        budget=Budget(8, seconds=1e-9),
+    )
+    assert keys(resumed) == keys(whole)
+    assert resumed.reason == "the time limit of 1e-09 s is reached"
 
 
 class ScriptedClock:

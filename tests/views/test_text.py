@@ -115,6 +115,12 @@ def test_several_results_are_a_line_each_with_notes_below(tmp_path: Path) -> Non
     assert last.startswith("1 of 2 falsified")
 
 
+def test_the_time_of_several_is_that_of_the_whole_run(found: Result) -> None:
+    first = replace(found, spent=Spent(simulations=2, seconds=4.8))
+    last = replace(found, spent=Spent(simulations=2, seconds=9.9))
+    assert "(9.9 s" in results_text([first, last])
+
+
 def test_a_line_of_several_says_if_a_part_was_not_tested(found: Result) -> None:
     finding = Finding(kind="condition", text="never held")
     partly = replace(found, status="not falsified", counterexample=None, findings=(finding,))
