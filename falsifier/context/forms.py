@@ -181,6 +181,8 @@ def _of_json(text: str, signals: Collection[str]) -> Readable:
         content = json.loads(text)
     except (ValueError, RecursionError):
         return _of_document(text, signals)
+    if not isinstance(content, (dict, list)):
+        return _of_document(text, signals)
     keys = list(content) if isinstance(content, dict) else [counted(len(content), "element")]
     forms = (
         Form("whole", lambda: json.dumps(content, indent=1)),
@@ -225,6 +227,7 @@ def _modes(diagram: Diagram) -> Iterator[tuple[str, str]]:
 def _without_tags(text: str) -> str:
     parser = _Text()
     parser.feed(text)
+    parser.close()
     return re.sub(r"\n{3,}", "\n\n", "".join(parser.found))
 
 
@@ -237,7 +240,7 @@ class _Text(HTMLParser):
         self._skipped = 0
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._skipped += tag in _SKIPPED_TAGS
+        self._skipped = 0 if tag == "body" else self._skipped + (tag in _SKIPPED_TAGS)  # a head may stay open
         if tag in _BLOCK_TAGS:
             self.found.append("\n")
 

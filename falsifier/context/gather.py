@@ -67,6 +67,8 @@ def gather(
 
 def _read(path: Path, name: str, seeds: Collection[str], signals: Collection[str]) -> _Source:
     try:
+        if not path.is_file() and path.exists():  # a pipe or device might never end
+            raise SpecError(f"context {name}: expected a file; name the files of a folder one by one")
         if path.stat().st_size > _MAX_BYTES:
             raise SpecError(
                 f"context {name}: has {path.stat().st_size >> 20} MiB, more than {_MAX_BYTES >> 20}"

@@ -68,3 +68,13 @@ def test_json_is_told_by_its_keys_if_it_is_long() -> None:
     told = texts(of_source('{"a": [1, 2], "b": 3}', "a.json", [], []))
     assert told["keys"] == "a, b"
     assert "size only" in texts(of_source("[1", "a.json", [], []))
+
+
+def test_json_of_a_single_value_is_told_as_it_is() -> None:
+    assert texts(of_source("3.5", "a.json", [], []))["whole"] == "3.5"
+    assert texts(of_source("null", "a.json", [], []))["whole"] == "null"
+
+
+def test_pages_whose_head_is_not_closed_keep_their_text() -> None:
+    page = "<html><head><title>no</title><body>The limit is 5 R&D"
+    assert texts(of_source(page, "a.html", [], []))["whole"] == "The limit is 5 R&D"

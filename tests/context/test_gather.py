@@ -1,3 +1,4 @@
+import os
 from hashlib import sha256
 from pathlib import Path
 
@@ -126,3 +127,9 @@ def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
 def test_the_inside_of_an_fmu_is_told_as_far_as_it_concerns_the_signals() -> None:
     fmu = bundled("fmus") / "HeaterLimpHome.fmu"
     assert gather([], [fmu], seeds=["trips"], signals=SIGNALS) == Context()  # generated code with arrays
+
+
+def test_only_files_are_read(tmp_path: Path) -> None:
+    for name in (str(tmp_path), os.devnull):  # a device or pipe might never end
+        with pytest.raises(SpecError, match="expected a file"):
+            gather([name], [], seeds=(), signals=())
