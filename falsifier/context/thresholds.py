@@ -79,7 +79,9 @@ def _threshold(
     known = {name: constants[name] for name in sorted(names) if name in constants}
     named = {name: value for name, value in known.items() if len(value) <= _MAX_LENGTH}
     values = [value for t in tokens if t.kind == "number" and (value := number_in(t.text)) is not None]
-    values += [value for stated in named.values() if (value := number_in(stated)) is not None]
+    values += [
+        value for s in named.values() for each in s.split(" or ") if (value := number_in(each)) is not None
+    ]
     variables = names - known.keys()
     if not variables or not values:
         return None
