@@ -12,6 +12,7 @@ from falsifier.context.modelica import (
     class_for,
     class_text,
     conditions,
+    modified_values,
     read_modelica,
     slice_of,
     used_classes,
@@ -117,9 +118,10 @@ def _of_modelica(text: str, shown: str, seeds: Collection[str], signals: Collect
     roots = _roots(seeds) & found.names
     kept = slice_of(found, roots) if roots else None
     others = used_classes(found, kept, classes)
-    limits = list(thresholds(conditions(found, kept), found.constants, shown))
+    changed = modified_values(text, shown)
+    limits = list(thresholds(conditions(found, kept), _possible(found.constants, changed), shown))
     for other in others:
-        limits += thresholds(conditions(other, None), other.constants, shown)
+        limits += thresholds(conditions(other, None), _possible(other.constants, changed), shown)
     of_main = class_text(found, kept)
     stated = {n: v for n, v in found.constants.items() if kept is None or n in kept.names}
     form = "what the requirement depends on" if roots else f"class {chosen.name}"
@@ -131,6 +133,11 @@ def _of_modelica(text: str, shown: str, seeds: Collection[str], signals: Collect
         Form("name only", lambda: f"{found.kind} {found.name}"),
     )
     return Readable(forms, tuple(limits))
+
+
+def _possible(constants: Mapping[str, str], changed: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return values of parameters with those that modifiers give them: which holds is not told apart."""
+    return {n: " or ".join(dict.fromkeys((v, *changed.get(n, ())))) for n, v in constants.items()}
 
 
 def _roots(names: Collection[str]) -> set[str]:
