@@ -47,12 +47,12 @@ class CSource:
     Attributes:
         functions: its functions.
         declared: what stands outside functions: variables, constants, types.
-        macros: values of ``#define NAME VALUE``.
+        macros: values of ``#define NAME VALUE``; several if it stands under several conditions.
     """
 
     functions: tuple[CFunction, ...]
     declared: tuple[Statement, ...]
-    macros: Mapping[str, str]
+    macros: Mapping[str, tuple[str, ...]]
 
     @property
     def statements(self) -> tuple[Statement, ...]:
@@ -66,8 +66,11 @@ class CSource:
 
     @property
     def constants(self) -> Mapping[str, str]:
-        """Values of macros and of constants with one value, as written."""
-        found = {name: _COMMENT.sub("", text).strip() for name, text in self.macros.items()}
+        """Values of macros and constants, as written; ``5 or 9`` of a macro that is defined twice."""
+        found = {
+            name: " or ".join(dict.fromkeys(_COMMENT.sub("", text).strip() for text in texts))
+            for name, texts in self.macros.items()
+        }
         for statement in self.declared:
             left, equals, right = statement.text.rstrip("; ").partition("=")
             if equals and "const" in left.split() and len(statement.sets) == 1:
@@ -82,7 +85,9 @@ def read_c(source: str, shown: str) -> CSource:
         SpecError: naming the line where a bracket is not closed or statements are nested too deep.
     """
     tokens = tokens_of(source, shown)
-    macros = dict(_macros(t.text for t in tokens if t.kind == "directive"))
+    macros: dict[str, tuple[str, ...]] = {}
+    for name, text in _macros(t.text for t in tokens if t.kind == "directive"):
+        macros[name] = (*macros.get(name, ()), text)
     reader = _Reader(source, [t for t in tokens if t.kind != "directive"], shown)
     functions, declared = reader.file()
     return CSource(tuple(functions), tuple(declared), macros)
@@ -94,7 +99,7 @@ def c_slice(found: CSource, names: Iterable[str]) -> Slice:
     A call counts as use of what the called function returns, and a function that sets a variable of this name
     anywhere sets it: variables of the same name in two functions are not told apart.
     """
-    values = {name: _words(text) for name, text in found.macros.items()}
+    values = {name: _words(" ".join(texts)) for name, texts in found.macros.items()}
     seeds = {name.rpartition(".")[2] for name in names}
     part = sliced(found.statements, values, seeds)
     # A statement that only calls a function is kept if something in that function is.
@@ -111,7 +116,10 @@ def c_text(found: CSource, kept: Slice | None) -> str:
     """Return what is kept as C: macros, declarations, functions; None: everything."""
     statements = frozenset(simple(found.statements)) if kept is None else kept.kept
     lines = [
-        f"#define {name} {text}" for name, text in found.macros.items() if kept is None or name in kept.names
+        f"#define {name} {text}"
+        for name, texts in found.macros.items()
+        if kept is None or name in kept.names
+        for text in dict.fromkeys(texts)
     ]
     lines += rendered(found.declared, statements)
     left_out = 0
@@ -157,6 +165,8 @@ class _Reader:
     def file(self) -> tuple[list[CFunction], list[Statement]]:
         functions, declared = [], []
         while self.at < len(self.tokens):
+            if self._word() == "extern" and self._word(1) == '"C"' and self._word(2) == "{":
+                self.at += 3  # its end is passed over like that of any block that is not understood
             begin = self.at
             name = self._head()
             head = self.tokens[begin : self.at]

@@ -12,6 +12,7 @@ from falsifier.context.modelica import (
     class_for,
     class_text,
     conditions,
+    modified_values,
     read_modelica,
     slice_of,
     used_classes,
@@ -117,9 +118,10 @@ def _of_modelica(text: str, shown: str, seeds: Collection[str], signals: Collect
     roots = _roots(seeds) & found.names
     kept = slice_of(found, roots) if roots else None
     others = used_classes(found, kept, classes)
-    limits = list(thresholds(conditions(found, kept), found.constants, shown))
+    changed = modified_values(text, shown)
+    limits = list(thresholds(conditions(found, kept), _possible(found.constants, changed), shown))
     for other in others:
-        limits += thresholds(conditions(other, None), other.constants, shown)
+        limits += thresholds(conditions(other, None), _possible(other.constants, changed), shown)
     of_main = class_text(found, kept)
     stated = {n: v for n, v in found.constants.items() if kept is None or n in kept.names}
     form = "what the requirement depends on" if roots else f"class {chosen.name}"
@@ -131,6 +133,11 @@ def _of_modelica(text: str, shown: str, seeds: Collection[str], signals: Collect
         Form("name only", lambda: f"{found.kind} {found.name}"),
     )
     return Readable(forms, tuple(limits))
+
+
+def _possible(constants: Mapping[str, str], changed: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return values of parameters with those that modifiers give them: which holds is not told apart."""
+    return {n: " or ".join(dict.fromkeys((v, *changed.get(n, ())))) for n, v in constants.items()}
 
 
 def _roots(names: Collection[str]) -> set[str]:
@@ -181,6 +188,8 @@ def _of_json(text: str, signals: Collection[str]) -> Readable:
         content = json.loads(text)
     except (ValueError, RecursionError):
         return _of_document(text, signals)
+    if not isinstance(content, (dict, list)):
+        return _of_document(text, signals)
     keys = list(content) if isinstance(content, dict) else [counted(len(content), "element")]
     forms = (
         Form("whole", lambda: json.dumps(content, indent=1)),
@@ -225,6 +234,7 @@ def _modes(diagram: Diagram) -> Iterator[tuple[str, str]]:
 def _without_tags(text: str) -> str:
     parser = _Text()
     parser.feed(text)
+    parser.close()
     return re.sub(r"\n{3,}", "\n\n", "".join(parser.found))
 
 
@@ -237,7 +247,7 @@ class _Text(HTMLParser):
         self._skipped = 0
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._skipped += tag in _SKIPPED_TAGS
+        self._skipped = 0 if tag == "body" else self._skipped + (tag in _SKIPPED_TAGS)  # a head may stay open
         if tag in _BLOCK_TAGS:
             self.found.append("\n")
 

@@ -28,6 +28,7 @@ class _Source:
     """One file with its forms."""
 
     path: str
+    name: str
     sha256: str
     readable: Readable
 
@@ -58,7 +59,7 @@ def gather(
         _refuse_secrets(text, f"{source.path}, as it is told")  # what encodings may have hidden before
     return Context(
         tuple(
-            Excerpt(s.path, s.sha256, _shortened(s.readable.forms, i), text)
+            Excerpt(s.path, s.name, s.sha256, _shortened(s.readable.forms, i), text)
             for s, (i, text) in zip(sources, chosen, strict=True)
         ),
         tuple(_compared(sources, signals)),
@@ -67,6 +68,8 @@ def gather(
 
 def _read(path: Path, name: str, seeds: Collection[str], signals: Collection[str]) -> _Source:
     try:
+        if not path.is_file() and path.exists():  # a pipe or device might never end
+            raise SpecError(f"context {name}: expected a file; name the files of a folder one by one")
         if path.stat().st_size > _MAX_BYTES:
             raise SpecError(
                 f"context {name}: has {path.stat().st_size >> 20} MiB, more than {_MAX_BYTES >> 20}"
@@ -81,7 +84,7 @@ def _read(path: Path, name: str, seeds: Collection[str], signals: Collection[str
             _refuse_secrets(text.decode("utf-8", "replace"), f"{name}: {part}")
     else:
         _refuse_secrets(content.decode("utf-8", "replace"), name)
-    return _Source(name, sha256(content).hexdigest(), of_diagram(read_diagram(path), seeds))
+    return _Source(name, path.name, sha256(content).hexdigest(), of_diagram(read_diagram(path), seeds))
 
 
 def _text_source(
@@ -94,9 +97,9 @@ def _text_source(
     if "\0" in text:
         raise SpecError(f"context {name}: expected text or a Simulink file, found binary data; leave it out")
     _refuse_secrets(text, name)
-    return _Source(
-        name, sha256(content).hexdigest(), of_source(text, name, seeds, signals, is_named=is_named)
-    )
+    told = Path(name).name if is_named else name  # folders often have names of people and customers
+    readable = of_source(text, told, seeds, signals, is_named=is_named)
+    return _Source(name, told, sha256(content).hexdigest(), readable)
 
 
 def _refuse_secrets(text: str, name: str) -> None:

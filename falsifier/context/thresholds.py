@@ -14,6 +14,7 @@ _BOUNDARIES = frozenset(_BOUNDING.split())
 _OPENING, _CLOSING = "([{", ")]}"
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?[fFlLuU]*$")
 _MAX_LENGTH = 160
+_MAX_CONDITION = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ def thresholds(
     """
     seen = set()
     for text, line in texts:
-        if not any(sign in text for sign in _SIGNS):
+        if len(text) > _MAX_CONDITION or not any(sign in text for sign in _SIGNS):
             continue
         tokens = tokens_of(text, file)
         for i, token in enumerate(tokens):
@@ -75,11 +76,14 @@ def _threshold(
         return None
     tokens = [*left, relation, *right]
     names = {t.text for t in _variables(tokens)}
-    named = {name: constants[name] for name in sorted(names) if name in constants}
+    known = {name: constants[name] for name in sorted(names) if name in constants}
+    named = {name: value for name, value in known.items() if len(value) <= _MAX_LENGTH}
     values = [value for t in tokens if t.kind == "number" and (value := number_in(t.text)) is not None]
-    values += [value for stated in named.values() if (value := number_in(stated)) is not None]
-    variables = names - named.keys()
-    if not variables or not values or len(text) > 10_000:
+    values += [
+        value for s in named.values() for each in s.split(" or ") if (value := number_in(each)) is not None
+    ]
+    variables = names - known.keys()
+    if not variables or not values:
         return None
     shown = written(text, tokens)
     if len(shown) > _MAX_LENGTH:

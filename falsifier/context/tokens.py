@@ -10,14 +10,16 @@ from falsifier.errors import SpecError
 Kind = Literal["name", "number", "text", "sign", "directive"]
 # Far more than a model of 10,000 lines has.
 _MAX_CHARACTERS = 20_000_000
+# Comments and texts that are not closed end with the source, and names in quotes have a limited length:
+# otherwise, each of their beginnings would be searched up to the end.
 _TOKEN = re.compile(
     r"""
-    (?P<blank>\s+)
-  | (?P<comment>//[^\n]*|/\*.*?\*/)
-  | (?P<directive>(?:(?<=\n)|\A)[ \t]*\#(?:[^\n\\]|\\.)*)
+    (?P<directive>(?:(?<=\n)|\A)[ \t]*\#(?:[^\n\\]|\\.)*)
+  | (?P<blank>\s*\n|\s+)
+  | (?P<comment>//[^\n]*|/\*.*?(?:\*/|\Z))
   | (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[a-zA-Z]*)
-  | (?P<name>[^\W\d]\w*|'(?:[^'\\\n]|\\.)+')
-  | (?P<text>"(?:[^"\\]|\\.)*")
+  | (?P<name>[^\W\d]\w*|'(?:[^'\\\n]|\\.){1,200}')
+  | (?P<text>"(?:[^"\\]|\\.)*(?:"|\\?\Z))
   | (?P<sign><=|>=|==|!=|<>|:=|&&|\|\||->|\+\+|--|[-+*/%&|^]=|.)
     """,
     re.VERBOSE | re.DOTALL,

@@ -9,12 +9,14 @@ class Excerpt:
 
     Attributes:
         path: the file as it was named; of one inside an FMU, ``my.fmu: sources/model.c``.
+        name: the file as it is told: without the folders of this machine.
         sha256: hash of the file's content.
         form: what is told of it, in words: ``whole``, ``structure``, ...
         text: what is told.
     """
 
     path: str
+    name: str
     sha256: str
     form: str
     text: str

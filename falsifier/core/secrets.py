@@ -18,7 +18,7 @@ _VARIABLE_NAME = re.compile(
     re.IGNORECASE,
 )
 # Shapes of well-known keys: OpenAI and providers with the same format, Hugging Face, Groq, xAI, NVIDIA,
-# Perplexity, Google, GitHub, GitLab, Slack, AWS, PEM files, JSON web tokens.
+# Perplexity, Google, GitHub, GitLab, Slack, AWS, Stripe, npm, PEM and PuTTY files, JSON web tokens.
 _KEY_SHAPES = (
     r"(?<![a-zA-Z0-9])(?:sk|pk|rk)-[\w*-]{8,}",
     r"\b(?:hf|gsk|pplx|nvapi|xai)[-_][\w*-]{8,}",
@@ -26,9 +26,13 @@ _KEY_SHAPES = (
     r"\b(?:github_pat_|gh[opsur]_)\w{16,}",
     r"\bglpat-[\w-]{16,}",
     r"\bxox[abprs]-[\w-]{8,}",
-    r"\bAKIA[0-9A-Z]{12,}",
-    r"-----BEGIN [A-Z ]*PRIVATE KEY-----",
-    r"\beyJ[\w-]{10,}\.[\w-]{10,}(?:\.[\w-]*)?",
+    r"\b(?:AKIA|ASIA)[0-9A-Z]{12,}",
+    r"\b(?:sk|rk)_(?:live|test)_\w{8,}",
+    r"\bnpm_[a-zA-Z0-9]{30,}",
+    r"-----BEGIN [A-Z ]*PRIVATE KEY(?: BLOCK)?-----",
+    r"\bPuTTY-User-Key-File-\d",
+    # Only where a word begins, so that time does not grow with the square of a text's length.
+    r"(?<![\w-])eyJ[\w-]{10,}+\.[\w-]{10,}(?:\.[\w-]*)?",
 )
 _CREDENTIALS_IN_ADDRESS = r"(?<=://)[^\s/@]+(?=@)"
 _VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS)))
@@ -45,9 +49,20 @@ _IN_TEXT = re.compile(
 )
 # A value given to something that is named like a secret, as in settings and scripts.
 _ASSIGNED = re.compile(
-    r"""(?ix) \b (?:\w*[_-])? (?:password|passwd|passphrase|secret|api[_-]?key|auth[_-]?token|access[_-]?token
-    |private[_-]?key|credentials?|authorization) ["']? \s* (?::?=|:) \s* ["']? [^\s"',;(){}]{6,}"""
+    r"""(?ix) \b (?:\w*[_-])? (?:(?:client|shared)?secret|(?:shared)?access[_-]?key|(?:secret|account|api
+    |private|encryption)[_-]?key|password|passwd|passphrase|(?:auth|access|api|bearer|refresh)[_-]?token
+    |credentials?|authorization) ["']? (?:\s* (?::?=|:) \s* | >) ["']? [^\s"',;(){}<]{6,}"""
 )
+# The same without a sign: a macro, or a sentence.
+_STATED = re.compile(
+    r"""(?ix) \#[ ]*define[ ]+\w*(?:passw(?:or)?d|secret|token|_key) \s+ ["'][^\s"']{6,}
+    | \bpassword[ ]is \s+ ["']? (?=[^\s"']*\d) [^\s"',;(){}]{6,}"""
+)
+# A line of an environment file: names in capitals, nothing around the sign.
+_ENVIRONMENT = re.compile(
+    r"\s*(?:export\s+)?[A-Z][A-Z0-9_]*(?:_KEY|TOKEN|SECRET|PASSWORD|PASSWD|_PASS|_PWD|_PAT)=[\"']?[^\s\"'(){};]{6,}"
+)
+_UNNAMED = (_VALUE, _ASSIGNED, _STATED)
 # Environment variables whose values are removed from texts: fewer than those that are kept from FMUs, because
 # the values of others, such as a region or a path, may be part of any text.
 _KEY_VARIABLE = re.compile(
@@ -108,7 +123,9 @@ def line_of_secret(text: str) -> int | None:
     held = [v.strip() for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
     held = [value for value in held if len(value) >= _SHORTEST]
     for number, line in enumerate(text.splitlines(), start=1):
-        if _VALUE.search(line) or _ASSIGNED.search(line) or any(value in line for value in held):
+        if any(pattern.search(line) for pattern in _UNNAMED) or _ENVIRONMENT.match(line):
+            return number
+        if any(value in line for value in held):
             return number
     return None
 

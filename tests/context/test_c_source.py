@@ -1,6 +1,7 @@
 import pytest
 
 from falsifier.context.c_source import c_conditions, c_slice, c_text, read_c
+from falsifier.context.thresholds import thresholds
 from falsifier.errors import SpecError
 
 SOURCE = """
@@ -76,3 +77,17 @@ def test_what_is_not_closed_is_named() -> None:
         with pytest.raises(SpecError, match=f"a.c: .*{message}"):
             read_c(source, "a.c")
     assert read_c("}}; garbage ??", "a.c").functions == ()
+
+
+def test_macros_of_several_conditions_have_several_values() -> None:
+    source = "#ifdef A\n#define L 5\n#else\n#define L 9\n#endif\nvoid f(M *m) { m->y = m->u > L; }"
+    found = read_c(source, "a.c")
+    assert found.constants == {"L": "5 or 9"}
+    assert c_text(found, c_slice(found, ["y"])).splitlines()[:2] == ["#define L 5", "#define L 9"]
+    (told,) = thresholds(c_conditions(found, None), found.constants, "a.c")
+    assert told.text == "m->u > L (L = 5 or 9)"
+
+
+def test_functions_within_extern_c_are_read() -> None:
+    source = '#ifdef P\nextern "C" {\n#endif\nvoid f(M *m) { m->y = 1; }\nvoid g(M *m) { m->z = 1; }\n}\n'
+    assert [f.name for f in read_c(source, "a.c").functions] == ["f", "g"]

@@ -68,3 +68,20 @@ def test_json_is_told_by_its_keys_if_it_is_long() -> None:
     told = texts(of_source('{"a": [1, 2], "b": 3}', "a.json", [], []))
     assert told["keys"] == "a, b"
     assert "size only" in texts(of_source("[1", "a.json", [], []))
+
+
+def test_json_of_a_single_value_is_told_as_it_is() -> None:
+    assert texts(of_source("3.5", "a.json", [], []))["whole"] == "3.5"
+    assert texts(of_source("null", "a.json", [], []))["whole"] == "null"
+
+
+def test_pages_whose_head_is_not_closed_keep_their_text() -> None:
+    page = "<html><head><title>no</title><body>The limit is 5 R&D"
+    assert texts(of_source(page, "a.html", [], []))["whole"] == "The limit is 5 R&D"
+
+
+def test_values_that_modifiers_change_are_not_told_as_certain() -> None:
+    derived = f"{MODEL}\nmodel D\n extends M(p = 8);\nend D;"
+    assert [t.text for t in of_source(derived, "a.mo", ["y"], ["y"]).found] == ["u > p (p = 3 or 8)"]
+    part = f"{MODEL}\nmodel D\n M m(p(min = 0) = 4);\n M n(p = f(1, 2), u = 5);\n Real z;\nend D;"
+    assert [t.text for t in of_source(part, "a.mo", ["y"], ["y"]).found] == ["u > p (p = 3 or 4 or f(1, 2))"]

@@ -1,3 +1,4 @@
+import os
 from hashlib import sha256
 from pathlib import Path
 
@@ -126,3 +127,20 @@ def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
 def test_the_inside_of_an_fmu_is_told_as_far_as_it_concerns_the_signals() -> None:
     fmu = bundled("fmus") / "HeaterLimpHome.fmu"
     assert gather([], [fmu], seeds=["trips"], signals=SIGNALS) == Context()  # generated code with arrays
+
+
+def test_only_files_are_read(tmp_path: Path) -> None:
+    for name in (str(tmp_path), os.devnull):  # a device or pipe might never end
+        with pytest.raises(SpecError, match="expected a file"):
+            gather([name], [], seeds=(), signals=())
+
+
+def test_folders_of_the_machine_are_recorded_and_not_told(tmp_path: Path) -> None:
+    source = tmp_path / "a.mo"
+    source.write_text("model A\n Real trips;\n input Real power;\nequation\n trips = power > 3;\nend A;\n")
+    (broken := tmp_path / "b.mo").write_text("model B\n Real trips;\n")
+    context = read(source, broken, simulink.write_slx(tmp_path / "limphome.slx"))
+    assert [e.name for e in context.excerpts] == ["a.mo", "b.mo", "limphome.slx"]
+    assert context.excerpts[0].path == str(source)
+    assert not [e for e in context.excerpts if str(tmp_path) in e.text + e.form]
+    assert not [c for c in context.comparisons if str(tmp_path) in c.text + c.place]

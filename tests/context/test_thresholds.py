@@ -31,3 +31,8 @@ def test_numbers() -> None:
     assert [number_in(t) for t in ("1.5", "(2)", "3f", "-1e3", "a", "1 + 2", "")] == [
         1.5, 2.0, 3.0, -1000.0, None, None, None
     ]  # fmt: skip
+
+
+def test_long_values_of_constants_are_not_told() -> None:
+    assert found("a + 1 > b", b="c + " * 100) == ["a + 1 > b"]
+    assert found("a > 3 " + "or b " * 3000) == []

@@ -27,3 +27,13 @@ def test_length_has_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tokens, "_MAX_CHARACTERS", 10)
     with pytest.raises(SpecError, match="has 12 characters, more than 10"):
         tokens_of("x" * 12, "a.c")
+
+
+def test_indented_directives_are_directives() -> None:
+    found = tokens_of("#if A\n\n  # define B 1\n#endif\nx", "a.c")
+    assert [t.kind for t in found] == ["directive"] * 3 + ["name"]
+
+
+@pytest.mark.parametrize("source", ["/* " * 1000, '"' + '\\"' * 1000, '"' + '\\"' * 1000 + "\\"])
+def test_what_is_not_closed_ends_with_the_source(source: str) -> None:
+    assert len(tokens_of(source, "a.c")) <= 1  # one by one, each would be searched up to the end

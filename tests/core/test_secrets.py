@@ -74,3 +74,42 @@ def test_the_line_of_a_secret_is_found(key: str, monkeypatch: pytest.MonkeyPatch
     assert line_of_secret('{"client_secret": "abcdefgh"}') == 1
     monkeypatch.setenv("MY_TOKEN", "quite an ordinary value")
     assert line_of_secret("a\nb = quite an ordinary value") == 2
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "aws_secret_access_key = abcdefghijk/lmno",
+        "SECRET_KEY=abcdefgh123",
+        "export GITHUB_TOKEN='abcdefgh1234'",
+        "DB_PASS=hunter2hunter2",
+        "Endpoint=sb://x;SharedAccessKey=abcdefghijk==",
+        "clientSecret: 'abcdefgh'",
+        '<P Name="password">hunter22</P>',
+        '#define WIFI_PASSWORD "hunter22"',
+        "// the password is hunter22",
+        "-----BEGIN PGP PRIVATE KEY BLOCK-----",
+        "PuTTY-User-Key-File-3: ssh-ed25519",
+        "sk_live_abcdefgh12345678",
+        "ASIAABCDEFGHIJKLMNOP",
+        f"npm_{'a1' * 18}",
+    ],
+)
+def test_secrets_of_settings_sources_and_key_files_are_found(line: str) -> None:
+    assert line_of_secret(f"gain = 3\n{line}\n") == 2
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "the password is required for entry",
+        "token = next_token;",
+        "NEXT_TOKEN=(state + 1) * 2;",
+        "#define MAX_TOKEN 1000000",
+        "#define KEY_STATE_KEY (BASE + 100000)",
+        "BlockKey = 12345678",
+        "secret > threshold",
+    ],
+)
+def test_code_that_only_speaks_of_keys_is_no_secret(line: str) -> None:
+    assert line_of_secret(line) is None

@@ -45,7 +45,7 @@ def test_context_stands_in_the_part_that_does_not_change(file: Path) -> None:
     falsify(with_file(file), llm=chat, budget=2)
     first, second = (request.messages[0].content for request in chat.requests)
     assert first == second
-    assert f"--- {file} (" in first
+    assert f"--- {file.name} (" in first
     assert first == preview(load_source(with_file(file)), simulations=2)[0].content
 
 

@@ -9,13 +9,14 @@ from falsifier.context.modelica.classes import (
     used_classes,
     with_bases,
 )
-from falsifier.context.modelica.reader import read_modelica
+from falsifier.context.modelica.reader import modified_values, read_modelica
 
 __all__ = [
     "ModelicaClass",
     "class_for",
     "class_text",
     "conditions",
+    "modified_values",
     "read_modelica",
     "slice_of",
     "used_classes",

@@ -39,6 +39,7 @@ _LISTED_FUNCTIONS = """
 """
 _FUNCTIONS = frozenset(_LISTED_FUNCTIONS.split())
 _MAX_DEPTH = 100
+_MAX_VALUE = 40
 
 
 def read_modelica(source: str, shown: str) -> tuple[ModelicaClass, ...]:
@@ -52,6 +53,24 @@ def read_modelica(source: str, shown: str) -> tuple[ModelicaClass, ...]:
     reader = _Reader(source, tokens_of(source, shown), shown)
     reader.file()
     return tuple(reader.classes)
+
+
+def modified_values(source: str, shown: str) -> dict[str, list[str]]:
+    """Return the values that modifiers such as ``Base(limit = 8)`` give to names, anywhere in a file."""
+    tokens = tokens_of(source, shown)
+    found: dict[str, list[str]] = {}
+    opened: list[int] = []
+    last = 0  # where the bracket began that was closed last
+    for i, token in enumerate(tokens):
+        if token.text in ("(", "[", "{"):
+            opened.append(i)
+        elif token.text in (")", "]", "}") and opened:
+            last = opened.pop()
+        elif token.text == "=" and opened:
+            name = tokens[last - 1] if tokens[i - 1].text == ")" else tokens[i - 1]  # p(min = 0) = 4
+            value = next(_split(_inside(tokens[i + 1 : i + 1 + _MAX_VALUE]), ","))
+            found.setdefault(name.text, []).append(written(source, value))
+    return found
 
 
 @dataclass(slots=True)
@@ -287,6 +306,16 @@ def _closing(tokens: list[Token]) -> int:
         if depth == 0:
             return i
     return len(tokens) - 1
+
+
+def _inside(tokens: list[Token]) -> list[Token]:
+    """Return the tokens before the bracket that closes what is around them."""
+    depth = 0
+    for i, token in enumerate(tokens):
+        depth += (token.text in "([{") - (token.text in ")]}")
+        if depth < 0:
+            return tokens[:i]
+    return tokens
 
 
 def _split(tokens: list[Token], sign: str) -> Iterator[list[Token]]:

@@ -1,9 +1,13 @@
 """Comparisons in a block diagram: in the labels of charts, and in blocks that compare a signal."""
 
+import re
 from collections.abc import Collection, Iterator, Mapping
 
 from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram
 from falsifier.context.simulink.upstream import Place
+
+# Of an If block, u1 is what leads to its first port, not a signal of that name.
+_PORT = re.compile(r"\bu(\d+)\b")
 
 
 def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[tuple[str, str]]:
@@ -62,9 +66,11 @@ def _compared(block: Block, inputs: Mapping[str, str]) -> Iterator[str]:
     if block.type == "RelationalOperator":
         yield f"{first} {_relation(block.parameter('Operator'))} {inputs.get('2', 'u2')}"
     elif block.type == "Switch":
-        criteria = block.parameter("Criteria").replace("u2", inputs.get("2", "u2"))
         threshold = block.parameter("Threshold") or "0"
-        yield criteria.replace("Threshold", threshold).replace("~=", "!=")
+        stated = {"u2": inputs.get("2", "u2"), "Threshold": threshold}
+        yield _relation(
+            re.sub(r"\b(u2|Threshold)\b", lambda word: stated[word[0]], block.parameter("Criteria"))
+        )
     elif block.type == "Relay":
         yield f"{first} >= {block.parameter('OnSwitchValue')}"
         yield f"{first} <= {block.parameter('OffSwitchValue')}"
@@ -73,8 +79,11 @@ def _compared(block: Block, inputs: Mapping[str, str]) -> Iterator[str]:
         yield f"{first} > {block.parameter('LowerLimit')}"
     elif block.type == "Reference" and block.parameter("relop"):  # Compare To Constant
         yield f"{first} {_relation(block.parameter('relop'))} {block.parameter('const')}"
-    elif block.type in ("If", "Fcn"):
-        yield block.parameter("IfExpression") or block.parameter("Expr")
+    elif block.type == "If":
+        for text in (block.parameter("IfExpression"), *block.parameter("ElseIfExpressions").split(",")):
+            yield _relation(_PORT.sub(lambda port: inputs.get(port[1], port[0]), text))
+    elif block.type == "Fcn":
+        yield _relation(re.sub(r"\bu\b(?!\()", lambda _: first, block.parameter("Expr")))
 
 
 def _relation(operator: str) -> str:

@@ -3,7 +3,8 @@
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
@@ -24,6 +25,9 @@ _READ = (_DIAGRAM, _DEFAULTS, _STATEFLOW, _CHARTS, _SETTINGS, "simulink/systems/
 # Sections that only group what is within them.
 _GROUPS = ("Children",)
 _MAX_NESTING = 200
+# Far more than models have. Parts that refer twice to the next one could stand for billions of sections.
+_MAX_SECTIONS = 2_000_000
+_MAX_REFERENCES = 20_000
 
 
 def read_parts(path: Path) -> dict[str, bytes]:
@@ -60,7 +64,9 @@ def as_tree(parts: Mapping[str, bytes], shown: str) -> Node:
     Raises:
         SpecError: naming the part that is missing or cannot be read.
     """
-    package = _Package({name.lower(): text for name, text in parts.items()}, shown)
+    lowered = {name.lower(): text for name, text in parts.items()}
+    stems = {PurePosixPath(name).stem: name for name in reversed(lowered)}
+    package = _Package(lowered, shown, stems)
     found = [*package.root(_DIAGRAM).children]
     found += [
         child for name in (_DEFAULTS, _STATEFLOW) if name in package.parts for child in package.of(name)
@@ -75,6 +81,9 @@ def as_tree(parts: Mapping[str, bytes], shown: str) -> Node:
 class _Package:
     parts: Mapping[str, bytes]
     shown: str
+    stems: Mapping[str, str]
+    sections: Iterator[int] = field(default_factory=lambda: count(1))
+    references: Iterator[int] = field(default_factory=lambda: count(1))
 
     @property
     def settings(self) -> list[str]:
@@ -97,6 +106,8 @@ class _Package:
         return root.children if root.kind in ("BlockDiagramDefaults", "ModelInformation") else (root,)
 
     def _node(self, element: Element, within: tuple[str, ...]) -> Node:
+        if next(self.sections) > _MAX_SECTIONS:
+            raise SpecError(f"{self.shown}: its parts have more than {_MAX_SECTIONS:,} sections together")
         values = dict(element.attrib)
         children: list[Node] = []
         for child in _ungrouped(element):
@@ -111,9 +122,11 @@ class _Package:
     def _referenced(self, element: Element, within: tuple[str, ...]) -> Node:
         """Return the root section of the part that an element stands for."""
         stem = element.attrib["Ref"].lower()
-        name = next((n for n in self.parts if PurePosixPath(n).stem == stem), f"{stem}.xml")
+        name = self.stems.get(stem, f"{stem}.xml")
         if name in within or len(within) > _MAX_NESTING:
             raise SpecError(f"{self.shown}: {within[-1]}: refers to {name}, which contains it")
+        if next(self.references) > _MAX_REFERENCES:
+            raise SpecError(f"{self.shown}: its parts refer to others more than {_MAX_REFERENCES:,} times")
         return self.root(name, within)
 
 

@@ -27,7 +27,10 @@ def read_diagram(path: Path) -> Diagram:
         SpecError: if it cannot be read; names the part, or the line.
         ModelError: if a ``.slx`` file is not a zip archive, or a dangerous one.
     """
-    return diagram_of(_tree(path), str(path))
+    try:
+        return diagram_of(_tree(path), str(path))
+    except RecursionError:
+        raise SpecError(f"{path}: its systems are nested too deep to be read") from None
 
 
 def diagram_of(tree: Node, shown: str) -> Diagram:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from falsifier.context.simulink.diagram import Chart, ChartData, State, Transition
 from falsifier.context.simulink.tree import Node
 
+_MAX_NESTING = 100  # of states
 _KINDS = ("state", "transition", "data", "junction")
 _SCOPE = re.compile(r"(?P<scope>\w+?)(_DATA)?$")
 _INTEGER = re.compile(r"-?\d+")
@@ -55,7 +56,7 @@ def _listed(tree: Node) -> Mapping[str, list[_Item]]:
     found: dict[str, list[_Item]] = {}
     for child in beside:
         parent = around = parents[child.get("id")]
-        for _ in parents:  # from state to state, up to the chart; at most as often as there are items
+        for _ in range(_MAX_NESTING):  # from state to state, up to the chart
             if around in charts or around not in parents:
                 break
             around = parents[around]
@@ -89,7 +90,7 @@ def _chart(node: Node, items: list[_Item]) -> Chart:
 
 def _full_name(key: str, states: Mapping[str, _Item]) -> str:
     names: list[str] = []
-    while key in states and len(names) <= len(states):
+    while key in states and len(names) <= _MAX_NESTING:
         names.append(_first_line(states[key].node))
         key = states[key].parent
     return ".".join(reversed(names))

@@ -6,6 +6,9 @@ from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagra
 from falsifier.context.simulink.upstream import Place
 from falsifier.core.words import counted
 
+# What leads to each port of each block: its source and the signal's name.
+_Leading = Mapping[str, Mapping[str, tuple[End, str]]]
+
 
 def names_text(diagram: Diagram) -> str:
     """Return the names of a diagram: inports, outports, blocks by system, signals, states."""
@@ -76,18 +79,17 @@ def _block(block: Block) -> str:
     return f"{block.name}: {kind}{number}{f' ({stated})' if stated else ''}{reference}{off}"
 
 
-def _leading(system: BlockSystem) -> Mapping[End, tuple[End, str]]:
-    """What leads to each input: its source and the signal's name."""
-    return {
-        target: (wire.source, wire.name)
-        for wire in system.wires
-        if wire.source is not None
-        for target in wire.targets
-    }
+def _leading(system: BlockSystem) -> _Leading:
+    found: dict[str, dict[str, tuple[End, str]]] = {}
+    for wire in system.wires:
+        if wire.source is not None:
+            for target in wire.targets:
+                found.setdefault(target.block, {})[target.port] = (wire.source, wire.name)
+    return found
 
 
-def _from(block: Block, leading: Mapping[End, tuple[End, str]]) -> str:
-    found = [(end.port, source, name) for end, (source, name) in leading.items() if end.block == block.name]
+def _from(block: Block, leading: _Leading) -> str:
+    found = [(port, source, name) for port, (source, name) in leading.get(block.name, {}).items()]
     if not found:
         return ""
     # Ports in order; named ones, such as enable, last.

@@ -101,7 +101,7 @@ class ParameterLine(_Block):
 class ExcerptLines(_Block):
     """What is told of one file."""
 
-    path: str
+    name: str
     form: str
     text: str
 

@@ -158,7 +158,7 @@ def _context(view: View) -> ContextBlock | None:
         return None
     return ContextBlock(
         comparisons=tuple(c.text for c in view.context.comparisons if not c.signals),
-        files=tuple(ExcerptLines(path=e.path, form=e.form, text=e.text) for e in view.context.excerpts),
+        files=tuple(ExcerptLines(name=e.name, form=e.form, text=e.text) for e in view.context.excerpts),
     )
 
 

@@ -107,7 +107,7 @@ def _context(block: ContextBlock) -> str:
         "those."
     ]
     for file in block.files:
-        lines += [f"--- {file.path} ({file.form}) ---", file.text]
+        lines += [f"--- {file.name} ({file.form}) ---", file.text]
     lines.append("--- end of the files ---")
     if block.comparisons:
         lines.append(f"Other comparisons with constants in them: {'; '.join(block.comparisons)}")

@@ -34,3 +34,20 @@ def test_constants_and_names_of_several_words() -> None:
     diagram = Diagram("m", BlockSystem(blocks, wires), (chart,))
     assert list(comparisons(diagram)) == [("'my gain' != 2.5", "r"), ("'my gain' <= 7", "cmp")]
     assert constants(diagram) == {"limit": "3"}
+
+
+def test_ports_in_expressions_are_named_by_what_leads_to_them() -> None:
+    blocks = (
+        Block("Inport", "u2", number=1),
+        Block("Inport", "Threshold speed", number=2),
+        Block("If", "if", (("IfExpression", "u1 > 3"), ("ElseIfExpressions", "u2 ~= 4, u1 < 1"))),
+        Block("Fcn", "fcn", (("Expr", "u > 5"),)),
+        Block("Switch", "s", (("Criteria", "u2 > Threshold"), ("Threshold", "7"))),
+    )
+    wires = (
+        Wire(End("u2", "1"), (End("if", "1"), End("fcn", "1"))),
+        Wire(End("Threshold speed", "1"), (End("if", "2"), End("s", "2"))),
+    )
+    texts = [text.strip() for text, _ in comparisons(Diagram("m", BlockSystem(blocks, wires)))]
+    speed = "'Threshold speed'"
+    assert texts == ["u2 > 3", f"{speed} != 4", "u2 < 1", "u2 > 5", f"{speed} > 7"]

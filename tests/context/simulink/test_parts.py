@@ -63,3 +63,19 @@ def test_bombs_and_parts_that_are_too_large_are_refused(
         archive.writestr("simulink/blockdiagram.xml", bytes(3 << 20))
     with pytest.raises(SpecError, match=r"blockdiagram\.xml has 3 MiB, more than 1"):
         tree_of(tmp_path / "a.slx")
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [("_MAX_SECTIONS", "more than 99 sections"), ("_MAX_REFERENCES", "more than 99 times")],
+)
+def test_parts_that_multiply_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, message: str
+) -> None:
+    monkeypatch.setattr(parts, limit, 99)
+    twice = '<System><System Ref="system_{0}"/><System Ref="system_{0}"/></System>'
+    systems = {f"simulink/systems/system_{i}.xml": twice.format(i + 1) for i in range(20)}
+    last = {"simulink/systems/system_20.xml": "<System/>"}
+    first = {"simulink/blockdiagram.xml": '<ModelInformation><System Ref="system_0"/></ModelInformation>'}
+    with pytest.raises(SpecError, match=message):
+        tree_of(simulink.write_slx(tmp_path / "a.slx", {**first, **systems, **last}))

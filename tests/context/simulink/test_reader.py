@@ -76,3 +76,12 @@ def test_libraries_and_referenced_models_are_named(tmp_path: Path) -> None:
     diagram = read_diagram(path)
     assert diagram.is_library
     assert diagram.root.blocks[0].reference == "plant.slx"
+
+
+def test_systems_that_are_nested_too_deep_are_refused(tmp_path: Path) -> None:
+    parts = {"simulink/blockdiagram.xml": '<ModelInformation><System Ref="system_0"/></ModelInformation>'}
+    for i in range(150):
+        within = f'<System Ref="system_{i + 1}"/>'
+        parts[f"simulink/systems/system_{i}.xml"] = "<a>" * 50 + within + "</a>" * 50
+    with pytest.raises(SpecError, match=r"a\.slx: its systems are nested too deep"):
+        read_diagram(simulink.write_slx(tmp_path / "a.slx", parts))

@@ -230,7 +230,7 @@ def test_context_makes_mp6_the_default() -> None:
 
 
 def test_only_mp6_tells_context() -> None:
-    excerpt = Excerpt("a.md", "0" * 64, "whole", "THE TEXT")
+    excerpt = Excerpt("/home/me/a.md", "a.md", "0" * 64, "whole", "THE TEXT")
     compared = (Compared(("x",), "x > 3", "a:1"), Compared(("u",), "u < 1", "a:2"), Compared((), "z < 2", ""))
     view = replace(View.of(lag_problem()), context=Context((excerpt,), compared))
     standing = {name: render(build_prompt(view, v, []))[0].content for name, v in VARIANTS.items()}
