@@ -12,8 +12,8 @@ from falsifier.problem.problem import Problem
 def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     """Initialise the model at both ends of the search space, and read the outputs at time 0.
 
-    The model takes one output step at most, a system as many as its slowest component needs for one. What cannot be initialised is left out: the search itself reports
-    such failures.
+    The model takes one output step at most, a system as many as its slowest component needs for one. What
+    cannot be initialised is left out: the search itself reports such failures.
 
     Returns:
         The smaller and the larger value by output name; empty if the model could not be initialised.
