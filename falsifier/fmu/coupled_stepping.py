@@ -43,7 +43,7 @@ from falsifier.fmu.stepping import (
 )
 
 COMPONENT = 3  # in the report, after STATUS, WHERE and STEP
-NOT_CONVERGED, RESTORING = 9, 10  # where a loop stopped, beside those of stepping.py
+NOT_CONVERGED, RESTORING, NOT_A_NUMBER = 9, 10, 11  # where a loop stopped, beside those of stepping.py
 
 # Columns of a component: the functions as for co_simulate, then four tables of ports (Ports.table).
 FUNCTIONS, PLAIN, HELD, SOURCES, RECORDED = 0, 7, 11, 15, 19
@@ -227,6 +227,20 @@ def read_signals(component, time):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def _read(component, time):  # type: ignore[no-untyped-def]
+    """Read a component's connected outputs; return status, and where to stop if one of them is NaN."""
+    status = read_signals(component, time)
+    if status > 1:
+        return status, GETTING
+    for j in range(load_i8(component + 8 * (SOURCES + 3))):
+        value = load_f8(load_i8(component + 8 * SIGNALS) + j * _SIGNAL_BYTES + 8 * VALUE)
+        # Otherwise the component that receives it would fail, and be blamed.
+        if value != value:
+            return status, NOT_A_NUMBER
+    return status, DONE
+
+
+@inlined
 def _copy(source, target, numbers):  # type: ignore[no-untyped-def]
     for i in range(numbers):
         store_i8(target + 8 * i, load_i8(source + 8 * i))
@@ -292,8 +306,7 @@ def _iterate(  # type: ignore[no-untyped-def]
                 status, where, ended = _step(component, start, end, scratch)
                 ends = ends or ended
             if where == DONE:
-                status = read_signals(component, end)
-                where = GETTING if status > 1 else DONE
+                status, where = _read(component, end)
             if where != DONE:
                 report[STATUS], report[COMPONENT] = status, c
                 return where, ends
@@ -411,8 +424,7 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
                 ends = True
                 report[COMPONENT] = c
             if where == DONE and not jacobi:
-                status = read_signals(component, end)
-                where = GETTING if status > 1 else DONE
+                status, where = _read(component, end)
             if where != DONE:
                 report[STATUS], report[COMPONENT] = status, c
                 break
@@ -421,9 +433,8 @@ def co_simulate_system(  # type: ignore[no-untyped-def]
             for c in range(number):
                 component = components + c * _COMPONENT_BYTES
                 if (k + 1) % load_i8(component + 8 * EVERY) == 0:
-                    status = read_signals(component, end)
-                    if status > 1:
-                        where = GETTING
+                    status, where = _read(component, end)
+                    if where != DONE:
                         report[STATUS], report[COMPONENT] = status, c
                         break
         if where != DONE:

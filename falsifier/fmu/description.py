@@ -203,9 +203,9 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         platforms=platforms,
         tool=tool,
         start_time=start_time,
-        stop_time=_number(experiment.get("stopTime")),
-        step_size=_number(experiment.get("stepSize")),
-        tolerance=_number(experiment.get("tolerance")),
+        stop_time=_positive(experiment.get("stopTime")),
+        step_size=_positive(experiment.get("stepSize")),
+        tolerance=_positive(experiment.get("tolerance")),
         variables=marked,
         notes=remarks(root, marked, start_time=start_time, tool=tool, needs_tool=needs_tool),
     )
@@ -439,6 +439,12 @@ def _child(root: Element, tag: str) -> Mapping[str, str]:
 def _number(text: str | None) -> float | None:
     number = None if text is None else float(text)
     return number if number is not None and isfinite(number) else None  # NaN and infinity limit nothing
+
+
+def _positive(text: str | None) -> float | None:
+    """Return a time or tolerance of the default experiment; None if no simulation could use it."""
+    number = _number(text)
+    return number if number is not None and number > 0.0 else None
 
 
 def _limit(text: str | None) -> float | None:

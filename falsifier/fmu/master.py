@@ -138,10 +138,17 @@ class Master:
         status, where, _, position = self._report.tolist()
         if where == loops.NOT_CONVERGED:
             raise SimulationError(self._open_loop(position, reached), time=reached)
+        if where == loops.NOT_A_NUMBER:
+            self._fail(position, f"{self._not_numbers(position)} became nan", reached)
         if where == loops.RESTORING:
             self._fail(position, f"saving or restoring the state returned {status_name(status)}", reached)
         if where != stepping.DONE:
             self._fail(position, what_stopped(stepping, status, where), reached)
+
+    def _not_numbers(self, position: int) -> str:
+        values, member = self._tables.signals[:, loops.VALUE], self._network.order[position]
+        own = [k for k in np.flatnonzero(np.isnan(values)).tolist() if self._tables.members[k] == member]
+        return ", ".join(self._tables.titles[k] for k in own[:_SHOWN])
 
     def _open_loop(self, first: int, reached: float) -> str:
         network, signals = self._network, self._tables.signals

@@ -64,6 +64,8 @@ def remarks(
             f"the default experiment starts at {start_time:g} s; here simulations start at 0 s and end at "
             "the stop time"
         )
+    if unusable := _not_positive(root):
+        said.append(f"ignored in the default experiment, as not greater than 0: {_listed(unusable)}")
     if needs_tool:
         said.append(needed_tool_text(tool, needs_tool))
     if clocks := tuple(input_clocks(root).values()):
@@ -75,6 +77,12 @@ def remarks(
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:
         said.append(f"two names of one input: {_listed(aliases)}; use the second")
     return tuple(said)
+
+
+def _not_positive(root: Element) -> list[str]:
+    stated = {k: v for e in root.findall("DefaultExperiment") for k, v in e.attrib.items()}
+    times = {k: stated[k] for k in ("stopTime", "stepSize", "tolerance") if k in stated}
+    return [f"{k} = {v}" for k, v in times.items() if float(v) <= 0.0]
 
 
 def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:

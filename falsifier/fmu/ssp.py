@@ -76,6 +76,7 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
         structure = _walk_file(Package(path, str(path)), "", flat, ())
     except RecursionError:
         raise SpecError(f"{path}: its systems are nested too deeply; flatten them") from None
+    _check_times(structure, flat.shown)
     connections: dict[str, Connection | str] = {}
     inputs: dict[End, list[End]] = {}
     notes: list[str] = []
@@ -107,6 +108,16 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
         )
     except (SpecError, ModelError) as error:
         raise SpecError(f"{path}: {error}") from None
+
+
+def _check_times(structure: Structure, shown: str) -> None:
+    """Refuse a default experiment that ends before it starts, or before 0, where simulations start."""
+    start, stop = structure.start_time or 0.0, structure.stop_time
+    if stop is not None and stop <= max(start, 0.0):
+        raise SpecError(
+            f"{shown}: DefaultExperiment: the stop time {stop:g} s must be after the start time {start:g} s, "
+            "and after 0, at which simulations start; correct the package, or leave the stop time out"
+        )
 
 
 def is_package(path: str | Path) -> bool:

@@ -9,6 +9,7 @@ from fractions import Fraction
 from math import ceil, gcd, lcm
 
 from falsifier.errors import FormulaError, SpecError
+from falsifier.problem.sizes import check_steps
 from falsifier.stl import Formula, parse
 
 # Number of intervals if the FMU specifies no step.
@@ -51,8 +52,11 @@ def choose_grid(
         step_size: communication step in s, if it is stated; the interval is a multiple of it, if possible.
 
     Raises:
-        SpecError: if only a very fine grid fits.
+        SpecError: if only a very fine grid fits, or a step is far too short for the stop time.
     """
+    # Otherwise the search below for a round interval would take minutes.
+    check_steps(stop_time, fmu_step or None, file="", key="model.output_interval")
+    check_steps(stop_time, step_size, file="", key="model.step_size")
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
     common = _common(stop, *named)
@@ -124,7 +128,8 @@ def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> in
         return count
     if step_size is None or common % step_size:
         # Thirds of a second have no end in decimals, however many digits are looked at.
-        return min(range(count, 2 * count + 1), key=lambda n: (min(_digits(common / n), _MANY_DIGITS), n))
+        candidates = range(count, min(2 * count, count + _MAX_INTERVALS) + 1)
+        return min(candidates, key=lambda n: (min(_digits(common / n), _MANY_DIGITS), n))
     steps = int(common / step_size)
     return next(n for n in range(min(count, steps), steps + 1) if not steps % n)
 

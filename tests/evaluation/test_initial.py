@@ -18,6 +18,12 @@ def test_an_fmu_is_initialised_without_a_whole_simulation() -> None:
     problem.model.close()
 
 
+def test_a_component_whose_step_is_longer_than_an_output_step_is_no_hindrance() -> None:
+    problem = load_problem("ATsplit1")  # the shift logic runs every 0.04 s, the outputs are read every 0.01 s
+    assert start_values(problem)["car.rpm"] == (1000.0, 1000.0)
+    problem.model.close()
+
+
 def _fails(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
     raise ValueError("no start")
 

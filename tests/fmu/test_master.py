@@ -164,6 +164,17 @@ def test_components_of_a_loop_that_fail_while_they_iterate_are_named() -> None:
         run(model, "plant.y", parameters={"bad.misdeed": 9, "pi.k": 1.0})
 
 
+@pytest.mark.parametrize("coupling", [Coupling(), Coupling(method="jacobi"), Coupling(loops="iterate")])
+def test_an_output_that_becomes_nan_is_named_and_not_the_component_that_receives_it(
+    coupling: Coupling,
+) -> None:
+    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
+    plant = "Lead_2" if coupling.loops == "iterate" else "Plant_2"
+    model = system({"plant": plant, "pi": "Gain_2", "bad": "Misdeeds_2"}, links, coupling)
+    with pytest.raises(SimulationError, match=r"^bad: bad\.y became nan at t = 0\.5 s"):
+        run(model, "plant.x", parameters={"bad.misdeed": 5.0, "pi.k": 1.0})
+
+
 def test_discrete_inputs_of_fmi_3_change_at_events() -> None:
     """The second Ticker counts its events; its input is continuous, those of Echo are discrete."""
     model = system(

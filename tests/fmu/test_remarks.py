@@ -34,3 +34,11 @@ def test_many_names_are_counted_instead_of_listed() -> None:
 def test_a_needed_tool_is_named_if_it_is_known() -> None:
     assert "(Tool 1)" in needed_tool_text("Tool 1", ("co-simulation",))
     assert "()" not in needed_tool_text("", ("co-simulation",))
+
+
+def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() -> None:
+    root = ElementTree.fromstring(
+        '<fmi><DefaultExperiment startTime="0" stopTime="-1" stepSize="0" tolerance="1e-6"/></fmi>'
+    )
+    (said,) = remarks(root, (), start_time=0.0, tool="", needs_tool=())
+    assert said == "ignored in the default experiment, as not greater than 0: stopTime = -1, stepSize = 0"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.signals import Signal
+from falsifier.errors import SpecError
 from falsifier.fmu import System, read_package, ssp
 from tests.fmu import packages
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
@@ -277,3 +278,10 @@ def test_entities_are_not_expanded(tmp_path: Path) -> None:
     file = write(tmp_path / "bomb.ssp", text.replace('name="test"', 'name="&i;"'), "Plant_2")
     with pytest.raises(Exception, match=r"bomb\.ssp: .*not well-formed XML"):
         read_package(file)
+
+
+@pytest.mark.parametrize("times", ['stopTime="-1"', 'stopTime="0"', 'startTime="5" stopTime="2"'])
+def test_a_default_experiment_that_ends_before_it_starts_is_refused(tmp_path: Path, times: str) -> None:
+    ssd = structure(system(PLANT + PI, FEEDBACK), after=f"<ssd:DefaultExperiment {times}/>")
+    with pytest.raises(SpecError, match=r"DefaultExperiment: the stop time -?\d s must be after the start"):
+        read_package(write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2"))

@@ -52,6 +52,14 @@ def test_times_that_fit_no_reasonable_grid_are_an_error() -> None:
         choose_grid(10.0, times=[3.14159265, 2.71828183])
 
 
+@pytest.mark.parametrize(("fmu_step", "step_size"), [(3e-7, None), (3e-7, 0.1), (None, 7e-9)])
+def test_a_step_that_is_far_too_short_for_the_stop_time_is_an_error(
+    fmu_step: float | None, step_size: float | None
+) -> None:
+    with pytest.raises(SpecError, match=r"gives more than 10,000,000 steps up to the stop time 10 s"):
+        choose_grid(10.0, fmu_step=fmu_step, step_size=step_size)
+
+
 def test_times_are_those_that_were_meant() -> None:
     assert exact(0.1) == Fraction(1, 10)
     assert exact(1 / 3) == Fraction(1, 3)

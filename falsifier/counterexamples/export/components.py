@@ -247,12 +247,21 @@ def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
 
 def _inputs(member: Member, seen: Seen) -> Iterator[str]:
     for name, column in seen.inputs.columns.items():
-        low, high = float(column.min()), float(column.max())
-        if low == high and member.description.info[name].kind == "real":
-            high = low + 1.0
+        low, high = _range(column, member.description.info[name])
         if low < high:
             yield from ("", f"[inputs.{json.dumps(name)}]", f"range = [{low!r}, {high!r}]")
             yield f"control_points = {DEFAULT_POINTS}"
+
+
+def _range(column: Floats, variable: Variable) -> tuple[float, float]:
+    """Return the range of an input; of a constant real one some range that the FMU allows."""
+    low, high = float(column.min()), float(column.max())
+    if low == high and variable.kind == "real":
+        high = low + 1.0
+        if variable.high is not None and high > variable.high:
+            low, high = low - 1.0, low
+    least = low if variable.low is None else max(low, variable.low)
+    return least, high if variable.high is None else min(high, variable.high)
 
 
 def _around(column: Floats) -> tuple[float, float]:
