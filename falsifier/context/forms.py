@@ -68,7 +68,7 @@ def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     found = [
         threshold
         for text, place in comparisons(diagram, only)
-        for threshold in thresholds([(text, 0)], constants(diagram), f"{diagram.name}/{place}")
+        for threshold in thresholds([(text, 0)], constants(diagram, place), f"{diagram.name}/{place}")
     ]
     whole = "structure" if only is None else "structure, as far as the requirement depends on it"
     forms = (

@@ -54,15 +54,17 @@ def gather(
             found = _text_source(content, f"{fmu.name}: {name}", seeds, signals, is_named=False)
             if len(found.readable.forms) > 1:  # otherwise it says nothing about the signals
                 sources.append(found)
-    chosen = _fitting(sources)
+    chosen, compared = _fitting(sources), tuple(_compared(sources, signals))
     for source, (_, text) in zip(sources, chosen, strict=True):
         _refuse_secrets(text, f"{source.path}, as it is told")  # what encodings may have hidden before
+    for each in compared:
+        _refuse_secrets(each.text, each.place)
     return Context(
         tuple(
             Excerpt(s.path, s.name, s.sha256, _shortened(s.readable.forms, i), text)
             for s, (i, text) in zip(sources, chosen, strict=True)
         ),
-        tuple(_compared(sources, signals)),
+        compared,
     )
 
 

@@ -30,13 +30,13 @@ def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iter
             yield from ((text, chart.name) for text in texts if text)
 
 
-def constants(diagram: Diagram) -> Mapping[str, str]:
-    """Return the values of variables of charts that do not change."""
+def constants(diagram: Diagram, place: str) -> Mapping[str, str]:
+    """Return the values of the variables of the chart at a place that do not change; none of a block."""
     return {
         data.name: data.initial
         for chart in diagram.charts
         for data in chart.data
-        if data.initial and data.scope in ("constant", "parameter")
+        if chart.name == place and data.initial and data.scope in ("constant", "parameter")
     }
 
 

@@ -31,9 +31,11 @@ def test_constants_and_names_of_several_words() -> None:
         Wire(End("c", "1"), (End("r", "2"),)),
     )
     chart = Chart("C", data=(ChartData("limit", "constant", "3"), ChartData("x", "local", "1")))
-    diagram = Diagram("m", BlockSystem(blocks, wires), (chart,))
+    other = Chart("D", data=(ChartData("limit", "constant", "4"),))
+    diagram = Diagram("m", BlockSystem(blocks, wires), (chart, other))
     assert list(comparisons(diagram)) == [("'my gain' != 2.5", "r"), ("'my gain' <= 7", "cmp")]
-    assert constants(diagram) == {"limit": "3"}
+    assert constants(diagram, "C") == {"limit": "3"}
+    assert constants(diagram, "r") == {}, "blocks do not see the variables of charts"
 
 
 def test_ports_in_expressions_are_named_by_what_leads_to_them() -> None:
