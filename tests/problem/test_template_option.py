@@ -38,6 +38,10 @@ def test_a_template_becomes_the_formula_of_its_simulation(tmp_path: Path) -> Non
         ("AT1", "rise signal=speed reference=80", r"--template: time: this key is missing"),
         ("AT1", "raise signal=speed", r"--template: template: no such template; did you mean 'rise'"),
         (str(AT), "rise signal=sped reference=80 time=10", r"--template: signal: unknown signal 'sped'"),
+        (str(AT), "stays_within signal=speed", r"^--template: expected low, high or both"),
+        ("AT1", "dwell condition=gear>2", r"^--template: expected at_least, at_most or both"),
+        ("AT1", f"{RISE} stop_time=10", r"^--template: stop_time: .*other options \(--stop-time"),
+        (str(AT), f"{RISE} description=fast", r"^--template: description: "),
         ("python:tests.problems:easy", RISE, "made in Python"),
     ],
 )
