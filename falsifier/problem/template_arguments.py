@@ -114,6 +114,8 @@ class Template(BaseModel):
     # Arguments that name signals.
     terms: ClassVar[tuple[str, ...]] = ()
     conditions_in: ClassVar[tuple[str, ...]] = ()
+    # Arguments that are times in s.
+    times: ClassVar[tuple[str, ...]] = ()
 
     def expanded(self, stop_time: float, step: float = 0.0) -> str:
         """Return the text of the formula.
@@ -193,12 +195,20 @@ def after_moment(
         raise TemplateError("during", "applies only if after is a condition; state the time in after")
     end = grid.stop_time if lasts is None else after + lasts
     start = after + (getattr(template, "time", 0.0) if lasts is None else 0.0)
-    if max(start, end) > grid.stop_time:
+    needed = max(start, end)
+    if needed > grid.stop_time:
         raise TemplateError(
-            "after",
-            f"needs values up to {max(start, end):g} s, but the simulation ends at {grid.stop_time:g} s",
+            _longest(template),
+            f"needs values up to {needed:g} s, but the simulation ends at {grid.stop_time:g} s: shorten the "
+            "times or simulate longer",
         )
     return body(after, end)
+
+
+def _longest(template: Template) -> str:
+    """Return the argument to name if a requirement needs more time than there is."""
+    times = {key: t for key in template.times if isinstance(t := getattr(template, key), int | float)}
+    return max(times, key=times.__getitem__) if times else (*template.conditions_in, "during")[0]
 
 
 def each_time(
@@ -227,11 +237,13 @@ def span(template: Template, grid: Grid, reach: float, during: tuple[float, floa
             "during", f"expected [start, end] with 0 <= start <= end, got [{start:g}, {end:g}]"
         )
     if end > latest + 1e-9 * grid.stop_time or latest < 0:
+        needed = grid.stop_time - latest + (0.0 if during is None else end)
+        cure = "shorten the times or simulate longer"
+        if during is not None and latest >= start:
+            cure = f"end the window at {latest:g} s, {cure}"
         raise TemplateError(
-            "during",
-            f"it needs {grid.stop_time - latest:g} s beyond its window, and the simulation ends at "
-            f"{grid.stop_time:g} s: end the window at {max(latest, 0.0):g} s, shorten the times or simulate "
-            "longer",
+            _longest(template) if during is None else "during",
+            f"needs values up to {needed:g} s, but the simulation ends at {grid.stop_time:g} s: {cure}",
         )
     return window_of(start, end)
 

@@ -54,7 +54,7 @@ def _check_keys(arguments: Mapping[str, object]) -> None:
     beside = next((key for key in arguments if key in _BESIDE), None)
     if beside is not None:
         raise SpecError(
-            "a template on the command line has no such argument; simulations are changed by the other options "
+            "no argument of a template on the command line; simulations are changed by the other options "
             "(--stop-time, --input, --param, ...), or write a spec with [requirements.NAME]",
             file=_OPTION,
             key=beside,
