@@ -42,6 +42,7 @@ def test_a_template_becomes_the_formula_of_its_simulation(tmp_path: Path) -> Non
         ("AT1", "dwell condition=gear>2", r"^--template: expected at_least, at_most or both"),
         ("AT1", f"{RISE} stop_time=10", r"^--template: stop_time: .*other options \(--stop-time"),
         (str(AT), f"{RISE} description=fast", r"^--template: description: "),
+        ("AT1", "ramp_limit signal=speed limit=9", r"rate: the model has no der\(speed\): .*; or over,"),
         ("python:tests.problems:easy", RISE, "made in Python"),
     ],
 )
