@@ -89,9 +89,9 @@ def formalize(
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
     checked, said back in words, told apart from the others by an example and judged on one simulation.
-    Without --llm, templates that may fit are shown.
+    Without --llm, templates that may fit are shown, and nothing is written.
     """
-    from falsifier.views.readings_text import advice_text, formalized_json, formalized_text
+    from falsifier.views.readings_text import advice_json, advice_text, formalized_json, formalized_text
 
     settings = connection_settings(options)
     if settings is None:
@@ -99,7 +99,8 @@ def formalize(
             raise click.UsageError("--choose: there are readings only with --llm NAME")
         from falsifier.problem.template_advice import advised_templates
 
-        say(advice_text(advised_templates(sentence, subject_of(target).problem.info)))
+        advice = advised_templates(sentence, subject_of(target).problem.info)
+        say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(advice))
         return
     from falsifier.search.formalize import formalize as ask
 

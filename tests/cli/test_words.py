@@ -101,6 +101,9 @@ def test_without_a_language_model_a_template_is_proposed(tmp_path: Path) -> None
     done = falsifier("formalize", "AT1", "The speed reaches 80 in 10 s.", cwd=tmp_path)
     assert done.code == 0, done.err
     assert 'template = "rise"\n  signal = "speed"' in done.out
+    found = falsifier("formalize", "AT1", "The speed reaches 80 in 10 s.", "--json", cwd=tmp_path).json
+    assert isinstance(found, dict)
+    assert [one["template"] for one in found["templates"]] == ["rise"]
     assert falsifier("formalize", "AT1", "x", "--choose", "1", cwd=tmp_path).code == 2
 
 
