@@ -1,6 +1,6 @@
 """What templates of requirements have in common: their arguments, and the windows in which they apply."""
 
-import shlex
+import re
 import tomllib
 from collections.abc import Callable, Iterator
 from math import floor, isfinite
@@ -15,6 +15,9 @@ from falsifier.stl.formula import Always, And, Implies, Next, Not, Predicate, Wi
 
 # Decimals of times in s; finer than any grid.
 _DECIMALS = 9
+_QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
+# One argument on the command line: spaces only in quotes, and between the quoted texts of a list.
+_ARGUMENT = re.compile(rf"""(?:=\[\s*{_QUOTED}(?:\s*,\s*{_QUOTED})*\s*,?\s*\]|{_QUOTED}|[^\s"'])+""")
 
 
 class TemplateError(FalsifierError):
@@ -267,7 +270,7 @@ def tidy(value: float) -> float:
 def template_arguments(text: str) -> dict[str, Any]:
     """Return the section for a template on the command line: its name, then ``key=value`` in any order.
 
-    Values are written as in TOML; text needs no quotes of its own.
+    Values are written as in TOML; text needs no quotes of its own unless it contains spaces.
 
     >>> template_arguments("settles signal=speed reference=80 within=2% time=3")["reference"]
     80
@@ -275,19 +278,23 @@ def template_arguments(text: str) -> dict[str, Any]:
     Raises:
         FormulaError: naming what is not ``key=value``.
     """
-    try:
-        name, *pairs = shlex.split(text)
-    except ValueError as error:
+    rest = _ARGUMENT.sub("", text).strip()
+    if rest or not text.strip():
+        problem = f"{rest}: a quote has no end" if rest else "empty"
         raise FormulaError(
-            f"--template: {error or 'empty'}; write a template and its arguments: 'settles signal=speed ...'"
-        ) from None
+            f"--template: {problem}; write a template and its arguments: 'settles signal=speed ...'"
+        )
+    name, *pairs = _ARGUMENT.findall(text)
     found: dict[str, Any] = {"template": name}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or key in found:
-            raise FormulaError(f"--template: {pair}: expected each argument once, as key=value")
+            raise FormulaError(
+                f"--template: {pair}: expected each argument once, as key=value; spaces need quotes: "
+                "when='speed > 5'"
+            )
         try:
             found[key] = tomllib.loads(f"v = {value}")["v"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):  # also integers of too many digits, and deep nesting
             found[key] = value
     return found
