@@ -1,6 +1,7 @@
 """``falsifier lint`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -117,7 +118,7 @@ def formalize(
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
     else:
         file, given = _write(found, choose, name, out)
-        say(f"{file}: [requirements.{given}] written; to search: falsifier run {file}:{given}")
+        say(f"{file}: requirement {given} written; to search: falsifier run {shlex.quote(f'{file}:{given}')}")
 
 
 def _may_ask() -> bool:
