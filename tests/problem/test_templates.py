@@ -194,7 +194,7 @@ def test_what_does_not_fit_the_simulation_names_the_argument(
             {"signal": "x", "low": 1, "reference": 2, "within": 1},
             "expected low, high or both",
         ),
-        ("never_together", {"conditions": ["a"]}, r"R\.conditions: "),
+        ("never_together", {"conditions": ["a"]}, r"R\.conditions: expected at least 2 items, got 1"),
         ("dwell", {"condition": "a"}, "expected at_least"),
         ("dwell", {"condition": "a", "at_least": 2, "at_most": 1}, "more than at_most"),
         ("ramp_limit", {"signal": "x", "limit": 1, "over": 1}, "over and range together"),
