@@ -16,8 +16,8 @@ from falsifier.stl.formula import Always, And, Implies, Next, Not, Predicate, Wi
 # Decimals of times in s; finer than any grid.
 _DECIMALS = 9
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
-# One argument on the command line: spaces only in quotes, and between the quoted texts of a list.
-_ARGUMENT = re.compile(rf"""(?:=\[\s*{_QUOTED}(?:\s*,\s*{_QUOTED})*\s*,?\s*\]|{_QUOTED}|[^\s"'])+""")
+# One argument on the command line: spaces only in quotes and in lists.
+_ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
 
 class TemplateError(FalsifierError):

@@ -22,6 +22,7 @@ def test_quotes_and_lists_are_those_of_toml() -> None:
     text = """never_together conditions=["a > 1", 'F[0,2] (b > 1)'] during=[0,5]"""
     assert template_arguments(text)["conditions"] == ["a > 1", "F[0,2] (b > 1)"]
     assert template_arguments("order conditions=['a','b']")["conditions"] == ["a", "b"]
+    assert template_arguments("order during=[0, 5] on=true")["during"] == [0, 5]
     assert template_arguments("rise signal=car.'front left'.v")["signal"] == "car.'front left'.v"
     assert template_arguments("rise signal='\"G\"'")["signal"] == '"G"'
     assert template_arguments(f"rise time={'9' * 5000}")["time"] == "9" * 5000
