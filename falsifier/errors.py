@@ -6,6 +6,7 @@ failed.
 """
 
 import difflib
+import re
 from collections.abc import Iterable
 from typing import Any, Literal
 
@@ -163,6 +164,10 @@ def rejected(message: str, given: object) -> str:
     "expected 'free' or 'fixed', got 'fixd'"
     """
     message = message.removeprefix("Value error, ")
+    if sizes := re.fullmatch(
+        r"\w+ should have at (least|most) (\d+) items? after validation, not (\d+)", message
+    ):
+        return f"expected at {sizes[1]} {sizes[2]} items, got {sizes[3]}"
     if not message.startswith("Input should"):
         return message
     message = next((own for begin, own in _VALIDATORS if message.startswith(begin)), "expected {}").format(

@@ -1,6 +1,7 @@
 """``falsifier lint`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -89,9 +90,9 @@ def formalize(
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
     checked, said back in words, told apart from the others by an example and judged on one simulation.
-    Without --llm, templates that may fit are shown.
+    Without --llm, templates that may fit are shown, and nothing is written.
     """
-    from falsifier.views.readings_text import advice_text, formalized_json, formalized_text
+    from falsifier.views.readings_text import advice_json, advice_text, formalized_json, formalized_text
 
     settings = connection_settings(options)
     if settings is None:
@@ -99,7 +100,8 @@ def formalize(
             raise click.UsageError("--choose: there are readings only with --llm NAME")
         from falsifier.problem.template_advice import advised_templates
 
-        say(advice_text(advised_templates(sentence, subject_of(target).problem.info)))
+        advice = advised_templates(sentence, subject_of(target).problem.info)
+        say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(advice))
         return
     from falsifier.search.formalize import formalize as ask
 
@@ -116,7 +118,7 @@ def formalize(
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
     else:
         file, given = _write(found, choose, name, out)
-        say(f"{file}: [requirements.{given}] written; to search: falsifier run {file}:{given}")
+        say(f"{file}: requirement {given} written; to search: falsifier run {shlex.quote(f'{file}:{given}')}")
 
 
 def _may_ask() -> bool:

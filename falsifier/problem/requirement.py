@@ -9,6 +9,7 @@ from falsifier.errors import FormulaError, SpecError, did_you_mean
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.spec import Spec
 from falsifier.problem.template_arguments import TemplateError
+from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.renaming import renamed
 
@@ -83,9 +84,13 @@ def expanded(spec: Spec, requirement: str, info: ModelInfo, experiment: Experime
     section, key = spec.requirements[requirement], f"requirements.{requirement}"
     for argument, name in section.signals():
         if name not in info:
-            raise SpecError(
-                f"unknown signal {name!r}; {similar(name, info)}", file=file, key=f"{key}.{argument}"
-            )
+            message = f"unknown signal {name!r}; {similar(name, info)}"
+            if isinstance(section, RampLimit) and argument == "rate" and section.rate is None:
+                message = (
+                    f"the model has no {name}: state rate, the signal that is this rate of change; or over, "
+                    "a time in s, and range, [low, high]"
+                )
+            raise SpecError(message, file=file, key=f"{key}.{argument}")
     try:
         return section.expanded(experiment.stop_time, experiment.output_interval)
     except TemplateError as error:

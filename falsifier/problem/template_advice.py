@@ -71,9 +71,12 @@ def advised_templates(sentence: str, info: ModelInfo, *, most: int = 2) -> list[
 
 def mentioned_signals(sentence: str, info: ModelInfo) -> list[str]:
     """Return the signals whose names, or words of whose descriptions, occur in a sentence; best first."""
-    words = set(re.findall(r"[a-z]{3,}", sentence.lower()))
+    words, whole = set(re.findall(r"[a-z]{3,}", sentence.lower())), set(re.findall(r"[\w.]*\w", sentence))
     variables = [v for v in (*info.outputs, *info.inputs) if v.kind != "string"]
-    named = {v.name: 2 * len(words & _parts(v.name)) + len(words & _parts(v.description)) for v in variables}
+    named = {
+        v.name: (v.name in whole) + 2 * len(words & _parts(v.name)) + len(words & _parts(v.description))
+        for v in variables
+    }
     return sorted((name for name in named if named[name]), key=lambda name: -named[name])
 
 

@@ -1,6 +1,6 @@
 """What templates of requirements have in common: their arguments, and the windows in which they apply."""
 
-import shlex
+import re
 import tomllib
 from collections.abc import Callable, Iterator
 from math import floor, isfinite
@@ -15,6 +15,9 @@ from falsifier.stl.formula import Always, And, Implies, Next, Not, Predicate, Wi
 
 # Decimals of times in s; finer than any grid.
 _DECIMALS = 9
+_QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
+# One argument on the command line: spaces only in quotes and in lists.
+_ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
 
 class TemplateError(FalsifierError):
@@ -114,6 +117,8 @@ class Template(BaseModel):
     # Arguments that name signals.
     terms: ClassVar[tuple[str, ...]] = ()
     conditions_in: ClassVar[tuple[str, ...]] = ()
+    # Arguments that are times in s.
+    times: ClassVar[tuple[str, ...]] = ()
 
     def expanded(self, stop_time: float, step: float = 0.0) -> str:
         """Return the text of the formula.
@@ -193,12 +198,20 @@ def after_moment(
         raise TemplateError("during", "applies only if after is a condition; state the time in after")
     end = grid.stop_time if lasts is None else after + lasts
     start = after + (getattr(template, "time", 0.0) if lasts is None else 0.0)
-    if max(start, end) > grid.stop_time:
+    needed = max(start, end)
+    if needed > grid.stop_time:
         raise TemplateError(
-            "after",
-            f"needs values up to {max(start, end):g} s, but the simulation ends at {grid.stop_time:g} s",
+            _longest(template),
+            f"needs values up to {needed:g} s, but the simulation ends at {grid.stop_time:g} s: shorten the "
+            "times or simulate longer",
         )
     return body(after, end)
+
+
+def _longest(template: Template) -> str:
+    """Return the argument to name if a requirement needs more time than there is."""
+    times = {key: t for key in template.times if isinstance(t := getattr(template, key), int | float)}
+    return max(times, key=times.__getitem__) if times else (*template.conditions_in, "during")[0]
 
 
 def each_time(
@@ -227,11 +240,13 @@ def span(template: Template, grid: Grid, reach: float, during: tuple[float, floa
             "during", f"expected [start, end] with 0 <= start <= end, got [{start:g}, {end:g}]"
         )
     if end > latest + 1e-9 * grid.stop_time or latest < 0:
+        needed = grid.stop_time - latest + (0.0 if during is None else end)
+        cure = "shorten the times or simulate longer"
+        if during is not None and latest >= start:
+            cure = f"end the window at {latest:g} s, {cure}"
         raise TemplateError(
-            "during",
-            f"it needs {grid.stop_time - latest:g} s beyond its window, and the simulation ends at "
-            f"{grid.stop_time:g} s: end the window at {max(latest, 0.0):g} s, shorten the times or simulate "
-            "longer",
+            _longest(template) if during is None else "during",
+            f"needs values up to {needed:g} s, but the simulation ends at {grid.stop_time:g} s: {cure}",
         )
     return window_of(start, end)
 
@@ -255,7 +270,7 @@ def tidy(value: float) -> float:
 def template_arguments(text: str) -> dict[str, Any]:
     """Return the section for a template on the command line: its name, then ``key=value`` in any order.
 
-    Values are written as in TOML; text needs no quotes of its own.
+    Values are written as in TOML; text needs no quotes of its own unless it contains spaces.
 
     >>> template_arguments("settles signal=speed reference=80 within=2% time=3")["reference"]
     80
@@ -263,19 +278,23 @@ def template_arguments(text: str) -> dict[str, Any]:
     Raises:
         FormulaError: naming what is not ``key=value``.
     """
-    try:
-        name, *pairs = shlex.split(text)
-    except ValueError as error:
+    rest = _ARGUMENT.sub("", text).strip()
+    if rest or not text.strip():
+        problem = f"{rest}: a quote has no end" if rest else "empty"
         raise FormulaError(
-            f"--template: {error or 'empty'}; write a template and its arguments: 'settles signal=speed ...'"
-        ) from None
+            f"--template: {problem}; write a template and its arguments: 'settles signal=speed ...'"
+        )
+    name, *pairs = _ARGUMENT.findall(text)
     found: dict[str, Any] = {"template": name}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or key in found:
-            raise FormulaError(f"--template: {pair}: expected each argument once, as key=value")
+            raise FormulaError(
+                f"--template: {pair}: expected each argument once, as key=value; spaces need quotes: "
+                "when='speed > 5'"
+            )
         try:
             found[key] = tomllib.loads(f"v = {value}")["v"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):  # also integers of too many digits, and deep nesting
             found[key] = value
     return found

@@ -1,5 +1,6 @@
 """Templates on the command line: they become the formula of the problem's own simulation."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from falsifier.errors import SpecError
@@ -10,6 +11,8 @@ from falsifier.problem.spec import AnyRequirement, ModelChanges, Spec, parse_spe
 from falsifier.problem.template_arguments import template_arguments
 
 _OPTION = "--template"
+# Keys of a requirement in a spec that are no arguments of its template.
+_BESIDE = {*ModelChanges.model_fields, "description"}
 
 
 def formula_of_template(source: ProblemSource, text: str) -> str:
@@ -24,24 +27,38 @@ def formula_of_template(source: ProblemSource, text: str) -> str:
         FormulaError: if the text is not of this form.
     """
     arguments = template_arguments(text)
-    kind = source.parts.kind
+    _check_keys(arguments)
+    kind, name = source.parts.kind, _OPTION
     if kind == "python":
         raise SpecError(f"{source.target}: a problem made in Python has its own requirement; drop {_OPTION}")
     try:
         if kind == "fmu":
-            joined = join_fmu(Path(source.target), arguments, changes=source.changes, name=_OPTION)
+            joined = join_fmu(Path(source.target), arguments, changes=source.changes, name=name)
         else:
-            path, name = find_spec(source.target)
+            path, requirement = find_spec(source.target)
             spec = read_spec(path)
-            name = name or next(iter(spec.requirements))
+            name = requirement or next(iter(spec.requirements))
             spec = _with(spec, name, arguments)
             joined = join(spec, name, path=path, profile=source.profile, changes=source.changes)
     except SpecError as error:
         if error.key is None or not error.key.startswith("requirements."):
             raise
         problem = str(error).partition(f"{error.key}: ")[2]
-        raise SpecError(problem, file=_OPTION, key=error.key.rpartition(".")[2]) from None
+        argument = error.key.removeprefix(f"requirements.{name}").removeprefix(".")
+        raise SpecError(problem, file=_OPTION, key=argument or None) from None
     return str(joined.requirement.formula)
+
+
+def _check_keys(arguments: Mapping[str, object]) -> None:
+    """Refuse what only a section of a spec may have: it would shape the formula and not the simulation."""
+    beside = next((key for key in arguments if key in _BESIDE), None)
+    if beside is not None:
+        raise SpecError(
+            "no argument of a template on the command line; simulations are changed by the other options "
+            "(--stop-time, --input, --param, ...), or write a spec with [requirements.NAME]",
+            file=_OPTION,
+            key=beside,
+        )
 
 
 def _with(spec: Spec, name: str, arguments: dict[str, object]) -> Spec:

@@ -63,6 +63,7 @@ class Settles(Template):
     summary: ClassVar[str] = "it is near a reference at the latest some time after a moment, and stays there"
     terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
     conditions_in: ClassVar[tuple[str, ...]] = ("after",)
+    times: ClassVar[tuple[str, ...]] = ("time", "stays", "after")
 
     template: Literal["settles"]
     signal: Term = _SIGNAL
@@ -95,6 +96,7 @@ class Overshoot(Template):
     summary: ClassVar[str] = "it exceeds a reference by at most a margin after a moment"
     terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
     conditions_in: ClassVar[tuple[str, ...]] = ("after",)
+    times: ClassVar[tuple[str, ...]] = ("after", "duration")
 
     template: Literal["overshoot"]
     signal: Term = _SIGNAL
@@ -133,6 +135,7 @@ class Rise(Template):
     )
     terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
     conditions_in: ClassVar[tuple[str, ...]] = ("after",)
+    times: ClassVar[tuple[str, ...]] = ("time", "after")
 
     template: Literal["rise"]
     signal: Term = _SIGNAL
@@ -168,6 +171,7 @@ class Response(Template):
 
     summary: ClassVar[str] = "whenever one condition holds, another one follows within some time"
     conditions_in: ClassVar[tuple[str, ...]] = ("when", "then")
+    times: ClassVar[tuple[str, ...]] = ("time", "stays")
 
     template: Literal["response"]
     when: Condition = Field(description="Condition.")
@@ -211,6 +215,8 @@ class StaysWithin(Template):
         is_near = self.reference is not None and self.within is not None
         if limited == is_near or (self.reference is None) != (self.within is None):
             raise ValueError("expected low, high or both; or reference and within")
+        if isinstance(self.low, float) and isinstance(self.high, float) and self.low > self.high:
+            raise ValueError(f"low is {self.low:g}, more than high, {self.high:g}: exchange them")
         return self
 
     def _formula(self, grid: Grid) -> Formula:
@@ -246,6 +252,7 @@ class Dwell(Template):
 
     summary: ClassVar[str] = "a condition that becomes true holds for at least or at most some time"
     conditions_in: ClassVar[tuple[str, ...]] = ("condition",)
+    times: ClassVar[tuple[str, ...]] = ("at_least", "at_most")
 
     template: Literal["dwell"]
     condition: Condition = Field(description="Condition.")
@@ -283,6 +290,7 @@ class RampLimit(Template):
 
     summary: ClassVar[str] = "it changes by at most so much per second"
     terms: ClassVar[tuple[str, ...]] = ("signal", "rate")
+    times: ClassVar[tuple[str, ...]] = ("over",)
 
     template: Literal["ramp_limit"]
     signal: Term = _SIGNAL

@@ -75,12 +75,16 @@ def _by_operator(first: Formula, second: Formula) -> bool:
 
 
 def _plain(formula: Formula) -> Formula:
-    """Return a formula without a negation in front that can be avoided."""
+    """Return a formula without a negation in front that can be avoided or moved inwards."""
     match formula:
         case Not(Not(operand)):
             return _plain(operand)
         case Not(Predicate(operator, left, right)) if operator in _OPPOSITE:
             return Predicate(_OPPOSITE[operator], left, right)
+        case Not(Always(operand, window)):
+            return Eventually(Not(operand), window)
+        case Not(Eventually(operand, window)):
+            return Always(Not(operand), window)
     return formula
 
 

@@ -1,6 +1,7 @@
 """Readings of a requirement in words, for the terminal and as JSON."""
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 from falsifier.core.literals import one_line
@@ -68,6 +69,11 @@ def advice_text(advice: list[Advice]) -> str:
             lines.append(f"  # numbers of the sentence: {', '.join(one.numbers)}")
     lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
     return "\n".join(lines)
+
+
+def advice_json(sentence: str, advice: list[Advice]) -> dict[str, Any]:
+    """Return the same as a JSON object."""
+    return {"sentence": sentence.strip(), "templates": [asdict(one) for one in advice]}
 
 
 def _reading_lines(number: int, reading: Reading) -> Iterator[str]:

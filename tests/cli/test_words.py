@@ -63,7 +63,9 @@ def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:
     spec(tmp_path, WIDE)
     with serving(REPLY) as server:
         shown = falsifier(*asked(server, "my.toml"), cwd=tmp_path, env=ENV)
-        done = falsifier(*asked(server, "my.toml"), "--choose", "1", "--name", "slow", cwd=tmp_path, env=ENV)
+        done = falsifier(
+            *asked(server, "my.toml"), "--choose", "1", "--name", "too slow", cwd=tmp_path, env=ENV
+        )
         assert len(server.received) == 1  # the second time from the cache
     assert shown.code == 0, shown.err
     assert (
@@ -71,11 +73,11 @@ def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:
         in shown.out
     )
     assert "nominal    robustness +" in shown.out
-    assert "language model: 1 call, 120 tokens (12 for reasoning), 0.0001 US dollars" in shown.out
+    assert "language model: 1 request, 120 tokens (12 for reasoning), 0.0001 US dollars" in shown.out
     assert "--choose N" in shown.out
     assert done.code == 0, done.err
-    assert "my.toml: [requirements.slow] written" in done.out
-    problem = load_problem(str(tmp_path / "my.toml:slow"))
+    assert "my.toml: requirement too slow written; to search: falsifier run 'my.toml:too slow'" in done.out
+    problem = load_problem(str(tmp_path / "my.toml:too slow"))
     assert (str(problem.requirement.formula), problem.requirement.description) == (GOOD["formula"], SENTENCE)
 
 
@@ -101,6 +103,9 @@ def test_without_a_language_model_a_template_is_proposed(tmp_path: Path) -> None
     done = falsifier("formalize", "AT1", "The speed reaches 80 in 10 s.", cwd=tmp_path)
     assert done.code == 0, done.err
     assert 'template = "rise"\n  signal = "speed"' in done.out
+    found = falsifier("formalize", "AT1", "The speed reaches 80 in 10 s.", "--json", cwd=tmp_path).json
+    assert isinstance(found, dict)
+    assert [one["template"] for one in found["templates"]] == ["rise"]
     assert falsifier("formalize", "AT1", "x", "--choose", "1", cwd=tmp_path).code == 2
 
 

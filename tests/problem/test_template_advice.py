@@ -61,3 +61,8 @@ def test_signals_are_found_by_names_and_descriptions() -> None:
     assert mentioned_signals("engine turns and speed of it, engine rpm", INFO) == ["engineRpm", "speed"]
     assert mentioned_signals("nothing of it", INFO) == []
     assert advised_templates("How nice.", INFO) == []
+
+
+def test_signals_are_found_by_their_whole_names() -> None:
+    cars = ModelInfo("cars", variables=tuple(Variable(f"y{k}", causality="output") for k in range(1, 6)))
+    assert mentioned_signals("y5 - y4 stays below 40.", cars) == ["y4", "y5"]

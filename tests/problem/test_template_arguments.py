@@ -6,7 +6,7 @@ from falsifier.problem.template_arguments import template_arguments, term
 
 
 def test_arguments_are_read_as_in_toml_or_as_text() -> None:
-    text = "settles signal=y2-y1 reference=80 within=2% after='brake > 0.5' during=[0,5] stays=\"1\""
+    text = "settles signal=y2-y1 reference=80 within=2% after='brake > 0.5' during=[0,5] stays=1"
     assert template_arguments(text) == {
         "template": "settles",
         "signal": "y2-y1",
@@ -16,6 +16,16 @@ def test_arguments_are_read_as_in_toml_or_as_text() -> None:
         "during": [0, 5],
         "stays": 1,
     }
+
+
+def test_quotes_and_lists_are_those_of_toml() -> None:
+    text = """never_together conditions=["a > 1", 'F[0,2] (b > 1)'] during=[0,5]"""
+    assert template_arguments(text)["conditions"] == ["a > 1", "F[0,2] (b > 1)"]
+    assert template_arguments("order conditions=['a','b']")["conditions"] == ["a", "b"]
+    assert template_arguments("order during=[0, 5] on=true")["during"] == [0, 5]
+    assert template_arguments("rise signal=car.'front left'.v")["signal"] == "car.'front left'.v"
+    assert template_arguments("rise signal='\"G\"'")["signal"] == '"G"'
+    assert template_arguments(f"rise time={'9' * 5000}")["time"] == "9" * 5000
 
 
 @pytest.mark.parametrize("text", ["", "settles signal", "rise time=1 time=2", "rise signal='x"])

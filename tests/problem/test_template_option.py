@@ -34,10 +34,15 @@ def test_a_template_becomes_the_formula_of_its_simulation(tmp_path: Path) -> Non
             "rise signal=sped reference=80 time=10",
             r"--template: signal: unknown signal 'sped'; did you",
         ),
-        ("AT1", "rise signal=speed reference=80 time=51", r"--template: after: needs values up to 51 s"),
+        ("AT1", "rise signal=speed reference=80 time=51", r"--template: time: needs values up to 51 s"),
         ("AT1", "rise signal=speed reference=80", r"--template: time: this key is missing"),
         ("AT1", "raise signal=speed", r"--template: template: no such template; did you mean 'rise'"),
         (str(AT), "rise signal=sped reference=80 time=10", r"--template: signal: unknown signal 'sped'"),
+        (str(AT), "stays_within signal=speed", r"^--template: expected low, high or both"),
+        ("AT1", "dwell condition=gear>2", r"^--template: expected at_least, at_most or both"),
+        ("AT1", f"{RISE} stop_time=10", r"^--template: stop_time: .*other options \(--stop-time"),
+        (str(AT), f"{RISE} description=fast", r"^--template: description: "),
+        ("AT1", "ramp_limit signal=speed limit=9", r"rate: the model has no der\(speed\): .*; or over,"),
         ("python:tests.problems:easy", RISE, "made in Python"),
     ],
 )
@@ -71,5 +76,5 @@ def test_a_spec_with_a_template_is_a_problem_with_its_formula(folder: Path) -> N
         load_problem(spec(folder, text.replace('"speed"', '"sped"')))
     with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.template: .*not a multiple"):
         load_problem(spec(folder, text.replace("time = 3", "time = 3.005").replace("[model]", GRID)))
-    with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.after: needs values up to 60 s"):
+    with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.time: needs values up to 60 s"):
         load_problem(spec(folder, text.replace("time = 3", "time = 60")))
