@@ -19,6 +19,7 @@ from typing import NoReturn
 from falsifier.core import linux, posix
 from falsifier.errors import ModelError
 from falsifier.fmu.environment import worker_environment
+from falsifier.fmu.folders import REMOVING
 from falsifier.fmu.wine import HOW_TO_INSTALL, find_wine, windows_path
 
 assert sys.platform != "win32"
@@ -157,9 +158,10 @@ class WineProcess:
             self.close()
             raise ModelError(f"{self._wine} cannot run {WORKER} (exit code {code}); is it a 64-bit Wine?")
         found = _SIGNALS.get(code) or (-code if code < 0 else None)
-        if found is not None:
-            linux.end_by(found)
-        os._exit(code & 0xFF)
+        with REMOVING:
+            if found is not None:
+                linux.end_by(found)
+            os._exit(code & 0xFF)
 
 
 def text(words: str) -> bytes:
