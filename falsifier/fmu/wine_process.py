@@ -84,13 +84,13 @@ class WineProcess:
         self._wine, self._log, self._connected = wine, log, False
         self.folder = Path(tempfile.mkdtemp(prefix="wine-", dir=scratch))
         prefix, replies = self.folder / "prefix", self.folder / "replies"
+        command, environment = [str(wine), windows_path(WORKER)], _environment(self.folder, prefix)
         _make_prefix(prefix)
         self._replies = linux.open_pipe(replies)
         self._received = b""
         # All that Wine starts holds the other end, so this one tells when the last of it has ended.
         self._everything, theirs = os.pipe()
-        command = [str(wine), windows_path(WORKER)]
-        self._process = linux.start_holding(command, _environment(self.folder, prefix), theirs)
+        self._process = linux.start_holding(command, environment, theirs)
         os.close(theirs)
         self._life = posix.open_life(self._process.pid)
         self.request(_CONNECT, text(windows_path(replies)))
