@@ -19,9 +19,10 @@ from falsifier.problem.problem import Problem
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing.connection import Connection
 
 T = TypeVar("T")
+# One end of a Pipe, whose class differs between systems, or None.
+_End = Any
 
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
@@ -183,7 +184,7 @@ def _check_jobs(jobs: int) -> None:
         raise SpecError(f"jobs must be at least 1, got {jobs}")
 
 
-def _process_pool(jobs: int, ending: "Connection | None" = None) -> "ProcessPoolExecutor":
+def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
@@ -194,7 +195,7 @@ def _process_pool(jobs: int, ending: "Connection | None" = None) -> "ProcessPool
     )
 
 
-def _prepare_worker(log_level: int, ending: "Connection | None") -> None:
+def _prepare_worker(log_level: int, ending: _End) -> None:
     """Make a worker end with its parent, however that ends, and ignore Ctrl-C, which the parent handles.
 
     Args:

@@ -1,14 +1,15 @@
 """Simulation in worker processes: the side of the process that requests it.
 
-Each requesting process has one starter of workers, and one worker per FMU, interface and thread. A worker
-that crashes, hangs or leaks memory is replaced; the simulation that it was running raises a SimulationError.
+Each requesting process has one starter of workers, and one worker per FMU, interface and thread; when another
+is needed, those of ended threads and the oldest of a thread that has many are ended. A worker that crashes,
+hangs or leaks memory is replaced; the simulation that it was running raises a SimulationError.
 """
 
 import atexit
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,9 @@ from falsifier.fmu.trust import Trust
 from falsifier.fmu.ways import open_starter
 from falsifier.fmu.worker import RUN
 from falsifier.fmu.worker_order import REUSES, Order, Reuse
+
+# A thread simulates with one worker at a time; the others save the start if it returns to their FMUs.
+_MOST_OF_A_THREAD = 12
 
 
 class IsolatedFmu:
@@ -302,12 +306,24 @@ class _Registry:
             return self._starter
 
     def fmu(self, order: Order) -> IsolatedFmu:
-        key = (order.sha256, order.interface, order.logging, order.through_wine, threading.get_ident())
+        # Not get_ident: threads of other libraries are listed only once they have asked for themselves.
+        thread = threading.current_thread().ident or 0
+        key = (order.sha256, order.interface, order.logging, order.through_wine, thread)
         found = self._fmus.get(key)
         if found is None:
             with self._lock:
-                found = self._fmus.setdefault(key, IsolatedFmu(self.starter, order))
+                superfluous = self._take_superfluous(thread)
+                found = self._fmus[key] = IsolatedFmu(self.starter, order)
+            _close(superfluous)
         return found
+
+    def _take_superfluous(self, thread: int) -> list[IsolatedFmu]:
+        """Take out what ended threads have left, and the oldest of a thread that needs one more."""
+        alive = {each.ident for each in threading.enumerate()}
+        keys = [key for key in self._fmus if key[-1] not in alive]
+        own = [key for key in self._fmus if key[-1] == thread]
+        keys += own[: max(0, len(own) + 1 - _MOST_OF_A_THREAD)]
+        return [self._fmus.pop(key) for key in keys]
 
     def drop(self, sha256: str, interface: str, *, logging: bool = False, through_wine: bool = False) -> None:
         with self._lock:
@@ -327,9 +343,7 @@ class _Registry:
         with self._lock:
             fmus, self._fmus = self._fmus, {}
             owner, self._starter = self._starter, None
-        for fmu in fmus.values():
-            with contextlib.suppress(ModelError):
-                fmu.close()
+        _close(fmus.values())
         if owner is not None:
             owner.close()
 
@@ -340,6 +354,12 @@ class _Registry:
         if self._starter is not None:
             self._starter.forget()
         self._fmus, self._starter = {}, None
+
+
+def _close(fmus: Iterable[IsolatedFmu]) -> None:
+    for fmu in fmus:
+        with contextlib.suppress(ModelError):
+            fmu.close()
 
 
 REGISTRY = _Registry()

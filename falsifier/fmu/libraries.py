@@ -36,19 +36,26 @@ def find_libraries(
     return libraries, tuple(dict.fromkeys(said))
 
 
-def missing_binary_text(name: str, platforms: Sequence[str], *, has_sources: bool) -> str:
+def missing_binary_text(
+    name: str, platforms: Sequence[str], *, has_sources: bool, needs_wine: bool = False
+) -> str:
     """Say that an FMU has no binary for this platform, why those that it has do not help, and what does.
 
     Args:
         name: file name of the FMU.
         platforms: platforms for which it contains binaries.
         has_sources: whether it contains C sources.
+        needs_wine: whether its binary for Windows can be simulated here.
     """
     here = archive.this_platform()
     system = here.partition("-")[2]
     text = f"no binary for {here}, " + (
         f"only for {', '.join(platforms)}" if platforms else "nor for any other"
     )
+    if needs_wine:
+        text += "; that for Windows runs through Wine"
+        build = f"; it contains C sources: compile them with `falsifier build {name}` to run without Wine"
+        return text + (build if has_sources else "")
     if f"x86-{system}" in platforms and here != f"x86-{system}":
         text += "; a 32-bit binary cannot be loaded here"
     elif platforms and all(p.endswith("-darwin") for p in platforms):

@@ -143,7 +143,8 @@ class Library:
                 "the model identifier tells which one to load: export the FMU again"
             )
         has_sources = any((folder / "sources").rglob("*.c"))
-        said = missing_binary_text("FMU", info.platforms, has_sources=has_sources)
+        wine = self.description.needs_wine(self.interface)
+        said = missing_binary_text("FMU", info.platforms, has_sources=has_sources, needs_wine=wine)
         raise ModelError(f"{info.name}: {said} ({expected} is missing)")
 
     def _load(self, folder: Path, binary: Path) -> Any:

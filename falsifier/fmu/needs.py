@@ -29,6 +29,8 @@ _BITS = 64 if sys.maxsize > 1 << 32 else 32
 def binary_remarks(path: Path) -> tuple[str, ...]:
     """Return why an FMU's binary cannot be loaded on this machine, one sentence each; none if it can.
 
+    That it runs through Wine is among the notes of its description, so here only what makes Wine superfluous.
+
     Raises:
         ModelError: if the file is not an FMU.
     """
@@ -38,7 +40,11 @@ def binary_remarks(path: Path) -> tuple[str, ...]:
     said = []
     if missing and len(missing) == len(description.identifiers):
         has_sources = any(n.startswith("sources/") and n.endswith(".c") for n in names)
-        said.append(missing_binary_text(path.name, description.info.platforms, has_sources=has_sources))
+        wine = any(map(description.needs_wine, missing))
+        if has_sources or not wine:
+            platforms = description.info.platforms
+            text = missing_binary_text(path.name, platforms, has_sources=has_sources, needs_wine=wine)
+            said.append(text)
     if archive.this_platform().endswith("-linux"):
         said += _missing_on_linux(path, description)
     return tuple(dict.fromkeys(said))

@@ -17,7 +17,7 @@ from falsifier.core import operating_system
 from falsifier.errors import FalsifierError
 from falsifier.fmu import worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
-from falsifier.fmu.folders import remove_work_folder
+from falsifier.fmu.folders import REMOVING, remove_work_folder
 from falsifier.fmu.readiness import Loops, settle_in
 from falsifier.fmu.stepper import warm_up
 from falsifier.fmu.worker_order import Order
@@ -69,6 +69,8 @@ def _follow(line: int, root: Path) -> NoReturn:
     """Wait for the end of the parent, and end with it."""
     while os.read(line, 1):
         pass
-    operating_system.end_descendants()
-    remove_work_folder(root)
-    os._exit(1)
+    # The other thread ends this process when Wine ends; not before the folder is gone.
+    with REMOVING:
+        operating_system.end_descendants()
+        remove_work_folder(root)
+        os._exit(1)

@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+from falsifier.errors import ModelError
 from falsifier.fmu import archive
 
 HOW_TO_INSTALL = (
@@ -12,6 +13,8 @@ HOW_TO_INSTALL = (
 
 # Debian's wine64 is in no folder of the search path.
 _DEBIAN = Path("/usr/lib/wine/wine64")
+# These are not part of a name, or of no name that Wine finds.
+_UNKNOWN = frozenset('\\"')
 
 
 def find_wine() -> Path | None:
@@ -35,5 +38,15 @@ def windows_text() -> str:
 
 
 def windows_path(path: Path) -> str:
-    """Return the path by which Windows programs know a file of this machine."""
-    return "Z:" + str(path.absolute()).replace("/", "\\")
+    """Return the path by which Windows programs know a file of this machine.
+
+    Raises:
+        ModelError: if it contains characters by which they cannot know it.
+    """
+    known = str(path.absolute())
+    if not _UNKNOWN.isdisjoint(known):
+        raise ModelError(
+            f"{known}: Windows programs cannot open a path with a backslash or quotation mark; set TMPDIR to "
+            "another folder, or install falsifier in another one"
+        )
+    return "Z:" + known.replace("/", "\\")

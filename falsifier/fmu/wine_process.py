@@ -19,6 +19,7 @@ from typing import NoReturn
 from falsifier.core import linux, posix
 from falsifier.errors import ModelError
 from falsifier.fmu.environment import worker_environment
+from falsifier.fmu.folders import REMOVING
 from falsifier.fmu.wine import HOW_TO_INSTALL, find_wine, windows_path
 
 assert sys.platform != "win32"
@@ -83,13 +84,13 @@ class WineProcess:
         self._wine, self._log, self._connected = wine, log, False
         self.folder = Path(tempfile.mkdtemp(prefix="wine-", dir=scratch))
         prefix, replies = self.folder / "prefix", self.folder / "replies"
+        command, environment = [str(wine), windows_path(WORKER)], _environment(self.folder, prefix)
         _make_prefix(prefix)
         self._replies = linux.open_pipe(replies)
         self._received = b""
         # All that Wine starts holds the other end, so this one tells when the last of it has ended.
         self._everything, theirs = os.pipe()
-        command = [str(wine), windows_path(WORKER)]
-        self._process = linux.start_holding(command, _environment(self.folder, prefix), theirs)
+        self._process = linux.start_holding(command, environment, theirs)
         os.close(theirs)
         self._life = posix.open_life(self._process.pid)
         self.request(_CONNECT, text(windows_path(replies)))
@@ -157,9 +158,10 @@ class WineProcess:
             self.close()
             raise ModelError(f"{self._wine} cannot run {WORKER} (exit code {code}); is it a 64-bit Wine?")
         found = _SIGNALS.get(code) or (-code if code < 0 else None)
-        if found is not None:
-            linux.end_by(found)
-        os._exit(code & 0xFF)
+        with REMOVING:
+            if found is not None:
+                linux.end_by(found)
+            os._exit(code & 0xFF)
 
 
 def text(words: str) -> bytes:

@@ -68,7 +68,7 @@ def test_schema_describes_spec_files(tmp_path: Path) -> None:
     schema = falsifier("schema", cwd=tmp_path).json
     systems = {"components", "connections", "coupling"}
     assert set(schema["properties"]) == {
-        "model", "inputs", "parameters", "requirements", "profiles", *systems
+        "model", "inputs", "parameters", "requirements", "profiles", "context", *systems
     }  # fmt: skip
 
 

@@ -6,15 +6,19 @@ import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event, Thread
 
 import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
+from falsifier.fmu.description import read_description
 from falsifier.fmu.forking import Nursery
-from falsifier.fmu.isolation import REGISTRY
+from falsifier.fmu.isolation import _MOST_OF_A_THREAD, REGISTRY, IsolatedFmu, _Registry
 from falsifier.fmu.spawning import Spawner
+from falsifier.fmu.worker_order import Order
 from tests import patience
+from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated, run
 from tests.fmu.support import (
     ABORT,
@@ -157,3 +161,57 @@ def test_closing_the_registry_removes_the_folder_of_this_process() -> None:
     REGISTRY.close()
     assert not root.exists()
     assert len(run(isolated("Lag_2"), ("y",))) == 11
+
+
+def orders(number: int) -> list[Order]:
+    description = read_description(fixtures.path("Lag_2"))
+    return [Order(Path("Lag"), f"{k:064d}", description, "co-simulation", None) for k in range(number)]
+
+
+@pytest.fixture
+def ended(monkeypatch: pytest.MonkeyPatch) -> list[IsolatedFmu]:
+    """What a registry ends from here on, in this order."""
+    found: list[IsolatedFmu] = []
+    monkeypatch.setattr(IsolatedFmu, "close", lambda fmu: found.append(fmu))
+    return found
+
+
+def test_workers_of_ended_threads_are_ended_when_another_is_needed(ended: list[IsolatedFmu]) -> None:
+    registry, (order,) = _Registry(), orders(1)
+    made: list[IsolatedFmu] = []
+    thread = Thread(target=lambda: made.append(registry.fmu(order)))
+    thread.start()
+    thread.join()
+    assert not ended
+    here = registry.fmu(order)
+    assert ended == made
+    assert registry.fmu(order) is here
+    registry.close()
+
+
+def test_workers_of_living_threads_are_kept(ended: list[IsolatedFmu]) -> None:
+    registry, asked, goes_on = _Registry(), Event(), Event()
+
+    def go() -> None:
+        one = registry.fmu(orders(1)[0])
+        asked.set()
+        goes_on.wait(patience.HANG)
+        assert registry.fmu(orders(1)[0]) is one
+        goes_on.clear()
+
+    thread = Thread(target=go)
+    thread.start()
+    assert asked.wait(patience.HANG)
+    registry.fmu(orders(2)[1])
+    assert not ended
+    goes_on.set()
+    thread.join()
+    assert not goes_on.is_set()
+    registry.close()
+
+
+def test_a_thread_keeps_the_workers_of_its_latest_fmus(ended: list[IsolatedFmu]) -> None:
+    registry = _Registry()
+    made = [registry.fmu(order) for order in orders(_MOST_OF_A_THREAD + 3)]
+    assert ended == made[:3]
+    registry.close()

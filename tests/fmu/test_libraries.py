@@ -1,5 +1,5 @@
 from falsifier.fmu.archive import WINDOWS, library_file
-from falsifier.fmu.libraries import find_libraries
+from falsifier.fmu.libraries import find_libraries, missing_binary_text
 
 EXPECTED = library_file("2.0", "model")
 
@@ -28,3 +28,11 @@ def test_libraries_of_another_platform_are_found_by_its_folder() -> None:
     for version, folder in (("2.0", "win64"), ("3.0", "x86_64-windows")):
         found, _ = find_libraries(names, version, {"co-simulation": "model"}, WINDOWS)
         assert found["co-simulation"].as_posix() == f"binaries/{folder}/model.dll"
+
+
+def test_what_runs_through_wine_need_not_be_exported_again() -> None:
+    alone = missing_binary_text("FMU", (WINDOWS,), has_sources=False, needs_wine=True)
+    assert alone.endswith("only for x86_64-windows; that for Windows runs through Wine")
+    assert missing_binary_text("FMU", (WINDOWS,), has_sources=False).endswith(
+        "export it again for this platform"
+    )

@@ -9,6 +9,7 @@ from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu import needs
 from falsifier.fmu.needs import binary_remarks
+from falsifier.fmu.wine import can_run_windows
 from tests.fmu.fixtures import FOLDER, path
 from tests.fmu.test_elf import library
 
@@ -130,6 +131,22 @@ def test_binaries_for_other_systems_are_named_with_what_helps(tmp_path: Path) ->
     said = without_linux(tmp_path, "win64", sources=True)
     assert (
         "only for x86_64-windows; it contains C sources: compile them with `falsifier build my.fmu`" in said
+    )
+
+
+def test_a_windows_binary_that_runs_through_wine_is_not_called_missing(tmp_path: Path) -> None:
+    if not can_run_windows():
+        pytest.skip("Windows libraries are not simulated on this machine, with or without Wine")
+    packed = tmp_path / "my.fmu"
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION)
+        archive.writestr("binaries/win64/M.dll", b"")
+    assert binary_remarks(packed) == ()
+    with zipfile.ZipFile(packed, "a") as archive:
+        archive.writestr("sources/all.c", b"")
+    assert binary_remarks(packed) == (
+        "no binary for x86_64-linux, only for x86_64-windows; that for Windows runs through Wine; it "
+        "contains C sources: compile them with `falsifier build my.fmu` to run without Wine",
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import wine, wine_process
+from falsifier.fmu import folders, wine, wine_process
 from tests import patience
 from tests.fmu.test_wine_instance import needs_wine
 
@@ -83,3 +83,21 @@ def test_nothing_is_left_of_a_wine_that_was_closed(tmp_path: Path) -> None:
     process.close()
     assert list(tmp_path.iterdir()) == []
     patience.wait_until(lambda: not processes_in(process.folder))
+
+
+@pytest.mark.parametrize(("code", "ending"), [(-9, 9), (0xC0000005, 11)])
+def test_this_process_does_not_end_while_its_folder_is_removed(
+    monkeypatch: pytest.MonkeyPatch, code: int, ending: int
+) -> None:
+    process = object.__new__(wine_process.WineProcess)
+    process._connected = True
+    said: list[tuple[int, bool]] = []
+
+    def end_by(number: int) -> None:
+        said.append((number, folders.REMOVING.locked()))
+        raise InterruptedError
+
+    monkeypatch.setattr("falsifier.core.linux.end_by", end_by)
+    with pytest.raises(InterruptedError):
+        process._end_alike(code)
+    assert said == [(ending, True)]

@@ -23,7 +23,7 @@ def test_readings_are_told_with_words_examples_and_cost() -> None:
         "1. F[0,10] (speed >= 80)\n   in words   At some time from 0 to 10 s, speed is at least 80.\n",
         "   meant      at 10 s",
         "only 1, not 2, is satisfied by (0 to 50 s)\n   speed  ",
-        "1 call",
+        "1 request",
         "0.0000 US dollars",
     ):
         assert part in text, part
