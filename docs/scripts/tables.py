@@ -13,7 +13,8 @@ from mkdocs.exceptions import PluginError
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS
 from falsifier.llm.prompts.variants import Part
-from falsifier.problem.spec import ModelChanges, ModelSection, Spec
+from falsifier.problem.sections import ModelChanges, ModelSection
+from falsifier.problem.spec import Spec
 
 _MARK = re.compile(r"^<!-- (keys|engines|variants)(?: (\w+))? -->$", re.MULTILINE)
 # Where a section's table stands in docs/spec.md.

@@ -27,8 +27,8 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import is_package, read_info, read_package
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.sections import InputSection
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.spec import InputSection
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_json, evaluation_lines
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from falsifier.errors import FormulaError
 from falsifier.problem.grid import exact
-from falsifier.problem.spec import FreeSection
+from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
 from falsifier.stl.formula import Window
 

@@ -14,17 +14,10 @@ from falsifier.problem.grid import Grid, choose_grid, formula_times
 from falsifier.problem.models import check_own_steps, make_model
 from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, expanded, parse_requirement, spec_formulas
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.source import MODEL_FILES
-from falsifier.problem.spec import (
-    InputSection,
-    ModelChanges,
-    ParameterSection,
-    RequirementSection,
-    Spec,
-    overlay,
-    parse_spec,
-)
+from falsifier.problem.spec import Spec, overlay, parse_spec
 
 _DEFAULT_TIME_LIMIT = 60.0
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.

@@ -19,9 +19,10 @@ from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_fmu
 from falsifier.problem.problem import Problem, alike
+from falsifier.problem.sections import InputSection, ModelChanges
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import Parameterization, ProblemSource, Target
-from falsifier.problem.spec import InputSection, ModelChanges, read_spec
+from falsifier.problem.spec import read_spec
 
 
 def find_spec(target: str) -> tuple[Path, str | None]:

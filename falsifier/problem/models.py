@@ -16,7 +16,8 @@ from falsifier.fmu import (
     read_info,
     read_package,
 )
-from falsifier.problem.spec import ModelChanges, Spec
+from falsifier.problem.sections import ModelChanges
+from falsifier.problem.spec import Spec
 
 
 def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:

@@ -6,8 +6,8 @@ from pathlib import Path
 from falsifier.core.model import Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, ValueKind
 from falsifier.errors import SpecError
+from falsifier.problem.sections import InputSection
 from falsifier.problem.shorthand import named_file
-from falsifier.problem.spec import InputSection
 
 
 def input_range(variable: Variable, section: InputSection, *, file: str | None, key: str) -> InputRange:

@@ -9,8 +9,8 @@ from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.errors import SpecError
 from falsifier.problem.freedom import default_freedom
 from falsifier.problem.problem import Problem
+from falsifier.problem.sections import FreeSection, InputSection, ModelChanges
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.spec import FreeSection, InputSection, ModelChanges
 
 # The middle level has this many times the pieces of an input's own control points; each level after it that
 # an engine on fixed control points searches has as many times more again.

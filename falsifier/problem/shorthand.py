@@ -11,7 +11,7 @@ from falsifier.core.arguments import instance
 from falsifier.core.model import Interface
 from falsifier.core.signals import INTERPOLATIONS
 from falsifier.errors import SpecError, did_you_mean, rejected
-from falsifier.problem.spec import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 
 _DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 

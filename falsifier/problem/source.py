@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from falsifier.fmu.ssp_package import SUFFIXES as PACKAGES
 from falsifier.problem.defaults import STL_NAME
-from falsifier.problem.spec import ModelChanges
+from falsifier.problem.sections import ModelChanges
 
 # Endings of files that are a model themselves; all others need a spec.
 MODEL_FILES = (".fmu", *PACKAGES)

@@ -14,7 +14,7 @@ from falsifier.errors import SpecError
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
 from falsifier.problem.freedom import default_freedom
 from falsifier.problem.grid import choose_grid
-from falsifier.problem.spec import FreeSection
+from falsifier.problem.sections import FreeSection
 from falsifier.stl.names import name_text
 
 # Stop time in s if the FMU specifies none.

@@ -6,8 +6,9 @@ from pathlib import Path
 from falsifier.errors import SpecError
 from falsifier.problem.joining import join, join_fmu
 from falsifier.problem.loading import find_spec
+from falsifier.problem.sections import AnyRequirement, ModelChanges
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.spec import AnyRequirement, ModelChanges, Spec, parse_spec, read_spec
+from falsifier.problem.spec import Spec, parse_spec, read_spec
 from falsifier.problem.template_arguments import template_arguments
 
 _OPTION = "--template"

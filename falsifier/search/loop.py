@@ -247,7 +247,7 @@ class _Loop:
         """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
 
         Simulations end in the order in which they were asked for, so that a run does not depend on which one
-        is faster. What an interruption leaves of them is counted and recorded.
+        is faster. Those that are still under way when the search ends are not counted.
         """
         evaluation = started.wait()
         # Also against the one whose engine proposed it, because a resumed run needs that verdict.

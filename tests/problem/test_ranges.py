@@ -6,7 +6,7 @@ from falsifier.core.model import Variable
 from falsifier.core.space import InputRange
 from falsifier.errors import SpecError
 from falsifier.problem.ranges import fixed_value, input_range, parameter_range
-from falsifier.problem.spec import InputSection
+from falsifier.problem.sections import InputSection
 
 
 def test_a_range_that_nobody_knows_must_be_given() -> None:

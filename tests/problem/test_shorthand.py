@@ -3,8 +3,8 @@ from typing import Any
 import pytest
 
 from falsifier.errors import SpecError
+from falsifier.problem.sections import InputSection
 from falsifier.problem.shorthand import changes_from, changes_from_options, options_from
-from falsifier.problem.spec import InputSection
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.problem.spec import InputSection, ParameterSection, overlay, parse_spec, read_spec
+from falsifier.problem.sections import InputSection, ParameterSection
+from falsifier.problem.spec import overlay, parse_spec, read_spec
 
 GOOD: dict[str, Any] = {
     "model": {"fmu": "a.fmu"},

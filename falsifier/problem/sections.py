@@ -1,0 +1,309 @@
+"""The sections of a spec file."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
+
+from falsifier.core.model import Interface
+from falsifier.core.signals import Interpolation
+from falsifier.fmu.network import Extrapolation, Loops, Method
+from falsifier.problem.templates import (
+    TEMPLATES,
+    Dwell,
+    NeverTogether,
+    Order,
+    Overshoot,
+    RampLimit,
+    Response,
+    Rise,
+    Settles,
+    StaysWithin,
+)
+
+Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Maximum number of control points of one input.
+MAX_CONTROL_POINTS = 10_000
+
+
+class Strict(BaseModel):
+    """A section that takes no other keys than its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FreeSection(Strict):
+    """Limits of a free parameterization."""
+
+    max_control_points: int = Field(
+        ge=1, le=MAX_CONTROL_POINTS, description="Maximum number of control points."
+    )
+    min_interval: Seconds = Field(description="Minimum time between two control points in s.")
+
+
+def _check_order(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:g}, {limits[1]:g}]")
+    return limits
+
+
+class InputSection(Strict):
+    """One input signal: searched within a range, or kept constant."""
+
+    range: tuple[Number, Number] | None = Field(
+        None, description="[low, high]; default: the FMU's min and max."
+    )
+    control_points: int | None = Field(
+        None, ge=1, le=MAX_CONTROL_POINTS, description="Number of evenly spaced control points."
+    )
+    interpolation: Interpolation | None = Field(
+        None,
+        description="pchip (default), linear or constant; integers, Booleans, enumerations: constant only.",
+    )
+    hold: Seconds | None = Field(None, description="Sample-and-hold period in s.")
+    free: FreeSection | None = Field(
+        None, description="Limits within which engines may choose the control points."
+    )
+    value: Number | None = Field(None, description="Keep this input at a constant value.")
+
+    @model_validator(mode="after")
+    def _searched_or_fixed(self) -> "InputSection":
+        if self.range is not None:
+            _check_order(self.range)
+        if self.value is not None and (self.range is not None or self.control_points is not None):
+            raise ValueError("value keeps the input constant; remove it, or remove range and control_points")
+        return self
+
+
+def _bare_value(section: object) -> object:
+    return {"value": section} if isinstance(section, int | float | bool | str) else section
+
+
+class ParameterSection(Strict):
+    """One parameter or initial state: searched within a range, or fixed to a value."""
+
+    range: tuple[Number, Number] | None = Field(None, description="[low, high] to search within.")
+    value: Number | str | None = Field(
+        None, description="Fixed value; text for a string. A file is named relative to the spec file."
+    )
+
+    @model_validator(mode="after")
+    def _searched_or_fixed(self) -> "ParameterSection":
+        if self.range is not None:
+            _check_order(self.range)
+        if (self.range is None) == (self.value is None):
+            raise ValueError(
+                "expected either range = [low, high] (searched) or value = number or text (fixed)"
+            )
+        return self
+
+
+Inputs = dict[str, InputSection]
+Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_value)]]
+
+
+class ModelSection(Strict):
+    """What is simulated and how."""
+
+    fmu: str | None = Field(
+        None,
+        description="Path of the FMU or SSP package, relative to the spec file; or see [components.NAME]",
+    )
+    interface: Interface | None = Field(None, description="Required if the FMU offers both.")
+    stop_time: Seconds | None = Field(None, description="End of each simulation in s.")
+    output_interval: Seconds | None = Field(None, description="Step of the monitored time grid in s.")
+    step_size: Seconds | None = Field(None, description="Communication or maximum solver step in s.")
+    tolerance: Seconds | None = Field(None, description="Relative tolerance of the solver.")
+    time_limit: Seconds | None = Field(
+        None, description="Maximum wall-clock time of one simulation in s; default: 60."
+    )
+    logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
+    record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
+
+
+class ComponentSection(Strict):
+    """One FMU of a system."""
+
+    fmu: str = Field(description="Path of the FMU, relative to the spec file.")
+    step: Seconds | None = Field(
+        None, description="Step of its own in s, an integer multiple of the communication step."
+    )
+    interface: Interface | None = Field(
+        None,
+        description="co-simulation or model-exchange; default: co-simulation if the FMU offers it.",
+    )
+
+
+class ConnectionSection(Strict):
+    """Where the values of one input of a component come from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    source: str = Field(alias="from", description="Output, as COMPONENT.VARIABLE.")
+    factor: Number | None = Field(None, description="Factor of factor * value + offset, in place of units.")
+    offset: Number | None = Field(None, description="Offset of factor * value + offset, in place of units.")
+    extrapolation: Extrapolation | None = Field(
+        None, description="hold or linear; default: that of [coupling]."
+    )
+
+
+def _bare_source(section: object) -> object:
+    return {"from": section} if isinstance(section, str) else section
+
+
+class CouplingSection(Strict):
+    """How the components of a system exchange values."""
+
+    method: Method = Field(
+        "gauss-seidel",
+        description="gauss-seidel: later components get the new values of earlier ones; jacobi: all step "
+        "from the values of the same communication point.",
+    )
+    loops: Loops = Field(
+        "refuse",
+        description="If outputs and inputs depend directly on each other: refuse the system; delay the "
+        "connection that closes the loop by one communication step; or iterate: repeat the steps in the loop "
+        "until its outputs no longer change.",
+    )
+    extrapolation: Extrapolation = Field(
+        "hold", description="Inputs during a step: hold the last value, or follow the last two linearly."
+    )
+    tolerance: Seconds = Field(
+        1e-9,
+        description="Change of an output, relative above 1, below which an initialisation or an iteration "
+        "has converged.",
+    )
+    max_rounds: int = Field(
+        100, ge=1, description="Maximum number of rounds of an initialisation, and of an iterated step."
+    )
+
+
+class ContextSection(Strict):
+    """What a language model may read about the model; nothing else is sent."""
+
+    files: tuple[str, ...] = Field(
+        (), description="Simulink files, sources and documents, relative to the spec file."
+    )
+    fmu: bool = Field(
+        default=False, description="Also documentation, sources, texts and annotations inside the FMU."
+    )
+
+
+Components = dict[str, ComponentSection]
+Connections = dict[str, Annotated[ConnectionSection, BeforeValidator(_bare_source)]]
+
+
+class ModelChanges(Strict):
+    """What a requirement or a profile may override."""
+
+    interface: Interface | None = None
+    stop_time: Seconds | None = None
+    output_interval: Seconds | None = None
+    step_size: Seconds | None = None
+    tolerance: Seconds | None = None
+    time_limit: Seconds | None = None
+    logging: bool | None = None
+    inputs: Inputs = Field(default_factory=dict)
+    parameters: Parameters = Field(default_factory=dict)
+
+
+class RequirementSection(ModelChanges):
+    """One requirement, and what it overrides."""
+
+    formula: str = Field(description="Formula in Signal Temporal Logic; or a template with its arguments.")
+    description: str = Field("", description="Its meaning in words.")
+
+    def expanded(self, stop_time: float, step: float = 0.0) -> str:
+        """Return the formula, which is the same for every simulation."""
+        del stop_time, step
+        return self.formula
+
+    def signals(self) -> tuple[tuple[str, str], ...]:
+        """Return nothing: the formula is checked as a whole."""
+        return ()
+
+
+class _TemplateChanges(ModelChanges):
+    """What a requirement by template may override."""
+
+    description: str = Field("", description="Its meaning in words.")
+
+
+class SettlesSection(_TemplateChanges, Settles):
+    """A requirement by the template ``settles``."""
+
+
+class OvershootSection(_TemplateChanges, Overshoot):
+    """A requirement by the template ``overshoot``."""
+
+
+class RiseSection(_TemplateChanges, Rise):
+    """A requirement by the template ``rise``."""
+
+
+class ResponseSection(_TemplateChanges, Response):
+    """A requirement by the template ``response``."""
+
+
+class StaysWithinSection(_TemplateChanges, StaysWithin):
+    """A requirement by the template ``stays_within``."""
+
+
+class NeverTogetherSection(_TemplateChanges, NeverTogether):
+    """A requirement by the template ``never_together``."""
+
+
+class DwellSection(_TemplateChanges, Dwell):
+    """A requirement by the template ``dwell``."""
+
+
+class RampLimitSection(_TemplateChanges, RampLimit):
+    """A requirement by the template ``ramp_limit``."""
+
+
+class OrderSection(_TemplateChanges, Order):
+    """A requirement by the template ``order``."""
+
+
+TemplateSection = (
+    Annotated[SettlesSection, Tag("<settles>")]
+    | Annotated[OvershootSection, Tag("<overshoot>")]
+    | Annotated[RiseSection, Tag("<rise>")]
+    | Annotated[ResponseSection, Tag("<response>")]
+    | Annotated[StaysWithinSection, Tag("<stays_within>")]
+    | Annotated[NeverTogetherSection, Tag("<never_together>")]
+    | Annotated[DwellSection, Tag("<dwell>")]
+    | Annotated[RampLimitSection, Tag("<ramp_limit>")]
+    | Annotated[OrderSection, Tag("<order>")]
+)
+
+
+def _kind_of_requirement(section: object) -> str | None:
+    """Return which section a requirement is; None if there is no such template."""
+    name = getattr(section, "template", None)
+    if isinstance(section, Mapping):
+        name = section.get("template")
+    if name is None:
+        return "<formula>"
+    return f"<{name}>" if name in TEMPLATES else None
+
+
+AnyRequirement = Annotated[
+    Annotated[RequirementSection, Tag("<formula>")] | TemplateSection, Discriminator(_kind_of_requirement)
+]
+
+
+class ProfileSection(ModelChanges):
+    """An alternative parameterization of the spec's problems."""
+
+    description: str = ""
+    requirements: dict[str, ModelChanges] = Field(default_factory=dict)
