@@ -103,6 +103,9 @@ def formalize(
         advice = advised_templates(sentence, subject_of(target).problem.info)
         say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(advice))
         return
+    if choose is not None or name is not None or out is not None:  # before anything is paid for
+        subject = subject_of(target)
+        with_requirement(subject, _file(subject, out), "true", name=name)
     from falsifier.search.formalize import formalize as ask
 
     found = ask(target, sentence, settings)

@@ -76,13 +76,15 @@ def lint(target: str, *, profile: str | None = None, simulations: int = SIMULATI
                 raise
             advice = "correct it; falsifier check says the same"
             findings.append(LintFinding(source.name, "invalid", "", str(error), advice))
-    for problem in problems:
-        findings += static_findings(problem)
-    for group in alike(problems):
-        findings += _repeated(group)
-        findings += unmoved_findings(group, simulations)
-    for problem in problems:
-        problem.model.close()
+    try:
+        for problem in problems:
+            findings += static_findings(problem)
+        for group in alike(problems):
+            findings += _repeated(group)
+            findings += unmoved_findings(group, simulations)
+    finally:
+        for problem in problems:
+            problem.model.close()
     return findings
 
 
@@ -116,9 +118,15 @@ def _constants(problem: Problem) -> dict[str, float]:
     return {n: v for n, v in problem.parameters.items() if causality.get(n) in ("input", "parameter")}
 
 
+def _range_text(name: str, found: Interval) -> str:
+    if found.low == found.high:
+        return f"{name} = {found.low:g}"
+    return f"{name} in [{found.low:g}, {found.high:g}]"
+
+
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
     ranges = ranges_of(problem)
-    bounds = [f"{n} in [{ranges[n].low:g}, {ranges[n].high:g}]" for n in part.signals]
+    bounds = [_range_text(n, ranges[n]) for n in part.signals]
     because = f"as long as {listed(bounds)}" if bounds else "whatever happens"
     if part == problem.requirement.formula:
         what = "no trajectory in range violates it" if holds else "every trajectory in range violates it"

@@ -91,11 +91,15 @@ def test_an_fmu_gets_a_spec_and_json_says_where(tmp_path: Path) -> None:
 
 
 def test_wrong_choices_are_errors(tmp_path: Path) -> None:
+    spec(tmp_path, WIDE)
     with serving(REPLY) as server:
         bundled = falsifier(*asked(server, "AT1"), "--choose", "1", cwd=tmp_path, env=ENV)
-        second = falsifier(*asked(server, "AT1"), "--choose", "2", cwd=tmp_path, env=ENV)
-    assert (bundled.code, second.code) == (2, 2)
+        taken = falsifier(*asked(server, "my.toml"), "--name", "R", cwd=tmp_path, env=ENV)
+        assert not server.received, "said before anything is paid for"
+        second = falsifier(*asked(server, "my.toml"), "--choose", "2", cwd=tmp_path, env=ENV)
+    assert (bundled.code, taken.code, second.code) == (2, 2, 2)
     assert "--out" in bundled.err
+    assert "the spec has a requirement 'R' already; choose another --name" in taken.err
     assert "--choose 2: there is 1 reading only" in second.err
 
 

@@ -44,7 +44,7 @@ FOUND = [
     ("G[0,20] (throttle <= 100)", "always", "G[0,20] (throttle <= 100)", "throttle in [0, 100]"),
     ("F[0,20] (throttle > 100.5)", "never", "F[0,20] (throttle > 100.5)", "every trajectory"),
     ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search is"),
-    ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake in [0, 0]"),
+    ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake = 0"),
     ("G[0,0] (speed <= 120)", "window", "G[0,0] (speed <= 120)", "leave it out: speed <= 120"),
     ("F[0,3] (throttle <= 3*speed)", "", "", ""),
     ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
