@@ -91,7 +91,7 @@ def _late(network: Network) -> Iterator[Link]:
 def _conversion(link: Link) -> str:
     factor = "" if link.factor == 1.0 else f" * {link.factor:.6g}"
     offset = "" if link.offset == 0.0 else f" {link.offset:+.6g}"
-    line = " (along the line)" if link.is_linear else ""
+    line = " (extrapolated)" if link.is_linear else ""
     return f"{factor}{offset}{line}"
 
 

@@ -21,7 +21,7 @@ system: 2 components, in the order in which they step (gauss-seidel)
 
  2 pi  (Gain_2.fmu, co-simulation, every 0.2 s)
      r [m]         <-  not connected
-     measured [m]  <-  plant.y * 0.5 -1 (along the line)
+     measured [m]  <-  plant.y * 0.5 -1 (extrapolated)
      y [m]         ->  plant.u
 
 (late): the value of the previous communication point"""
