@@ -171,7 +171,7 @@ def _own_words(text: str) -> str:
     said = _CLASSES.sub("", text, count=1).strip() if _CLASSES.match(text) else text
     try:
         told = json.loads(said)["error"]["message"]
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         told = said
     return told if isinstance(told, str) and told.strip() else text
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from falsifier.engines.llm import make_llm_engine
@@ -157,6 +157,7 @@ RESPONSES = st.one_of(
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(RESPONSES)
+@example(response(b"[" * 2060, status="301 x"))
 def test_any_response_is_a_reply_or_an_error_that_says_so(data: bytes) -> None:
     with misbehaving(sends(data)) as server:
         (found,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url, timeout=20.0).complete(REQUEST))
