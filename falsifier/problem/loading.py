@@ -17,7 +17,7 @@ from falsifier.core.space import Freedom
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
-from falsifier.problem.joining import Joined, join, join_fmu
+from falsifier.problem.joining import join, join_fmu
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.sections import InputSection, ModelChanges
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
@@ -171,7 +171,7 @@ def load_source(source: ProblemSource) -> Problem:
     elif kind == "fmu":
         if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
-        problem = _made(
+        problem = Problem.from_parts(
             join_fmu(Path(source.target), source.stl or "", changes=source.changes, name=source.stl_name),
             source,
         )
@@ -230,19 +230,7 @@ def _of_spec(source: ProblemSource) -> Problem:
         stl_name=source.stl_name,
         changes=source.changes,
     )
-    return replace(_made(joined, source), named_context=named_context(source, spec, path))
-
-
-def _made(joined: Joined, source: ProblemSource) -> Problem:
-    return Problem(
-        joined.model,
-        joined.requirement,
-        joined.space,
-        joined.experiment,
-        joined.parameters,
-        source,
-        joined.notes,
-    )
+    return replace(Problem.from_parts(joined, source), named_context=named_context(source, spec, path))
 
 
 def _with_limits(problem: Problem, freed: Mapping[str, InputSection]) -> Problem:

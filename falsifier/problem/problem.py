@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from math import inf
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite
@@ -17,6 +17,9 @@ from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import ProblemSource
+
+if TYPE_CHECKING:
+    from falsifier.problem.joining import Joined
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,16 +118,8 @@ class Problem:
         source = ProblemSource(
             target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
         )
-        return cls(
-            joined.model,
-            joined.requirement,
-            joined.space,
-            joined.experiment,
-            joined.parameters,
-            source,
-            joined.notes,
-            named_context=Named(tuple(name for name in context if name != "fmu"), "fmu" in context),
-        )
+        named = Named(tuple(name for name in context if name != "fmu"), "fmu" in context)
+        return replace(cls.from_parts(joined, source), named_context=named)
 
     @classmethod
     def from_system(
@@ -175,14 +170,19 @@ class Problem:
             time_limit=time_limit,
         )
         joined = join_system(system, formula, path=Path(system.name), changes=changes, name=name)
+        return cls.from_parts(joined)
+
+    @classmethod
+    def from_parts(cls, parts: "Joined", source: ProblemSource | None = None) -> Self:
+        """Return the problem that a spec, or an FMU and a formula, was joined to."""
         return cls(
-            joined.model,
-            joined.requirement,
-            joined.space,
-            joined.experiment,
-            joined.parameters,
-            None,
-            joined.notes,
+            parts.model,
+            parts.requirement,
+            parts.space,
+            parts.experiment,
+            parts.parameters,
+            source,
+            parts.notes,
         )
 
     @property

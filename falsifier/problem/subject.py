@@ -100,16 +100,7 @@ def _of_model(fmu: Path) -> Subject:
         )
     text = starter_spec(Path(fmu.name), info)
     joined = join(parse_spec(tomllib.loads(text), file=str(path)), _PLACEHOLDER, path=path)
-    problem = Problem(
-        joined.model,
-        joined.requirement,
-        joined.space,
-        joined.experiment,
-        joined.parameters,
-        None,
-        joined.notes,
-    )
-    return Subject(problem, path, path.parent, text, is_new=True, free_grid=True)
+    return Subject(Problem.from_parts(joined), path, path.parent, text, is_new=True, free_grid=True)
 
 
 def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
