@@ -9,18 +9,18 @@
     components/NAME/NAME.toml           a spec of the FMU alone, for ``falsifier simulate``
 """
 
-import json
-import re
 import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import tomlkit
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
+from falsifier.core.literals import one_line
 from falsifier.core.model import Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.export.inputs import InputTable, start_values
@@ -29,9 +29,8 @@ from falsifier.fmu import FmuModel, System
 from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.problem import Problem
+from falsifier.stl.names import name_text
 
-# Names that formulas can use as they are.
-_PLAIN_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 # Share by which the outputs may leave the range that they had in the system.
 _MARGIN = 1e-6
 
@@ -206,16 +205,16 @@ class _Reader:
 
 
 def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
-    """Return a spec of the FMU alone; empty if formulas cannot use the names of its outputs as they are."""
-    parts = [
-        f"{name} >= {low!r} and {name} <= {high!r}"
-        for name, column in seen.outputs.columns.items()
-        if _PLAIN_NAME.fullmatch(name)
-        for low, high in [_around(column)]
-    ]
-    if not parts or not len(seen.inputs.times):
+    """Return a spec of the FMU alone; empty if it has no inputs or no outputs to compare."""
+    if not seen.outputs.columns or not len(seen.inputs.times):
         return ""
-    formula = f"G ({' and '.join(parts)})"
+    document = tomlkit.document()
+    document.add(
+        tomlkit.comment(f"The component {one_line(member.name)} alone, with what it saw in the system:")
+    )
+    document.add(
+        tomlkit.comment(f"    falsifier simulate {file_name(member.name)}.toml --input-file input.csv")
+    )
     model = {
         "fmu": member.path.name,
         "interface": member.interface,
@@ -223,34 +222,28 @@ def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
         "output_interval": seen.step,
         "tolerance": tolerance,
     }
-    lines = [
-        f"# The component {member.name} alone, with what it saw in the system:",
-        f"#     falsifier simulate {file_name(member.name)}.toml --input-file input.csv",
-        "[model]",
-        *(f"{key} = {json.dumps(value)}" for key, value in model.items() if value is not None),
-        *_inputs(member, seen),
-    ]
-    if seen.start:
-        lines += ["", "[parameters]"]
-        lines += [f"{json.dumps(name)} = {json.dumps(value)}" for name, value in seen.start.items()]
-    return "\n".join(
-        [
-            *lines,
-            "",
-            "[requirements.as_in_the_system]",
-            f"formula = {json.dumps(formula)}",
-            'description = "The outputs stay in the range that they had in the system."',
-            "",
-        ]
-    )
+    document["model"] = {key: value for key, value in model.items() if value is not None}
+    document["inputs"] = dict(_inputs(member, seen))
+    document["parameters"] = dict(seen.start)
+    requirement = {
+        "formula": f"G ({' and '.join(_bounds(seen.outputs))})",
+        "description": "The outputs stay in the range that they had in the system.",
+    }
+    document["requirements"] = {"as_in_the_system": requirement}
+    return tomlkit.dumps(document)
 
 
-def _inputs(member: Member, seen: Seen) -> Iterator[str]:
+def _bounds(outputs: InputTable) -> Iterator[str]:
+    for name, column in outputs.columns.items():
+        low, high = _around(column)
+        yield f"{name_text(name)} >= {low!r} and {name_text(name)} <= {high!r}"
+
+
+def _inputs(member: Member, seen: Seen) -> Iterator[tuple[str, dict[str, object]]]:
     for name, column in seen.inputs.columns.items():
         low, high = _range(column, member.description.info[name])
         if low < high:
-            yield from ("", f"[inputs.{json.dumps(name)}]", f"range = [{low!r}, {high!r}]")
-            yield f"control_points = {DEFAULT_POINTS}"
+            yield name, {"range": [low, high], "control_points": DEFAULT_POINTS}
 
 
 def _range(column: Floats, variable: Variable) -> tuple[float, float]:

@@ -2,7 +2,9 @@
 
 import csv
 import json
+import zipfile
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import Component, Connection, Coupling, System
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
+from tests.fmu.fixtures import path
 from tests.fmu.systems import LOOP, component, solved, system
 
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 1.0})
@@ -77,3 +80,28 @@ def test_a_constant_input_at_its_upper_limit_gets_a_range_that_the_fmu_allows(tm
     assert alone.info["r"].high == 2.0
     assert (1.0, 2.0) in [(r.low, r.high) for r in alone.space.inputs if r.name == "r"]
     alone.model.close()
+
+
+def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> None:
+    odd = {"u": 'wheel "1" \U0001f600', "y": "height.always", "T": "time constant"}
+    renamed = tmp_path / "Plant.fmu"
+    with zipfile.ZipFile(path("Plant_2")) as source, zipfile.ZipFile(renamed, "w") as target:
+        for entry in source.infolist():
+            data = source.read(entry)
+            if entry.filename == "modelDescription.xml":
+                for old, new in odd.items():
+                    written = f"name={quoteattr(new)} value"
+                    data = data.replace(f'name="{old}" value'.encode(), written.encode())
+            target.writestr(entry.filename, data)
+    links = {f"plant.{odd['u']}": "pi.y", "pi.measured": f"plant.{odd['y']}"}
+    whole = Problem.from_system(
+        System({"plant": renamed, "pi": path("Gain_2")}, links, isolate=False),
+        "G (plant.height.always <= 10)",
+        inputs={"pi.r": (0.0, 2.0)},
+        stop_time=1.0,
+        output_interval=0.1,
+    )
+    write_components(whole, Candidate({"pi.r": Signal((0.0,), (1.0,))}, {}), tmp_path)
+    alone = load_problem(str(tmp_path / "plant" / "plant.toml"))
+    assert [r.name for r in alone.space.inputs] == [odd["u"]]
+    assert alone.requirement.formula.signals == (odd["y"],)
