@@ -43,11 +43,11 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
         ChatError: for an unknown provider or a missing key.
     """
     check_names(request)
+    seeded = [(problem, request.seed + i * _SEED_STRIDE) for i, problem in enumerate(problems)]
     if request.llm is None:
-        engine = request.engine or DEFAULT_ENGINE
-        return [_numerical(engine, p, request.seed + i * _SEED_STRIDE) for i, p in enumerate(problems)]
+        return [_numerical(request.engine or DEFAULT_ENGINE, *each) for each in seeded]
     chat = chat or open_chat(request.llm, max_cost=request.budget.cost)
-    return [_led_by_llm(request, request.llm, problem, chat) for problem in problems]
+    return [_led_by_llm(request, request.llm, *each, chat) for each in seeded]
 
 
 def make_scouts(request: RunRequest, problems: Sequence[Problem]) -> list[Engine]:
@@ -164,10 +164,10 @@ def price_of(llm: LLMSettings) -> "Price | None":
     return Price(*llm.price) if llm.price else listed_price(llm.name, api_base=llm.api_base)
 
 
-def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, chat: Chat) -> Engine:
+def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: int, chat: Chat) -> Engine:
     from falsifier.engines.llm import make_llm_engine
 
-    fallback = make_engine(llm.fallback, problem, seed=request.seed) if llm.fallback else None
+    fallback = make_engine(llm.fallback, problem, seed=seed) if llm.fallback else None
     led = make_llm_engine(
         problem,
         chat,
@@ -178,7 +178,7 @@ def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, chat: C
         fallback=fallback,
     )
     if request.engine == "hybrid":
-        return make_engine("hybrid", problem, seed=request.seed, adviser=led)
+        return make_engine("hybrid", problem, seed=seed, adviser=led)
     return led
 
 

@@ -92,3 +92,11 @@ def test_a_limit_on_money_needs_a_price() -> None:
     priced = LLMSettings(name="hosted_vllm/mine", price=(0.25, 2.0), cache=False)
     (engine,) = make_engines(asked.model_copy(update={"llm": priced}), [PROBLEM], None)
     assert engine.name.startswith("hosted_vllm/mine")
+
+
+def test_several_requirements_of_one_language_model_fall_back_to_different_points() -> None:
+    problems = [lag_problem(name="A"), lag_problem(name="B")]
+    hybrids = make_engines(request("hybrid", "script"), problems, CHAT)
+    surrogates = [hybrid.surrogate for hybrid in hybrids if isinstance(hybrid, Hybrid)]
+    one, other = ([candidate.key for candidate in each.ask(12)] for each in surrogates)
+    assert one != other
