@@ -179,12 +179,22 @@ def make_run(request: RunRequest, place: Path) -> None:
                 seconds=0.0001,
                 requirement=problem.name,
                 told=i,
+                elapsed=0.01 * i,
             )
         )
         falling = verdict.model_copy(update={"robustness": float(BUDGET - i) if i < BUDGET - 1 else -1.0})
         last = trajectory if i == BUDGET - 1 else None
         judged = {problem.name: falling}
-        records.append(EvaluatedRecord(index=i, status="ok", verdicts=judged, seconds=0.01, trajectory=last))
+        records.append(
+            EvaluatedRecord(
+                index=i,
+                status="ok",
+                verdicts=judged,
+                seconds=0.01,
+                trajectory=last,
+                elapsed=0.01 * (i + 1),
+            )
+        )
     records.append(
         ConfirmedRecord(
             index=BUDGET - 1,

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from threading import get_ident
@@ -164,19 +164,23 @@ def start(
 ) -> list[Callable[[], Evaluation]]:
     """Start to simulate candidates; return functions that wait for their evaluations, in order.
 
-    Without an executor, a function simulates when it is called. If a worker process dies, its evaluation has
-    the status ``crashed``.
+    Without an executor, a function simulates when it is called. A pool of processes is lost with the first
+    that dies, so its simulations are repeated one at a time, each in a process of its own; the one that ends
+    that process too has the status ``crashed``.
     """
     if executor is None:
         return [partial(evaluate, problem, candidate) for candidate in candidates]
-    return [partial(_wait, c, executor.submit(evaluate, problem, c)) for c in candidates]
+    return [partial(_wait, problem, c, executor.submit(evaluate, problem, c)) for c in candidates]
 
 
-def _wait(candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
-    try:
+def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
+    with suppress(BrokenExecutor):
         return future.result()
-    except BrokenExecutor as error:
-        return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
+    with _processes(1) as alone:
+        try:
+            return alone.submit(evaluate, problem, candidate).result()
+        except BrokenExecutor as error:
+            return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
 
 
 def _check_jobs(jobs: int) -> None:

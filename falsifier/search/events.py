@@ -48,6 +48,7 @@ class Asked:
         problem: the problem that the engine works on.
         proposer: who was asked: the engine, or the scout beside it.
         told: number of evaluations that it had been told, all with a smaller index.
+        spent: what the run has spent so far.
     """
 
     first: int
@@ -57,6 +58,7 @@ class Asked:
     problem: Problem
     proposer: Proposer = "engine"
     told: int
+    spent: Spent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

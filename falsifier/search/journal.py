@@ -121,11 +121,12 @@ class Journal:
                         requirement=event.problem.name,
                         proposer=event.proposer,
                         told=event.told,
+                        elapsed=event.spent.seconds,
                     )
                 )
             case Exchanged():
                 exchange = event.exchange.model_dump(mode="json")
-                self._add(ExchangeRecord(exchange=exchange), at_once=True)
+                self._add(ExchangeRecord(exchange=exchange, elapsed=event.spent.seconds), at_once=True)
             case Evaluated():
                 self._evaluated(event)
             case Confirmed():
@@ -200,6 +201,7 @@ class Journal:
                 seconds=evaluation.seconds,
                 log=list(evaluation.log),
                 trajectory=file,
+                elapsed=event.spent.seconds,
             )
         )
         # Only after the record: a crash in between must not lose the trajectory that the journal refers to.

@@ -238,6 +238,7 @@ class _Loop:
                 problem=target.problem,
                 proposer=move.proposer,
                 told=self.count,
+                spent=self.clock(),
             )
         )
         started = self.steps.start(target.problem, candidates)

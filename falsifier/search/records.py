@@ -14,6 +14,8 @@ from falsifier.search.findings import Finding, FindingKind
 from falsifier.search.moves import Proposer
 from falsifier.stl.verdict import Verdict
 
+_ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
+
 
 class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -33,6 +35,7 @@ class AskedRecord(_Record):
     requirement: str = Field(description="Requirement whose engine was asked.")
     proposer: Proposer = Field("engine", description="Who was asked: the engine, or the scout beside it.")
     told: int = Field(description="Number of evaluations that it had been told: all with a smaller index.")
+    elapsed: float = _ELAPSED
 
 
 class VerdictRecord(_Record):
@@ -74,6 +77,7 @@ class EvaluatedRecord(_Record):
     seconds: float
     log: list[str] = []
     trajectory: str | None = Field(None, description="File, relative to the run directory.")
+    elapsed: float = _ELAPSED
 
 
 class ExchangeRecord(_Record):
@@ -81,6 +85,7 @@ class ExchangeRecord(_Record):
 
     kind: Literal["exchange"] = "exchange"
     exchange: dict[str, Any]
+    elapsed: float = _ELAPSED
 
 
 class ConfirmedRecord(_Record):
@@ -170,6 +175,13 @@ def parse_line(line: bytes, number: int | None = None) -> Record:
     if number is not None and record.line != number:
         raise ValueError(f"expected line {number}, found line {record.line}: lines are missing or doubled")
     return record
+
+
+def elapsed_at(record: Record) -> float:
+    """Wall-clock time of the run in s when a record was written."""
+    if isinstance(record, ConfirmedRecord | EndedRecord):
+        return spent_of(record.spent).seconds
+    return record.elapsed
 
 
 def spent_of(recorded: Mapping[str, float | None]) -> Spent:

@@ -7,14 +7,13 @@ valid reply that ended a run is asked again; it stays paid for.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.messages import Chat, Exchange
 from falsifier.llm.replay import RecordedChat, Recording
@@ -29,6 +28,7 @@ from falsifier.search.records import (
     EndedRecord,
     ExchangeRecord,
     Record,
+    elapsed_at,
     spent_of,
 )
 from falsifier.search.steps import Steps
@@ -40,7 +40,7 @@ class Replayed:
 
     Attributes:
         live: carries out the rest.
-        asked: what engines suggested, in order, by the index of the first candidate's evaluation.
+        asked: what engines suggested, by the index of the first candidate's evaluation.
         evaluations: recorded evaluations by index; those that a repair dropped are carried out.
         confirmed: recorded confirmations by evaluation index and requirement.
         recording: recorded replies of a language model.
@@ -49,7 +49,7 @@ class Replayed:
     """
 
     live: Steps
-    asked: dict[int, list[AskedRecord]]
+    asked: dict[int, AskedRecord]
     evaluations: dict[int, Evaluation]
     confirmed: dict[tuple[int, str], ConfirmedRecord]
     recording: Recording
@@ -63,9 +63,9 @@ class Replayed:
 
     def move(self, settled: int, decide: Callable[[], Move]) -> Move:
         """Repeat the recorded moves: ask the same proposer once as much has been told as then."""
-        if not self.asked.get(self._next):
+        record = self.asked.get(self._next)
+        if record is None:
             return decide()
-        record = self.asked[self._next][0]
         return Ask(record.proposer, record.n) if settled >= record.told else None
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
@@ -74,9 +74,9 @@ class Replayed:
         Raises:
             JournalError: if it suggests something else.
         """
-        if not self.asked.get(self._next):
+        record = self.asked.get(self._next)
+        if record is None:
             return self.live.ask(problem, engine, wanted)
-        record = self.asked[self._next].pop(0)
         # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
         candidates = proposals(engine, problem.space, record.n)
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
@@ -89,12 +89,18 @@ class Replayed:
     def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
         """Return functions for recorded evaluations, and start live ones of candidates without."""
         first, self._next = self._next, self._next + len(candidates)
-        return [
-            partial(_with_trajectory, problem, self.evaluations[index])
-            if index in self.evaluations
-            else self.live.start(problem, [candidate])[0]
-            for index, candidate in enumerate(candidates, first)
-        ]
+        return [self._start(problem, *item) for item in enumerate(candidates, first)]
+
+    def _start(self, problem: Problem, index: int, candidate: Candidate) -> Callable[[], Evaluation]:
+        """Start what is left of an evaluation: all of it, its trajectory, or nothing."""
+        recorded = self.evaluations.get(index)
+        if recorded is None:
+            return self.live.start(problem, [candidate])[0]
+        if recorded.verdict is None or recorded.trajectory is not None:
+            return lambda: recorded
+        # The trajectory was not kept, but engines need it.
+        simulate = self.live.start(problem, [recorded.candidate])[0]
+        return lambda: replace(recorded, trajectory=simulate().trajectory)
 
     def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
         """Tell the engine, which has to learn again what it had learnt."""
@@ -124,19 +130,14 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     """Return steps that replay a journal; with an empty journal, the live ones."""
     if not records:
         return live
-    asked: dict[int, list[AskedRecord]] = {}
-    for record in records:
-        if isinstance(record, AskedRecord):
-            asked.setdefault(record.first, []).append(record)
     exchanges, unrepeated = _played_back(records)
-    ended = [r.spent["seconds"] or 0.0 for r in records if isinstance(r, ConfirmedRecord | EndedRecord)]
     return Replayed(
         live,
-        asked,
+        {r.first: r for r in records if isinstance(r, AskedRecord)},
         recorded_evaluations(directory, records),
         {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
         Recording(exchanges),
-        max(ended, default=0.0),
+        max(map(elapsed_at, records)),
         unrepeated,
     )
 
@@ -175,10 +176,3 @@ def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
         reasoning_tokens=spent.reasoning_tokens - sum(usage.reasoning_tokens for usage in usages),
         cost=cost,
     )
-
-
-def _with_trajectory(problem: Problem, evaluation: Evaluation) -> Evaluation:
-    """Simulate a recorded evaluation again if its trajectory was not kept, because engines need it."""
-    if evaluation.verdict is None or evaluation.trajectory is not None:
-        return evaluation
-    return replace(evaluation, trajectory=evaluate(problem, evaluation.candidate).trajectory)

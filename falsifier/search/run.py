@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import overload
 
@@ -208,7 +209,8 @@ def resume(
         problems: what is searched, if it was made in Python: the problems of all these runs.
         engine: the engine, if it was made in Python: a new instance in its initial state.
         chat: chat with the language model, if it was made in Python.
-        budget: limits of the whole run, including what is recorded; default: the original limits.
+        budget: limits of the whole run, including what is recorded; a plain number replaces the limit on
+            simulations alone; default: the original limits.
         listeners: called with every event.
 
     Returns:
@@ -234,7 +236,7 @@ def resume(
     for place, described in described_at.items():
         request = described.request
         if budget is not None:
-            request = request.model_copy(update={"budget": _budget(budget)})
+            request = request.model_copy(update={"budget": _changed(request.budget, budget)})
         if not problems and not request.problems:
             raise JournalError(
                 f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
@@ -378,6 +380,13 @@ def _budget(given: Budget | int | None, objective: Objective | None = None) -> B
     if isinstance(given, Budget):
         return given
     return budget_of(None if given is None else whole("budget", given, least=1), objective=objective)
+
+
+def _changed(budget: Budget, given: Budget | int) -> Budget:
+    """The limits of a run that is continued with others."""
+    if isinstance(given, Budget):
+        return given
+    return replace(budget, simulations=whole("budget", given, least=1))
 
 
 def _settings(llm: LLM | None) -> LLMSettings | None:

@@ -19,6 +19,7 @@ from falsifier.search.records import (
     ExchangeRecord,
     Record,
     VerdictRecord,
+    elapsed_at,
     spent_of,
 )
 
@@ -65,7 +66,7 @@ class Tally:
 
     @property
     def spent(self) -> Spent:
-        """What the run has spent; wall-clock seconds are known only after it has ended."""
+        """What the run has spent."""
         return replace(
             self._spent,
             simulations=len(self._robustness),
@@ -100,6 +101,7 @@ class Tally:
             return
         if self.counterexample is None:
             self.status = "running"
+            self._spent = replace(self._spent, seconds=elapsed_at(record))
         match record:
             case EvaluatedRecord():
                 self._evaluated(record)

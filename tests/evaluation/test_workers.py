@@ -4,9 +4,10 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
 from threading import Barrier
 from time import sleep
@@ -16,7 +17,8 @@ import pytest
 
 from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SimulationError, SpecError
-from falsifier.evaluation.workers import Renewing, local_executor, open_workers
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.evaluation.workers import Renewing, local_executor, open_workers, start
 from falsifier.fmu.isolation import REGISTRY
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
@@ -162,3 +164,30 @@ def test_processes_that_died_are_replaced() -> None:
     assert [executor.submit(abs, -i).result() for i in range(3)] == [0, 1, 2]
     assert len(made) == 3
     executor.shutdown()
+
+
+class Doomed(Executor):
+    """A pool that is lost with all its tasks if it has several, or if its only one is deadly."""
+
+    def __init__(self, jobs: int, ending: object) -> None:
+        self._jobs = jobs
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> "Future[Any]":
+        future: Future[Any] = Future()
+        if self._jobs > 1 or args[1].rationale == "deadly":
+            future.set_exception(BrokenProcessPool("a process was terminated abruptly"))
+        else:
+            future.set_result(function(*args, **options))
+        return future
+
+
+def test_only_what_ends_a_process_of_its_own_has_crashed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.evaluation.workers._process_pool", Doomed)
+    problem = lag_problem()
+    harmless = problem.space.decode([0.1, 0.2, 0.3, 0.4])
+    deadly = replace(harmless, rationale="deadly")
+    with local_executor(3, problem.model) as executor:
+        evaluations = [wait() for wait in start(problem, [harmless, deadly, harmless], executor)]
+    assert [each.status for each in evaluations] == ["ok", "crashed", "ok"]
+    assert evaluations[0].verdict == evaluate(problem, harmless).verdict
+    assert evaluations[1].reason == "the worker process died: a process was terminated abruptly"

@@ -6,19 +6,18 @@ import pytest
 
 from falsifier.errors import JournalError
 from falsifier.search.journal import Journal, JournalReader, open_journal, read_journal, recorded_candidates
-from falsifier.search.records import AskedRecord, Record, line_of
+from falsifier.search.records import Record, line_of
 from falsifier.search.run import falsify
 from tests.problems import impossible
+from tests.search.test_questions import asked
 from tests.search.test_tally import evaluated
 
 
 def test_candidates_are_found_in_batches(tmp_path: Path) -> None:
     lines: list[Record] = [
-        AskedRecord(
-            first=0, n=2, candidates=[{"origin": "a"}, {"origin": "b"}], seconds=0.1, requirement="R", told=0
-        ),
+        asked(0, {"origin": "a"}, {"origin": "b"}),
         evaluated(0, 1.0),
-        AskedRecord(first=2, n=2, candidates=[{"origin": "c"}], seconds=0.1, requirement="R", told=1),
+        asked(2, {"origin": "c"}),
     ]
     (tmp_path / "journal.jsonl").write_bytes(b"".join(line_of(line, i) for i, line in enumerate(lines, 1)))
     found = recorded_candidates(read_journal(tmp_path))

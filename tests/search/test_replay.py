@@ -4,6 +4,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 
@@ -14,11 +15,13 @@ from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget
+from falsifier.search.events import Evaluated, Event
 from falsifier.search.journal import read_journal
-from falsifier.search.records import AskedRecord
+from falsifier.search.records import AskedRecord, EvaluatedRecord
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
 from falsifier.testing import lag_problem
+from tests.patience import HANG
 from tests.search.support import run
 
 
@@ -59,6 +62,20 @@ def test_a_run_whose_time_is_used_up_is_still_repeated(tmp_path: Path) -> None:
     )
     assert keys(resumed) == keys(whole)
     assert resumed.reason == "the time limit of 1e-09 s is reached"
+
+
+def test_the_time_of_a_run_that_was_killed_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.search.loop.perf_counter", ScriptedClock(10.0))
+    problem = lag_problem("G[0,10] (x <= 2)")
+    run(problem, tmp_path, budget=5)
+    journal = tmp_path / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:-1]))
+    last = read_journal(tmp_path)[-1]
+    assert isinstance(last, EvaluatedRecord) and last.elapsed > 100.0
+    (resumed,) = resume(tmp_path, problems=[problem], budget=Budget(8, seconds=100.0))
+    assert resumed.reason == "the time limit of 100 s is reached"
+    assert resumed.spent.simulations == 5 and resumed.spent.seconds > last.elapsed
 
 
 class ScriptedClock:
@@ -146,3 +163,24 @@ def test_with_several_cores_an_engine_is_asked_as_soon_as_one_is_free(
     assert [told for *_, told in proposers(tmp_path)] == [0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
     (resumed,) = resume(tmp_path, problems=[problem])
     assert keys(resumed) == keys(whole)
+
+
+def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    monkeypatch.setattr("falsifier.search.run.local_executor", threads)
+    whole = falsify(problem, "uniform", budget=6, seed=1, jobs=2, directory=tmp_path)
+    shutil.rmtree(tmp_path / "trajectories")
+    together = Barrier(2)
+
+    def simulated(problem: Problem, candidate: Candidate) -> Evaluation:
+        together.wait(HANG)
+        return evaluate(problem, candidate)
+
+    monkeypatch.setattr("falsifier.evaluation.workers.evaluate", simulated)
+    events: list[Event] = []
+    (resumed,) = resume(tmp_path, problems=[problem], listeners=[events.append])
+    assert keys(resumed) == keys(whole)
+    evaluated = [event.evaluation for event in events if isinstance(event, Evaluated)]
+    assert len(evaluated) == 6 and all(each.trajectory is not None for each in evaluated)

@@ -162,6 +162,13 @@ class TestResume:
         whole = falsify(impossible(), "uniform", budget=7)
         assert [e.candidate.key for e in more.evaluations] == [e.candidate.key for e in whole.evaluations]
 
+    def test_a_number_changes_the_limit_on_simulations_alone(self, tmp_path: Path) -> None:
+        limits = Budget(3, seconds=1e6)
+        falsify("python:tests.problems:impossible", "uniform", budget=limits, directory=tmp_path)
+        events: list[Event] = []
+        resume(tmp_path, budget=4, listeners=[events.append])
+        assert isinstance(events[0], RunStarted) and events[0].budget == Budget(4, seconds=1e6)
+
     def test_a_folder_of_runs_is_resumed_one_by_one(self, tmp_path: Path) -> None:
         for name in ("easy", "impossible"):
             falsify(f"python:tests.problems:{name}", "corners", budget=2, directory=tmp_path / name)

@@ -23,7 +23,9 @@ def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
             robustness=robustness, critical_time=1.0, predicate="x <= 1", values={"x": 2.0}
         )
     status = "ok" if verdict else "failed"
-    return EvaluatedRecord(index=index, status=status, verdicts={"R": verdict}, seconds=0.5)
+    return EvaluatedRecord(
+        index=index, status=status, verdicts={"R": verdict}, seconds=0.5, elapsed=index + 1
+    )
 
 
 def confirmed(index: int, outcome: Outcome, reason: str, **spent: float | None) -> ConfirmedRecord:
@@ -41,12 +43,12 @@ def confirmed(index: int, outcome: Outcome, reason: str, **spent: float | None) 
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     tally = Tally()
     assert status(tally) == "waiting"
-    tally.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", told=0))
+    tally.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", told=0, elapsed=0.1))
     assert status(tally) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         tally.add(evaluated(i, robustness))
     assert (tally.best, tally.best_robustness) == (4, -3.0)
-    assert (tally.spent.simulations, tally.spent.simulation_seconds) == (5, 2.5)
+    assert (tally.spent.simulations, tally.spent.simulation_seconds, tally.spent.seconds) == (5, 2.5, 5.0)
     tally.add(confirmed(2, "fragile", "vanishes"))
     assert status(tally) == "running"
     tally.add(confirmed(4, "confirmed", "yes", simulations=5.0, seconds=9.0, cost=None))
@@ -75,7 +77,7 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     )
     unanswered = exchange.model_copy(update={"reply": None, "problem": "timeout"})
     for each in (exchange, unanswered, exchange):
-        tally.add(ExchangeRecord(exchange=each.model_dump(mode="json")))
+        tally.add(ExchangeRecord(exchange=each.model_dump(mode="json"), elapsed=1.0))
     assert (tally.spent.tokens, tally.spent.reasoning_tokens, tally.spent.cost) == (240, 10, 0.5)
 
 

@@ -83,9 +83,17 @@ def test_loading_reads_each_line_once_and_passes_over_the_candidates(
     with (tmp_path / "journal.jsonl").open("wb") as file:
         for i in range(1000):
             asked = AskedRecord(
-                first=i, n=1, candidates=[candidate], seconds=1e-4, requirement="EASY", told=i
+                first=i,
+                n=1,
+                candidates=[candidate],
+                seconds=1e-4,
+                requirement="EASY",
+                told=i,
+                elapsed=0.02 * i,
             )
-            done = EvaluatedRecord(index=i, status="ok", verdicts={"EASY": verdict}, seconds=0.01)
+            done = EvaluatedRecord(
+                index=i, status="ok", verdicts={"EASY": verdict}, seconds=0.01, elapsed=0.02 * i + 0.01
+            )
             file.write(line_of(asked, 2 * i + 1) + line_of(done, 2 * i + 2))
     parsed: list[str] = []
 
