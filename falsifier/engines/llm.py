@@ -64,7 +64,7 @@ class LLMEngine:
         fallback: engine to switch to if the LLM cannot be reached or gives no valid reply; None: the error
             ends the run.
         start: called once, before the first question, for the smallest and largest value of each output at
-            time 0; only if the variant tells them.
+            time 0; only if the variant tells them, or if scales depend on them.
     """
 
     def __init__(
@@ -237,7 +237,7 @@ class LLMEngine:
             self._fallback.tell(evaluations)
         told = evaluations
         if self._disguise:
-            self._circumstances()  # first, so that values at time 0 determine scales before trajectories do
+            self._circumstances()  # first: values at time 0 determine scales before trajectories do
             self._wear(self._disguise.fitted(evaluations))
             told = [self._disguise.hidden(e) for e in evaluations]
         keys = {e.candidate.key for e in told}
@@ -262,7 +262,7 @@ class LLMEngine:
         *,
         dispensable: bool,
     ) -> list[Candidate]:
-        variant = self._variant
+        variant, circumstances = self._variant, self._circumstances()  # scales may depend on start values
         form = reply_form(self._view, variant, self._reply, count=count)
         prompt = build_prompt(
             self._view,
@@ -272,7 +272,7 @@ class LLMEngine:
             notes=notes,
             count=count,
             reply=self._reply,
-            circumstances=self._circumstances(),
+            circumstances=circumstances,
         )
         request = ChatRequest(
             messages=render(trimmed(prompt, self._prompt_tokens, self._chat.llm)),
@@ -297,9 +297,9 @@ class LLMEngine:
 
     def _circumstances(self) -> Circumstances:
         if self._known is None:
-            start = self._start() if self._variant.has("circumstances") else {}
+            start = self._start() if self._disguise or self._variant.has("circumstances") else {}
             if self._disguise:
-                self._wear(self._disguise.fitted_to_start(start))
+                self._wear(Disguise.of(self._disguise.real, start))
                 start = self._disguise.hidden_values(start)
             self._known = Circumstances(start=start)
         return replace(self._known, simulations=self._simulations, doubts=self._doubts)

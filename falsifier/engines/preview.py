@@ -42,10 +42,10 @@ def preview(
     """
     problem, told = told_context(problem, variant, anonymous=anonymous)
     view = told_view(View.of(problem), reply)
-    start = start_values(problem) if told.has("circumstances") else {}
+    start = start_values(problem) if anonymous or told.has("circumstances") else {}
     disguise = None
     if anonymous:
-        disguise = Disguise.of(view).fitted_to_start(start).fitted(evaluations)
+        disguise = Disguise.of(view, start).fitted(evaluations)
         view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
         start = disguise.hidden_values(start)
     doubts = doubts_told(doubtful, disguise)

@@ -67,7 +67,9 @@ def doubts_told(confirmations: Sequence[Confirmation], disguise: Disguise | None
     """Return why violations do not count, by the keys of their candidates as they are told."""
     if disguise is None:
         return {c.candidate.key: in_doubt(c) for c in confirmations}
-    return {
-        disguise.hidden_candidate(c.candidate).key: in_doubt(c, disguise.unit_of(c.evaluation))
-        for c in confirmations
-    }
+    return {disguise.hidden_candidate(c.candidate).key: _in_hidden_doubt(c, disguise) for c in confirmations}
+
+
+def _in_hidden_doubt(confirmation: Confirmation, disguise: Disguise) -> str:
+    verdict = confirmation.evaluation.verdict
+    return in_doubt(confirmation, lambda r: r if verdict is None else disguise.hidden_robustness(verdict, r))

@@ -1,34 +1,38 @@
 """Neutral names and scales, so that the prompt does not reveal which system is searched.
 
 Inputs are u1, u2, ..., parameters p1, ..., other signals y1, ..., derived ones z1, .... What is searched runs
-from 0 to 1, everything else is divided by a constant (``falsifier.llm.scaling`` states the rules). Units,
+from 0 to 1, everything else is mapped to between 0 and 1 (``falsifier.llm.scaling`` states the rules). Units,
 descriptions, types and names of enumeration items are left out. Times stay in seconds.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.model import Kind, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.observations import monitor_for
 from falsifier.llm.prompts.view import View
 from falsifier.llm.scaling import (
     Scales,
+    are_comparable,
+    compared_numbers,
     hidden_value,
     keeps_form,
     levels,
     margin,
     real_value,
     scaled_predicate,
+    signed_names,
     with_predicates,
 )
 from falsifier.problem.requirement import Requirement
@@ -41,9 +45,12 @@ Columns = Mapping[str, NDArray[np.float64]]
 # Of a signal between 0 and 1, so that it is told as exactly as one in the hundreds.
 _MORE_DECIMALS = 2
 _DESCRIPTION = (
-    "Names are neutral and numbers have no units: everything that you choose runs from 0 to 1, and each "
-    "signal is divided by a constant; signals that are compared have the same one"
+    "Names are neutral and numbers have no units. Everything that you choose runs from 0 to 1. Each signal "
+    "has a scale of its own from 0 to 1, which is linear between 0.2 and 0.8 and compressed beyond; "
+    "robustness is that of scaled signals"
 )
+# What a derived signal is compared with.
+_MIDDLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -54,7 +61,7 @@ class Disguise:
         real: the original view.
         names: neutral names by real name.
         derived: predicates that are told as derived signals, with what stands for the real names of these.
-        scales: constants by which signals are divided, by real name.
+        scales: how signals are scaled, by real name.
     """
 
     real: View
@@ -63,8 +70,14 @@ class Disguise:
     scales: Scales
 
     @classmethod
-    def of(cls, view: View) -> "Disguise":
-        """Number the names of a view: inputs, parameters, then the signals of the formula and the model."""
+    def of(cls, view: View, start: Mapping[str, tuple[float, float]] | None = None) -> "Disguise":
+        """Number the names of a view: inputs, parameters, then the signals of the formula and the model.
+
+        Args:
+            view: what is hidden.
+            start: smallest and largest value of outputs at time 0, by name.
+        """
+        start = start or {}
         inputs = [r.name for r in view.space.inputs]
         parameters = [p.name for p in view.space.parameters]
         searched = {*inputs, *parameters}
@@ -73,17 +86,24 @@ class Disguise:
             (*formula.signals, *view.experiment.outputs, *(v.name for v in view.info.inputs))
         )
         others = [name for name in seen if name not in searched]
-        changed = [p for p in formula.predicates if not keeps_form(p, searched)]
+        changed = [p for p in formula.predicates if not keeps_form(p)]
         # No variable has such a name.
         derived = {p: f"\0{k}" for k, p in enumerate(changed, start=1)}
-        units = {name: view.unit(name) for name in others}
         names = {
             **{name: f"u{i}" for i, name in enumerate(inputs, start=1)},
             **{name: f"p{i}" for i, name in enumerate(parameters, start=1)},
             **{name: f"y{i}" for i, name in enumerate(others, start=1)},
             **{name: f"z{i}" for i, name in enumerate(derived.values(), start=1)},
         }
-        return cls(view, names, derived, Scales.of(formula, (*others, *derived.values()), units, searched))
+        scales = Scales.of(
+            {
+                **{name: [*compared_numbers(formula, name), *start.get(name, ())] for name in others},
+                **{name: _known_margins(p, start) for p, name in derived.items()},
+            },
+            {name: _unit_of_margin(view, p) for p, name in derived.items()},
+            {name: limits for name in others if (limits := _declared(view, name)) is not None},
+        )
+        return cls(view, names, derived, scales)
 
     @cached_property
     def view(self) -> View:
@@ -94,8 +114,8 @@ class Disguise:
         variables = [
             *(Variable(names[name], kind=kind) for name, kind in kinds.items() if kind != "string"),  # type: ignore[arg-type]
             *(
-                Variable(names[name], description="derived from other signals")
-                for name in self.derived.values()
+                Variable(names[name], kind=self._kind(predicate), description=self._derivation(predicate))
+                for predicate, name in self.derived.items()
             ),
         ]
         return View(
@@ -113,19 +133,11 @@ class Disguise:
         )
 
     def fitted(self, evaluations: Sequence[Evaluation]) -> "Disguise":
-        """The disguise with the constants that trajectories determine; those known already stay."""
+        """The disguise with the scales that trajectories determine; those known already stay."""
         found = self
         for trajectory in (e.trajectory for e in evaluations if e.trajectory is not None):
-            largest = {
-                n: float(np.abs(c).max(initial=0.0)) for n, c in self._scaled_columns(trajectory).items()
-            }
-            found = replace(found, scales=found.scales.fitted(largest))
+            found = replace(found, scales=found.scales.fitted(self._scaled_columns(trajectory)))
         return found
-
-    def fitted_to_start(self, start: Mapping[str, tuple[float, float]]) -> "Disguise":
-        """The disguise with the constants that values at time 0 determine."""
-        largest = {name: max(abs(low), abs(high)) for name, (low, high) in start.items()}
-        return replace(self, scales=self.scales.fitted(largest))
 
     def hidden(self, evaluation: Evaluation) -> Evaluation:
         """Return an evaluation under neutral names and scales, without the model's messages."""
@@ -149,7 +161,7 @@ class Disguise:
         predicate = next((p for p in self._predicates if str(p) == verdict.predicate), None)
         return replace(
             verdict,
-            robustness=verdict.robustness / self._unit(verdict),
+            robustness=self.hidden_robustness(verdict, verdict.robustness),
             predicate="" if predicate is None else str(self._predicates[predicate]),
             values={
                 self.names[n]: self._hidden_number(n, v) for n, v in verdict.values.items() if n in self.names
@@ -161,20 +173,20 @@ class Disguise:
         back = self.hidden_candidate(self.revealed(candidate))
         return replace(candidate, signals=back.signals, parameters=back.parameters)
 
-    def unit_of(self, evaluation: Evaluation) -> float:
-        """What the robustness of an evaluation is divided by, in the scale of what decided it."""
-        return 1.0 if evaluation.verdict is None else self._unit(evaluation.verdict)
-
-    def _unit(self, verdict: Verdict) -> float:
-        for predicate in self._predicates:
-            if str(predicate) == verdict.predicate:
-                if predicate in self.derived:
-                    return self.scales[self.derived[predicate]]
-                name = (*predicate.left.signals, *predicate.right.signals, "")[0]
-                if name in self._searched:
-                    return self._searched[name].high - self._searched[name].low or 1.0
-                return self.scales[name]
-        return 1.0
+    def hidden_robustness(self, verdict: Verdict, robustness: float) -> float:
+        """Return a robustness in the scale of what decided a verdict on the same candidate."""
+        predicate = next((p for p in self._predicates if str(p) == verdict.predicate), None)
+        if predicate is None:
+            return robustness
+        if predicate in self.derived:
+            return self.scales[self.derived[predicate]].number(robustness) - _MIDDLE
+        (name,) = predicate.left.signals or predicate.right.signals
+        (limit,) = compared_numbers(predicate, name)
+        # Whether a larger value of the signal is a larger robustness.
+        rises = (verdict.values.get(name, np.inf) > limit) == (verdict.robustness > 0)
+        there = limit + (robustness if rises else -robustness)
+        distance = self._scaled(name, there) - self._scaled(name, limit)
+        return distance if rises else -distance
 
     def hidden_values(self, values: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
         """Return smallest and largest values under neutral names, without those that are not shown."""
@@ -222,11 +234,17 @@ class Disguise:
     def _predicates(self) -> dict[Predicate, Predicate]:
         """Hidden predicates by real ones."""
         return {
-            p: Predicate(p.operator, Name(self.names[self.derived[p]]), Number(0.0))
-            if p in self.derived
-            else scaled_predicate(p, self.scales, self.names, self._searched)
+            p: _not_truth(
+                Predicate(p.operator, Name(self.names[self.derived[p]]), Number(_MIDDLE))
+                if p in self.derived
+                else self._rescaled(p)
+            )
             for p in self.real.requirement.formula.predicates
         }
+
+    def _rescaled(self, predicate: Predicate) -> Predicate:
+        (name,) = predicate.left.signals or predicate.right.signals
+        return scaled_predicate(predicate, partial(self._scaled, name), self.names[name])
 
     def _hidden_input(self, r: InputRange) -> InputRange:
         low, high = hidden_value(r, r.low), hidden_value(r, r.high)
@@ -248,10 +266,33 @@ class Disguise:
     def _hidden_number(self, name: str, value: float) -> float:
         if name in self._searched:
             return hidden_value(self._searched[name], value)
-        return value / self.scales[name]
+        return self.scales[name].number(value)
+
+    def _scaled(self, name: str, value: float) -> float:
+        """A value near what a signal is compared with; not rounded."""
+        ranged = self._searched.get(name)
+        if ranged is None:
+            return self.scales[name].number(value)
+        return (value - ranged.low) / (ranged.high - ranged.low or 1.0)
+
+    def _kind(self, predicate: Predicate) -> Kind:
+        """Integer if all signals of a derived one are discrete, so that it is told as changes, too."""
+        kinds = {self.real.kind(n) for n in (*predicate.left.signals, *predicate.right.signals)}
+        return "real" if "real" in kinds else "integer"
+
+    def _derivation(self, predicate: Predicate) -> str:
+        """What a derived signal is made of, without numbers."""
+        terms = signed_names(predicate)
+        if not terms or {name for _, name in terms} & self._searched.keys():
+            names = dict.fromkeys((*predicate.left.signals, *predicate.right.signals))
+            return f"derived from {listed([self.names[name] for name in names])}"
+        first, *rest = sorted(terms)  # a plus comes before a minus
+        lead = "" if first[0] == "+" else "-"
+        text = "".join(f" {sign} {self.names[name]}" for sign, name in rest)
+        return f"{lead}{self.names[first[1]]}{text} before scaling, less a constant, on a scale of its own"
 
     def _scaled_columns(self, trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
-        """Columns that are divided by constants, derived ones included, before the division."""
+        """Columns that have scales, derived ones included, before they are scaled."""
         others = {n: c for n, c in trajectory.columns.items() if n in self.names and n not in self._searched}
         return others | {name: margin(p, trajectory.columns) for p, name in self.derived.items()}
 
@@ -260,7 +301,40 @@ class Disguise:
         return {
             **{self.names[n]: (trajectory[n] - r.low) / (r.high - r.low or 1.0) for n, r in searched.items()},
             **{
-                self.names[n]: column / self.scales[n]
+                self.names[n]: self.scales[n].of(column)
                 for n, column in self._scaled_columns(trajectory).items()
             },
         }
+
+
+def _not_truth(predicate: Predicate) -> Predicate:
+    """The predicate, in a form that is not read as the truth of a Boolean."""
+    if predicate.operator == ">=" and predicate.right == Number(_MIDDLE):
+        return Predicate("<=", predicate.right, predicate.left)
+    return predicate
+
+
+def _declared(view: View, name: str) -> tuple[float, float] | None:
+    """Smallest and largest value that the model declares; None unless it declares both."""
+    low, high = view.info[name].limits if name in view.info else (None, None)
+    return None if low is None or high is None else (float(low), float(high))
+
+
+def _known_margins(predicate: Predicate, start: Mapping[str, tuple[float, float]]) -> list[float]:
+    """What is known of left minus right side before a simulation, so that 0 is in the middle."""
+    names = {*predicate.left.signals, *predicate.right.signals}
+    if not names <= start.keys() or any(low != high for low, high in (start[n] for n in names)):
+        return [0.0]
+    found = margin(predicate, {n: np.array([start[n][0]]) for n in names})
+    size = float(np.abs(found).max())
+    return [-size, size]
+
+
+def _unit_of_margin(view: View, predicate: Predicate) -> str:
+    """A name for the unit of left minus right side; empty if it has not that of its signals, or none."""
+    units = {view.unit(n) for n in (*predicate.left.signals, *predicate.right.signals)}
+    return (
+        f"difference in {units.pop()}"
+        if len(units) == 1 and units != {""} and are_comparable(predicate)
+        else ""
+    )

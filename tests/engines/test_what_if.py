@@ -208,7 +208,7 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
     judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
     asked = drive(engine, judge, rounds=14)
     sent = [r for r in chat.requests if r.tools]
-    assert "by y1 <= 0.769230769" in answers(sent[1])[0]
+    assert "by y1 <= 0.730769231" in answers(sent[1])[0]
     everything = "\n".join(m.content for r in sent for m in r.messages) + str([r.tools for r in sent])
     # An x between numbers counts repeated values.
     assert not re.search(r"\bu\b|(?<!\d )\bx\b|\blag\b|drive|position", everything)

@@ -14,6 +14,7 @@ from falsifier.engines.llm import make_llm_engine
 from falsifier.engines.preview import preview
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.initial import start_values
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
@@ -88,30 +89,33 @@ def test_candidates_come_back_under_their_names_and_in_their_ranges() -> None:
     assert disguise.hidden_candidate(problem.space.admit(back)).signals == signals
 
 
-def test_a_formula_on_one_scale_keeps_its_robustness_up_to_a_constant() -> None:
+def test_robustness_is_that_of_the_scaled_formula() -> None:
     problem = load_problem("AT1")
     disguise = disguised(problem)
     real = evaluate(problem, problem.space.decode([100] * 7 + [0] * 3))
     hidden = disguise.fitted([real]).hidden(real)
     assert real.verdict is not None and hidden.verdict is not None
-    assert hidden.verdict.robustness * 1.3 * 120 == pytest.approx(real.verdict.robustness, rel=1e-6)
-    assert hidden.verdict.predicate == "y1 <= 0.769230769"
+    # The FMU declares -10 to 250 mph, which becomes 0.2 to 0.8.
+    assert hidden.verdict.predicate == "y1 <= 0.5"
+    assert hidden.verdict.robustness == pytest.approx(real.verdict.robustness * 0.6 / 260, rel=1e-6)
     assert hidden.verdict.critical_time == real.verdict.critical_time
     bare = disguise.hidden(replace(real, trajectory=None))
     assert bare.trajectory is None and bare.verdict is not None
     assert bare.verdict.robustness == pytest.approx(hidden.verdict.robustness, rel=1e-6)
-    assert bare.verdict.values["y1"] == pytest.approx(real.verdict.values["speed"] / 156, rel=1e-12)
+    assert bare.verdict.values["y1"] == pytest.approx(0.5 - hidden.verdict.robustness, rel=1e-9)
+    assert round(bare.verdict.values["y3"], 9) in (0.2, 0.4, 0.6, 0.8)
 
 
 @pytest.mark.parametrize(
     ("formula", "hidden"),
     [
-        ("G[0,10] (x <= 0.9)", "G[0,10] (y1 <= 0.769230769)"),
+        ("G[0,10] (x <= 0.9)", "G[0,10] (y1 <= 0.5)"),
         ("G[0,10] (u <= 0.5)", "G[0,10] (u1 <= 0.75)"),
-        ("G[0,10] (abs(x) <= 0.9 and x >= -0.45)", "G[0,10] (abs(y1) <= 0.769230769 and y1 >= -0.384615385)"),
-        ("G[0,10] (x >= 0)", "G[0,10] (y1 >= 0)"),
-        ("G[0,10] (2*x <= 1)", "G[0,10] (z1 <= 0)"),
-        ("G[0,10] (x^2 <= 1 -> abs(x - u) < 3)", "G[0,10] (z1 <= 0 -> z2 < 0)"),
+        ("G[0,10] (x <= 0.9 and x >= -0.35)", "G[0,10] (y1 <= 0.730769231 and y1 >= 0.269230769)"),
+        ("G[0,10] (x >= 0)", "G[0,10] (0.5 <= y1)"),
+        ("G[0,10] (abs(x) >= 0.1)", "G[0,10] (0.5 <= z1)"),
+        ("G[0,10] (2*x <= 1)", "G[0,10] (z1 <= 0.5)"),
+        ("G[0,10] (x^2 <= 1 -> abs(x - u) < 3)", "G[0,10] (z1 <= 0.5 -> z2 < 0.5)"),
     ],
 )
 def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
@@ -120,9 +124,34 @@ def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
     assert str(disguise.view.requirement.formula) == hidden
     for value in (-1.0, -0.3, 0.95, 1.0):
         real = evaluate(problem, problem.space.decode([value] * 4))
-        told = disguise.fitted([real]).hidden(real)
-        assert real.robustness is not None and told.robustness is not None
-        assert (told.robustness < 0) == (real.robustness < 0)
+        settled = disguise.fitted([real])
+        assert str(settled.view.requirement.formula) == hidden
+        told = settled.hidden(real)
+        assert real.verdict is not None and told.verdict is not None
+        assert (told.verdict.robustness < 0) == (real.verdict.robustness < 0)
+        foretold = settled.hidden_verdict(real.verdict)
+        assert foretold.robustness == pytest.approx(told.verdict.robustness, abs=1e-8)
+
+
+def test_outputs_stay_between_0_and_1_and_scales_do_not_change() -> None:
+    problem = load_problem("CCx")
+    disguise = Disguise.of(View.of(problem), start_values(problem))
+    standing = disguise.view.info.description, str(disguise.view.requirement.formula)
+    first, second = (
+        evaluate(problem, problem.space.decode(p)) for p in ([1.0] * 10 + [0.0] * 10, [0.0] * 20)
+    )
+    fitted = disguise.fitted([first])
+    assert fitted.fitted([second]) == fitted
+    assert (fitted.view.info.description, str(fitted.view.requirement.formula)) == standing
+    for evaluation in (first, second):
+        told = fitted.hidden(evaluation).trajectory
+        assert told is not None
+        assert all(0 <= column.min() <= column.max() <= 1 for column in told.columns.values())
+        assert {told[f"y{i}"][0] for i in range(1, 6)} == {0.5}
+    gear = Disguise.of(View.of(load_problem("AT51"))).view
+    assert (gear.kind("z1"), gear.description("z1")) == ("integer", "derived from y1")
+    kept = disguise.view.info["z2"].description
+    assert kept == "y3 - y1 before scaling, less a constant, on a scale of its own"
 
 
 def test_integers_become_levels() -> None:
@@ -158,7 +187,7 @@ def test_doubts_and_start_values_are_scaled() -> None:
     )
     engine.ask()
     sent = text_of(chat.requests)
-    assert "a second simulation gave robustness +0.5," in sent or "gave robustness +0.5." in sent
+    assert "a second simulation gave robustness +0.135. " in sent
     assert "y1: " in sent.replace("- y1;", "y1: ") and "p1" in sent
 
 

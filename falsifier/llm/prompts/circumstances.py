@@ -1,6 +1,6 @@
 """What a prompt may tell beside the problem and its samples: limit, start, doubts."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 
 from falsifier.evaluation.confirm import Confirmation
@@ -22,20 +22,20 @@ class Circumstances:
     doubts: Mapping[Hashable, str] = field(default_factory=dict)
 
 
-def in_doubt(confirmation: Confirmation, unit: float = 1.0) -> str:
+def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float) -> str:
     """Why a violation does not count, without any name, and what would count.
 
     Args:
         confirmation: how the violation was repeated.
-        unit: what robustness values are divided by.
+        shown: turns a robustness into the number that is told.
     """
     found = confirmation.evaluation.robustness
     assert found is not None
     robustness, reference, halved = (
-        None if value is None else value / unit
+        None if value is None else shown(value)
         for value in (confirmation.robustness, confirmation.reference, confirmation.halved)
     )
-    found /= unit
+    found = shown(found)
     again = halved if robustness is not None else None
     if robustness is None:
         why = "a second simulation of it failed"

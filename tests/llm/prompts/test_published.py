@@ -160,5 +160,5 @@ def test_scaled_signals_get_more_digits() -> None:
     prompt = build_prompt(disguise.view, VARIANTS["MP4"], [disguise.hidden(evaluation)])
     changing = render(prompt)[1].content
     real = told(problem, "MP4", [evaluation])[1]
-    assert "robustness 0.419" in real and "robustness 0.00268" in changing
-    assert re.search(r"y1: 0\.000 at 0\.0 s, 0\.\d{3} at", changing)
+    assert "robustness 0.419" in real and "robustness 0.00097" in changing
+    assert re.search(r"y1: 0\.223 at 0\.0 s, 0\.\d{3} at", changing)
