@@ -123,7 +123,7 @@ class Problem:
             joined.parameters,
             source,
             joined.notes,
-            named_context=Named(tuple(name for name in context if name != "fmu"), "fmu" in context),
+            named_context=Named.of(context),
         )
 
     @classmethod
