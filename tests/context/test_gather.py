@@ -21,12 +21,12 @@ def read(*files: Path) -> Context:
 
 def test_thresholds_stand_with_their_signals(tmp_path: Path) -> None:
     context = read(LIMP, simulink.write_slx(tmp_path / "limphome.slx"))
-    assert "disagreement > enterAbove (enterAbove = 9.5)" in context.of("disagreement")
-    assert "disagreement > 9.5" in context.of("disagreement")
+    assert "disagreement > enterAbove (enterAbove = 6.8)" in context.of("disagreement")
+    assert "disagreement > 6.8" in context.of("disagreement")
     assert "temperature >= 64" in context.of("temperature")
     assert "set by the chart Mode logic with the states Normal, Limp" in context.of("limp")[0]
     others = [c.text for c in context.comparisons if not c.signals]
-    assert "pause * period < valid (period = 0.1, valid = 1.5)" in others
+    assert "pause * period >= settling (period = 0.1, settling = 1.5)" in others
     first, second = context.excerpts
     assert (first.form, first.sha256) == (
         "what the requirement depends on",

@@ -42,6 +42,6 @@ def test_files_are_read_only_when_asked_for() -> None:
     with pytest.raises(SpecError, match="context no such file: cannot be read"):
         with_context(problem)
     read = with_context(load_source(ProblemSource(target="HeaterLimpHome", context=(str(LIMP),))))
-    assert "disagreement > enterAbove (enterAbove = 9.5)" in read.context.of("disagreement")
+    assert "disagreement > enterAbove (enterAbove = 6.8)" in read.context.of("disagreement")
     # What was read once, or recorded, is not read again.
     assert with_context(replace(problem, context=read.context)).context == read.context
