@@ -185,10 +185,10 @@ def context_option(command: Function) -> Function:
         "--context",
         "context",
         multiple=True,
-        metavar="FILE|fmu|none",
+        metavar="FILE|fmu|none|checked:FILE",
         help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
-        "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names. "
-        "Repeatable.",
+        "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names; "
+        "checked:FILE: a line of this file looks like a key and is none. Repeatable.",
     )(command)
 
 

@@ -1,14 +1,12 @@
 """What lies inside an FMU beside its binaries: documentation, sources, texts, terminals, annotations."""
 
-import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
-from falsifier.context.xml import parse_xml
 from falsifier.errors import SpecError
-from falsifier.fmu.archive import open_archive
+from falsifier.fmu.archive import UNREADABLE, open_archive
+from falsifier.fmu.xml import read_xml
 
 _DOCUMENTS = (".html", ".htm", ".md", ".txt")
 _RESOURCES = (".txt", ".md", ".json")
@@ -19,6 +17,8 @@ _DESCRIPTION = "modelDescription.xml"
 _STANDARD = ("fmi2", "fmi3", "fmiplatform", "fmimodel", "sundials", "cvode")
 _MAX_BYTES = 4 << 20
 _MAX_FILES = 400
+# What to do about a file inside an FMU that cannot be told: it cannot be left out alone.
+NAME_THEM = "unpack the FMU, and name the files that matter with --context FILE instead of --context fmu"
 
 
 def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
@@ -34,18 +34,22 @@ def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
         entries = [e for e in archive.infolist() if not e.is_dir() and _may_tell(PurePosixPath(e.filename))]
         if len(entries) > _MAX_FILES:
             raise SpecError(
-                f"{fmu}: has {len(entries)} documents and sources, more than {_MAX_FILES}; name those that "
-                "matter with --context FILE"
+                f"{fmu}: has {len(entries)} documents and sources, more than {_MAX_FILES}; {NAME_THEM}"
             )
         for entry in sorted(entries, key=lambda e: e.filename):
             if entry.file_size > _MAX_BYTES:
-                raise SpecError(f"{fmu}: {entry.filename} has {entry.file_size >> 20} MiB, more than 4")
+                raise SpecError(
+                    f"{fmu}: {entry.filename} has {entry.file_size >> 20} MiB, more than {_MAX_BYTES >> 20}; "
+                    f"{NAME_THEM}"
+                )
             try:
                 content = archive.read(entry)
-            except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-                raise SpecError(f"{fmu}: {entry.filename} is damaged ({error})") from None
+            except UNREADABLE as error:
+                raise SpecError(
+                    f"{fmu}: {entry.filename} is damaged ({error}); copy or export the FMU again"
+                ) from None
             if entry.filename in (_TERMINALS, _DESCRIPTION):
-                root = parse_xml(content, f"{fmu}: {entry.filename}")
+                root = read_xml(content, f"{fmu}: {entry.filename}", SpecError)
                 lines = list(_terminals(root) if entry.filename == _TERMINALS else _annotations(root))
                 content = "\n".join(lines).encode()
             if content.strip():

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from falsifier.context.fmu_files import inside
+from falsifier.context.decoding import text_of
+from falsifier.context.fmu_files import NAME_THEM, inside
 from falsifier.context.forms import Form, Readable, of_diagram, of_source
+from falsifier.context.sentry import Sentry
 from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.context.simulink import read_diagram
 from falsifier.context.simulink.parts import read_parts
 from falsifier.context.thresholds import Threshold
 from falsifier.context.values import Compared, Context, Excerpt
-from falsifier.core.secrets import line_of_secret
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
@@ -21,6 +22,7 @@ MAX_CHARACTERS = 12_000
 MAX_TOTAL = 20_000
 _MAX_BYTES = 32 << 20
 _MAX_COMPARISONS = 60
+_LEAVE_OUT = "remove it, or leave the file out"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +33,25 @@ class _Source:
     name: str
     sha256: str
     readable: Readable
+    otherwise: str = _LEAVE_OUT
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What the files are read for."""
+
+    seeds: Collection[str]
+    signals: Collection[str]
+    sentry: Sentry
 
 
 def gather(
-    files: Iterable[str], fmus: Iterable[Path], *, seeds: Collection[str], signals: Collection[str]
+    files: Iterable[str],
+    fmus: Iterable[Path],
+    *,
+    seeds: Collection[str],
+    signals: Collection[str],
+    checked: Collection[str] = (),
 ) -> Context:
     """Return what files and the inside of FMUs say of a model; nothing else is opened.
 
@@ -43,74 +60,84 @@ def gather(
         fmus: FMUs to look into.
         seeds: the requirement's signals: sources are cut to what they depend on.
         signals: all signals that the language model is told.
+        checked: files with a line that looks like a secret and is none, by the names that messages give them.
 
     Raises:
-        SpecError: naming the file that is missing, damaged or binary, or the line that looks like a secret.
+        SpecError: naming the file that is missing, damaged or binary, the line that looks like a secret, or a
+            checked file that is not told.
         ModelError: if an archive is damaged or dangerous.
     """
-    sources = [_read(Path(name), name, seeds, signals) for name in dict.fromkeys(files)]
+    wanted = _Wanted(seeds, signals, Sentry(checked))
+    sources = [_read(Path(name), name, wanted) for name in dict.fromkeys(files)]
+    left_out = []
     for fmu in fmus:
         for name, content in inside(fmu):
-            found = _text_source(content, f"{fmu.name}: {name}", seeds, signals, is_named=False)
-            if len(found.readable.forms) > 1:  # otherwise it says nothing about the signals
+            found = _of_fmu(content, f"{fmu.name}: {name}", wanted)
+            if found is None:
+                left_out.append(f"context {fmu.name}: {name} is left out, because it is not text")
+            elif len(found.readable.forms) > 1:  # otherwise it says nothing about the signals
                 sources.append(found)
     chosen, compared = _fitting(sources), tuple(_compared(sources, signals))
     for source, (_, text) in zip(sources, chosen, strict=True):
-        _refuse_secrets(text, f"{source.path}, as it is told")  # what encodings may have hidden before
-    for each in compared:
-        _refuse_secrets(each.text, each.place)
+        _look_again(source, text, wanted.sentry)
+    wanted.sentry.refuse_unused()
     return Context(
         tuple(
             Excerpt(s.path, s.name, s.sha256, _shortened(s.readable.forms, i), text)
             for s, (i, text) in zip(sources, chosen, strict=True)
         ),
         compared,
+        (*left_out, *wanted.sentry.notes),
     )
 
 
-def _read(path: Path, name: str, seeds: Collection[str], signals: Collection[str]) -> _Source:
+def _look_again(source: _Source, text: str, sentry: Sentry) -> None:
+    """Refuse what encodings may have hidden before."""
+    beside = [t.text for t in source.readable.found] + [told for _, told in source.readable.modes]
+    told = "\n".join((text, *beside))
+    sentry.look(told, f"{source.path}, as it is told", source.path, source.otherwise)
+
+
+def _read(path: Path, name: str, wanted: _Wanted) -> _Source:
     try:
         if not path.is_file() and path.exists():  # a pipe or device might never end
             raise SpecError(f"context {name}: expected a file; name the files of a folder one by one")
         if path.stat().st_size > _MAX_BYTES:
             raise SpecError(
-                f"context {name}: has {path.stat().st_size >> 20} MiB, more than {_MAX_BYTES >> 20}"
+                f"context {name}: has {path.stat().st_size >> 20} MiB, more than {_MAX_BYTES >> 20}; name a "
+                "file with only the part that matters"
             )
         content = path.read_bytes()
     except OSError as error:
         raise SpecError(f"context {name}: cannot be read ({error.strerror or error})") from None
-    if path.suffix.lower() not in SIMULINK:
-        return _text_source(content, name, seeds, signals)
-    if path.suffix.lower() == ".slx":
-        for part, text in read_parts(path).items():
-            _refuse_secrets(text.decode("utf-8", "replace"), f"{name}: {part}")
+    sentry = wanted.sentry
+    if path.suffix.lower() in SIMULINK:
+        parts = read_parts(path) if path.suffix.lower() == ".slx" else {"": content}
+        for part, packed in parts.items():
+            shown = f"{name}: {part}" if part else name
+            sentry.look(packed.decode("utf-8", "replace"), shown, name, _LEAVE_OUT)
+        readable = of_diagram(read_diagram(path), wanted.seeds)
     else:
-        _refuse_secrets(content.decode("utf-8", "replace"), name)
-    return _Source(name, path.name, sha256(content).hexdigest(), of_diagram(read_diagram(path), seeds))
+        text = text_of(content)
+        if text is None:
+            raise SpecError(
+                f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
+                "UTF-8, or leave it out"
+            )
+        sentry.look(text, name, name, _LEAVE_OUT)
+        # Only the name is told: folders often have names of people and customers.
+        readable = of_source(text, path.name, wanted.seeds, wanted.signals)
+    return _Source(name, path.name, sha256(content).hexdigest(), readable)
 
 
-def _text_source(
-    content: bytes, name: str, seeds: Collection[str], signals: Collection[str], *, is_named: bool = True
-) -> _Source:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    if "\0" in text:
-        raise SpecError(f"context {name}: expected text or a Simulink file, found binary data; leave it out")
-    _refuse_secrets(text, name)
-    told = Path(name).name if is_named else name  # folders often have names of people and customers
-    readable = of_source(text, told, seeds, signals, is_named=is_named)
-    return _Source(name, told, sha256(content).hexdigest(), readable)
-
-
-def _refuse_secrets(text: str, name: str) -> None:
-    line = line_of_secret(text)
-    if line is not None:
-        raise SpecError(
-            f"context {name}: line {line} looks like a key, token or password, so nothing is sent; remove "
-            "it, or leave the file out"
-        )
+def _of_fmu(content: bytes, name: str, wanted: _Wanted) -> _Source | None:
+    """Return a file of an FMU; None if it is not text."""
+    text = text_of(content)
+    if text is None:
+        return None
+    wanted.sentry.look(text, name, name, NAME_THEM)
+    readable = of_source(text, name, wanted.seeds, wanted.signals, is_named=False)
+    return _Source(name, name, sha256(content).hexdigest(), readable, NAME_THEM)
 
 
 def _fitting(sources: list[_Source]) -> list[tuple[int, str]]:

@@ -52,7 +52,10 @@ def tokens_of(source: str, shown: str) -> list[Token]:
         SpecError: if the source is too long.
     """
     if len(source) > _MAX_CHARACTERS:
-        raise SpecError(f"{shown}: has {len(source):,} characters, more than {_MAX_CHARACTERS:,}")
+        raise SpecError(
+            f"{shown}: has {len(source):,} characters, more than {_MAX_CHARACTERS:,}; split it, and name "
+            "the part that matters"
+        )
     return list(_tokens(source))
 
 

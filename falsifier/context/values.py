@@ -1,6 +1,11 @@
 """What was read of the files that a user named, as it is told and recorded."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Self
+
+# What --context takes beside files, and what it begins with if a file is allowed.
+INSIDE, NOTHING, CHECKED = "fmu", "none", "checked:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +49,12 @@ class Context:
     Attributes:
         excerpts: what is told of each file.
         comparisons: thresholds, signals of the model first.
+        notes: what a user should know of the reading: files left out, lines allowed. Not told.
     """
 
     excerpts: tuple[Excerpt, ...] = ()
     comparisons: tuple[Compared, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def of(self, signal: str) -> tuple[str, ...]:
         """Return what is known of one signal of the model."""
@@ -61,10 +68,26 @@ class Named:
     Attributes:
         files: paths of files.
         fmu: whether to look inside the model's FMUs.
+        checked: files with a line that looks like a secret and is none.
     """
 
     files: tuple[str, ...] = ()
     fmu: bool = False
+    checked: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.files) or self.fmu
+
+    @classmethod
+    def of(cls, names: Iterable[str]) -> Self:
+        """Return what the values of ``--context`` name.
+
+        >>> Named.of(["a.mo", "fmu", "checked:a.mo"])
+        Named(files=('a.mo',), fmu=True, checked=('a.mo',))
+        """
+        listed = dict.fromkeys(names)
+        return cls(
+            tuple(n for n in listed if n not in (INSIDE, NOTHING) and not n.startswith(CHECKED)),
+            INSIDE in listed,
+            tuple(n.removeprefix(CHECKED) for n in listed if n.startswith(CHECKED)),
+        )

@@ -115,16 +115,22 @@ def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
 
 
 def line_of_secret(text: str) -> int | None:
-    """Return the number of the first line, from 1, that holds or seems to hold a secret; None if none does.
+    """Return the number of the first line, from 1, that looks like a secret; None if none does.
 
     >>> line_of_secret("api_key = abcdef123"), line_of_secret("gain = 3")
     (1, None)
     """
-    held = [v.strip() for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
-    held = [value for value in held if len(value) >= _SHORTEST]
     for number, line in enumerate(text.splitlines(), start=1):
         if any(pattern.search(line) for pattern in _UNNAMED) or _ENVIRONMENT.match(line):
             return number
+    return None
+
+
+def line_of_held_secret(text: str) -> int | None:
+    """Return the number of the first line, from 1, with a secret of this process's environment, or None."""
+    held = [v.strip() for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
+    held = [value for value in held if len(value) >= _SHORTEST]
+    for number, line in enumerate(text.splitlines(), start=1):
         if any(value in line for value in held):
             return number
     return None

@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
+from falsifier.context.values import NOTHING
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.llm.disguise import Disguise
@@ -10,7 +11,7 @@ from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts import CONTEXT_VARIANT, Variant, View, variant_named
 from falsifier.llm.prompts.circumstances import in_doubt
 from falsifier.llm.replies import ReplyForm
-from falsifier.problem.context import NOTHING, with_context
+from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
 
 

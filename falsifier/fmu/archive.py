@@ -13,6 +13,11 @@ from pathlib import Path, PurePosixPath
 
 from falsifier.errors import ModelError
 
+try:
+    from lzma import LZMAError
+except ImportError:  # some builds of Python have no lzma; then no archive can be packed with it
+    LZMAError = zlib.error  # type: ignore[misc,assignment]
+
 # Far more than exporters write (a few MB, or several hundred with tables), far less than fills a disk.
 _MAX_BYTES = 8 << 30
 _MAX_FILES = 100_000
@@ -45,6 +50,9 @@ _OLD_PLATFORMS = {
 WINDOWS = "x86_64-windows"
 # What an archive is called, by the ending of its name; all others are taken for FMUs.
 _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
+# What reading an entry of a damaged archive raises. RuntimeError stands for entries that are encrypted or
+# compressed by an unknown method, OSError also for damaged bzip2 data, ValueError for names in no encoding.
+UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
 _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
@@ -72,7 +80,7 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         archive = zipfile.ZipFile(path)
     except FileNotFoundError:
         raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
-    except (zipfile.BadZipFile, OSError) as error:
+    except UNREADABLE as error:
         what = _KINDS.get(path.suffix.lower(), "FMU")
         raise ModelError(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
     with archive:
@@ -99,7 +107,7 @@ def read_entry(path: Path, name: str) -> bytes:
             raise ModelError(
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+        except UNREADABLE as error:
             raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
 
 
@@ -112,7 +120,7 @@ def extract(path: Path, folder: Path) -> None:
     with open_archive(path) as archive:
         try:
             archive.extractall(folder)
-        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
+        except UNREADABLE as error:
             raise ModelError(f"{path}: cannot unpack the FMU into {folder} ({error})") from error
 
 

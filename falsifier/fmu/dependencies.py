@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import ModelError
-from falsifier.fmu import archive
+from falsifier.fmu.archive import read_entry
+from falsifier.fmu.xml import read_xml
 
 
 @lru_cache(maxsize=32)
@@ -18,12 +18,12 @@ def inputs_of_outputs(path: Path, sha256: str) -> Mapping[str, frozenset[str]]:
     not part of it, so that a declared independence is strong evidence and no proof.
 
     Raises:
-        ModelError: if its description does not follow the standard.
+        ModelError: if its description cannot be read or does not follow the standard.
     """
+    root = read_xml(read_entry(path, "modelDescription.xml"), f"{path}: modelDescription.xml", ModelError)
     try:
-        root = ElementTree.fromstring(archive.read_entry(path, "modelDescription.xml"))
         return _reachable(root)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
+    except (LookupError, ValueError) as error:
         raise ModelError(
             f"{path}: dependencies in modelDescription.xml do not follow the standard "
             f"({type(error).__name__}: {error})"

@@ -10,7 +10,6 @@ from itertools import product
 from math import isfinite, prod
 from pathlib import Path, PurePosixPath
 from typing import cast
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from falsifier.core.model import Causality, Interface, Kind, ModelInfo, Variable
@@ -20,6 +19,7 @@ from falsifier.fmu.libraries import find_libraries
 from falsifier.fmu.remarks import input_clocks, remarks, with_aliases_marked
 from falsifier.fmu.slot import Slot
 from falsifier.fmu.wine import can_run_windows, windows_text
+from falsifier.fmu.xml import read_xml
 
 # Element name -> (kind, type code). The type code names the FMU's get and set functions for the value.
 _TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
@@ -138,10 +138,7 @@ def describe(path: Path, sha256: str) -> Description:
         ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
     """
     text = archive.read_entry(path, "modelDescription.xml")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # also an unknown encoding
-        raise ModelError(f"{path}: modelDescription.xml is not well-formed XML ({error})") from error
+    root = read_xml(text, f"{path}: modelDescription.xml", ModelError)
     names = archive.entry_names(path)
     described = parse(root, name=str(path), platforms=archive.platforms(names))
     info = described.info

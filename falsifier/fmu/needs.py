@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
@@ -56,7 +55,7 @@ def _missing_on_linux(path: Path, description: Description) -> Iterator[str]:
             bundled = {PurePosixPath(name) for name in packed.namelist()}
             for library in dict.fromkeys(description.libraries.values()):
                 yield from _Look(packed, bundled).missing(library)
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError) as error:
+    except archive.UNREADABLE as error:
         raise ModelError(f"{path}: a binary is damaged ({error}); copy or export the FMU again") from error
 
 

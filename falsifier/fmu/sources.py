@@ -4,10 +4,10 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import ModelError
+from falsifier.fmu.xml import read_xml
 
 # The standard's name, and that of drafts of FMI 3, which some exporters still write.
 _BUILD_DESCRIPTIONS = ("buildDescription.xml", "build_description.xml")
@@ -44,7 +44,7 @@ def find_sources(path: Path, folder: Path, major: int, identifier: str) -> Sourc
         ModelError: if there are no sources, or listed ones are missing.
     """
     root = folder / "sources"
-    listed = _listed_2(folder, identifier) if major < 3 else _listed_3(root, identifier)
+    listed = _listed_2(path, folder, identifier) if major < 3 else _listed_3(path, root, identifier)
     files = listed.files or tuple(_unlisted(root))
     if not files:
         raise ModelError(f"{path}: contains no C sources; export it with sources or for this platform")
@@ -65,8 +65,8 @@ def _unlisted(root: Path) -> Iterator[str]:
     return (f.relative_to(root).as_posix() for f in files if f.resolve() not in included)
 
 
-def _listed_2(folder: Path, identifier: str) -> Sources:
-    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+def _listed_2(path: Path, folder: Path, identifier: str) -> Sources:
+    root = _xml(path, folder / "modelDescription.xml")
     for interface in (*root.findall("CoSimulation"), *root.findall("ModelExchange")):
         files = tuple(f.attrib["name"] for f in interface.findall("SourceFiles/File"))
         if files and interface.get("modelIdentifier") == identifier:
@@ -74,11 +74,11 @@ def _listed_2(folder: Path, identifier: str) -> Sources:
     return Sources(())
 
 
-def _listed_3(root: Path, identifier: str) -> Sources:
+def _listed_3(path: Path, root: Path, identifier: str) -> Sources:
     described = next((root / name for name in _BUILD_DESCRIPTIONS if (root / name).is_file()), None)
     if described is None:
         return Sources(())
-    configurations = ElementTree.parse(described).getroot().findall("BuildConfiguration")
+    configurations = _xml(path, described).findall("BuildConfiguration")
     own = [c for c in configurations if c.get("modelIdentifier", identifier) == identifier]
     # A configuration for another platform lists that platform's own files.
     general = [c for c in own if "platform" not in c.attrib] or own
@@ -92,6 +92,10 @@ def _listed_3(root: Path, identifier: str) -> Sources:
         },
         tuple(_attributes(sets, "IncludeDirectory")),
     )
+
+
+def _xml(path: Path, described: Path) -> Element:
+    return read_xml(described.read_bytes(), f"{path}: {described.name}", ModelError)
 
 
 def _attributes(sets: list[Element], tag: str) -> Iterator[str]:

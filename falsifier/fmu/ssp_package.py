@@ -3,8 +3,6 @@
 import atexit
 import os
 import shutil
-import zipfile
-import zlib
 from collections.abc import Callable
 from functools import lru_cache
 from hashlib import sha256
@@ -137,7 +135,7 @@ def _extracted(path: Path, name: str) -> Path:
     try:
         with archive.open_archive(path) as package, package.open(name) as packed, partial.open("wb") as out:
             shutil.copyfileobj(packed, out)
-    except (ModelError, zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
+    except (ModelError, *archive.UNREADABLE) as error:
         raise SpecError(f"{path}: cannot unpack {name} ({error})") from error
     partial.rename(target)
     return target

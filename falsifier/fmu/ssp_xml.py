@@ -7,11 +7,11 @@ another namespace), default experiments and inline mappings, and reads packages 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
 from falsifier.fmu.units import Unit, read_units
+from falsifier.fmu.xml import read_xml
 
 _NAMESPACE = "{http://ssp-standard.org/SSP"
 _VALUE_TAGS = ("Boolean", "String", "Enumeration", "Real", "Integer", "Float64", "Float32", *(
@@ -157,10 +157,7 @@ def _said(error: Exception) -> str:
 
 
 def _root(text: bytes, expected: str, shown: str) -> Element:
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise SpecError(f"{shown}: not well-formed XML ({error})") from None
+    root = read_xml(text, shown, SpecError)
     if not root.tag.startswith(_NAMESPACE) or root.tag.rpartition("}")[2] != expected:
         raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
     return root

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import ModelError
-from falsifier.fmu import archive
+from falsifier.fmu.archive import read_entry
 from falsifier.fmu.units import Units, read_units
+from falsifier.fmu.xml import read_xml
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,12 @@ def read_structure(path: Path, sha256: str) -> Structure:
     """Return the structure of an FMU of FMI 2 or 3 whose content has this hash; cached.
 
     Raises:
-        ModelError: if its description does not follow the standard.
+        ModelError: if its description cannot be read or does not follow the standard.
     """
+    root = read_xml(read_entry(path, "modelDescription.xml"), f"{path}: modelDescription.xml", ModelError)
     try:
-        root = ElementTree.fromstring(archive.read_entry(path, "modelDescription.xml"))
         return Structure(read_units(root), dict(_dependencies(root)))
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
+    except (LookupError, ValueError) as error:
         raise ModelError(
             f"{path}: units or dependencies in modelDescription.xml do not follow the standard "
             f"({type(error).__name__}: {error})"

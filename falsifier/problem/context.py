@@ -1,18 +1,18 @@
 """What a problem names as context, and reading it: only when a language model is to be asked."""
 
+import logging
 from dataclasses import replace
 from os.path import relpath
 from pathlib import Path
 
 from falsifier.context.gather import gather
-from falsifier.context.values import Context, Named
+from falsifier.context.values import NOTHING, Context, Named
 from falsifier.fmu import fmu_files
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import Spec
 
-# What --context takes beside files.
-INSIDE, NOTHING = "fmu", "none"
+_LOG = logging.getLogger(__name__)
 
 
 def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | None = None) -> Named:
@@ -23,13 +23,16 @@ def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | 
         spec: the spec, if there is one.
         path: its file, to which its paths are relative.
     """
-    files: list[str] = []
-    within = INSIDE in source.context
-    if spec is not None and path is not None and NOTHING not in source.context:
-        files += [_shown(path.parent / name) for name in spec.context.files]
-        within = within or spec.context.fmu
-    files += [name for name in source.context if name not in (INSIDE, NOTHING)]
-    return Named(tuple(dict.fromkeys(files)), within)
+    named = Named.of(source.context)
+    if spec is None or path is None or NOTHING in source.context:
+        return named
+    stated = spec.context
+    shown = {name: _shown(path.parent / name) for name in stated.files}
+    return Named(
+        tuple(dict.fromkeys((*shown.values(), *named.files))),
+        named.fmu or stated.fmu,
+        (*(shown.get(name, name) for name in stated.checked), *named.checked),
+    )
 
 
 def with_context(problem: Problem) -> Problem:
@@ -43,8 +46,11 @@ def with_context(problem: Problem) -> Problem:
         return problem
     seeds = problem.requirement.formula.signals
     signals = dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))
-    fmus = fmu_files(problem.model) if problem.named_context.fmu else {}
-    found = gather(problem.named_context.files, fmus, seeds=tuple(seeds), signals=tuple(signals))
+    named = problem.named_context
+    fmus = fmu_files(problem.model) if named.fmu else {}
+    found = gather(named.files, fmus, seeds=tuple(seeds), signals=tuple(signals), checked=named.checked)
+    for note in found.notes:
+        _LOG.warning(note)
     return replace(problem, context=found)
 
 

@@ -118,8 +118,7 @@ class Problem:
         source = ProblemSource(
             target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
         )
-        named = Named(tuple(name for name in context if name != "fmu"), "fmu" in context)
-        return replace(cls.from_parts(joined, source), named_context=named)
+        return replace(cls.from_parts(joined, source), named_context=Named.of(context))
 
     @classmethod
     def from_system(

@@ -196,6 +196,9 @@ class ContextSection(Strict):
     fmu: bool = Field(
         default=False, description="Also documentation, sources, texts and annotations inside the FMU."
     )
+    checked: tuple[str, ...] = Field(
+        (), description="Of these files, those with a line that looks like a key or password and is none."
+    )
 
 
 Components = dict[str, ComponentSection]

@@ -64,7 +64,8 @@ class ProblemSource(BaseModel):
             free; None: the spec's or the default limits.
         changes: overrides for experiment, inputs and parameters.
         context: files that a language model may read beside those that the spec names; ``fmu``: also what
-            lies inside the FMU; ``none``: not what the spec names.
+            lies inside the FMU; ``none``: not what the spec names; ``checked:FILE``: a line of this file
+            looks like a key and is none.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)

@@ -1,7 +1,8 @@
 within Faults;
 model HeaterLimpHome "Heated bath with a PI controller. While its two temperature sensors disagree, the controller is in
-limp-home mode: the power is limited, and the integral term is frozen until the mode ends. If the bath gets too hot, a
-safety switch turns the heater off permanently and counts a trip"
+limp-home mode: the power is limited, and the integral term is frozen until the mode ends. A sensor that is far off counts
+as failed and is not used, and sensors that agree exactly count as one that is read twice: neither changes the mode. If the
+bath gets too hot, a safety switch turns the heater off permanently and counts a trip"
   input Real disagreement(unit = "K", min = 0, max = 10, start = 5) "Difference between the two sensors";
   output Real temperature(unit = "degC", start = 60, fixed = true, nominal = 10) "Temperature of the bath";
   output Real power(unit = "%", start = 50, fixed = true, min = 0, max = 100) "Heater power";
@@ -11,11 +12,12 @@ safety switch turns the heater off permanently and counts a trip"
   parameter Real wanted(unit = "degC") = 60 "Temperature set point";
   parameter Real hottest(unit = "degC") = 64 "Temperature at which the safety switch acts";
   parameter Real limited(unit = "%", min = 0, max = 100) = 30 "Maximum power in limp-home mode";
-  parameter Real enterAbove(unit = "K") = 9.5 "Disagreement above which limp-home mode begins";
-  parameter Real leaveBelow(unit = "K") = 0.2 "Disagreement below which it ends";
-  parameter Real leaveAfter(unit = "s", min = 0) = 1 "Time for which the disagreement must stay below leaveBelow";
-  parameter Real valid(unit = "s", min = 0) = 1.5 "Time after limp-home mode for which the frozen integral term stays valid";
-  parameter Real settling(unit = "s", min = 0) = 4 "Time after limp-home mode before the integral term can be frozen again";
+  parameter Real enterAbove(unit = "K") = 6.8 "Disagreement above which limp-home mode begins";
+  parameter Real failedAbove(unit = "K") = 7.2 "Disagreement above which one sensor counts as failed";
+  parameter Real leaveBelow(unit = "K") = 0.3 "Disagreement below which limp-home mode ends";
+  parameter Real sameBelow(unit = "K") = 0.1 "Disagreement below which one sensor seems to be read twice";
+  parameter Real leaveAfter(unit = "s", min = 0) = 1 "Time for which the sensors must agree before the mode ends";
+  parameter Real settling(unit = "s", min = 0) = 1.5 "Time after limp-home mode before the integral term can be frozen again";
   parameter Real proportional(unit = "%/K", min = 0) = 5 "Proportional gain of the controller";
   parameter Real integral(unit = "%/(K.s)", min = 0) = 0.2 "Integral gain of the controller";
   parameter Real tracking(unit = "1/s", min = 0) = 0.5 "Rate of the anti-windup while the power is limited";
@@ -33,11 +35,12 @@ equation
   der(temperature) = (outside + reach * (if trips > 0 then 0 else power) / 100 - temperature) / lag;
 algorithm
   when sample(0, period) then
-    calm := if disagreement < leaveBelow then pre(calm) + 1 else 0;
-    limp := disagreement > enterAbove or pre(limp) and (calm - 1) * period < leaveAfter - period / 2;
+    calm := if disagreement < leaveBelow and disagreement > sameBelow then pre(calm) + 1 else 0;
+    limp := disagreement > enterAbove and disagreement < failedAbove
+      or pre(limp) and (calm - 1) * period < leaveAfter - period / 2;
     pause := if not limp and pre(limp) then 0 elseif pre(limp) then pre(pause) else min(1000000, pre(pause) + 1);
-    // The integral term is frozen when limp-home mode begins, or it is still frozen from the last time.
-    frozen := limp and (pre(frozen) or not pre(limp) and (pause * period >= settling or pause * period < valid));
+    // The integral term is frozen when limp-home mode begins, unless the last phase ended less than settling ago.
+    frozen := limp and (pre(frozen) or not pre(limp) and pause * period >= settling);
     error := wanted - temperature;
     command := proportional * error + pre(sum);
     power := min(if limp then limited else 100, max(0, command));

@@ -139,10 +139,10 @@ def test_info_of_a_simulink_file(tmp_path: Path) -> None:
     simulink.write_slx(tmp_path / "limphome.slx")
     done = falsifier("info", "limphome.slx", cwd=tmp_path)
     assert done.code == 0, done.err
-    assert "Normal -> Limp [disagreement > 9.5]" in done.out
+    assert "Normal -> Limp [disagreement > 6.8 && disagreement < 7.2]" in done.out
     (tmp_path / "limphome.mdl").write_text(simulink.MDL)
     assert falsifier("info", "limphome.mdl", cwd=tmp_path).out == done.out
-    assert "9.5" not in falsifier("info", "limphome.mdl", "--names", cwd=tmp_path).out
+    assert "6.8" not in falsifier("info", "limphome.mdl", "--names", cwd=tmp_path).out
     assert falsifier("info", "limphome.slx", "--json", cwd=tmp_path).json["name"] == "limphome"
     assert falsifier("info", "limphome.slx", "--check", cwd=tmp_path).code == 2
     assert falsifier("info", "AT.fmu", "--names", cwd=tmp_path).code == 2

@@ -1,4 +1,5 @@
 import os
+import zipfile
 from hashlib import sha256
 from pathlib import Path
 
@@ -20,12 +21,12 @@ def read(*files: Path) -> Context:
 
 def test_thresholds_stand_with_their_signals(tmp_path: Path) -> None:
     context = read(LIMP, simulink.write_slx(tmp_path / "limphome.slx"))
-    assert "disagreement > enterAbove (enterAbove = 9.5)" in context.of("disagreement")
-    assert "disagreement > 9.5" in context.of("disagreement")
+    assert "disagreement > enterAbove (enterAbove = 6.8)" in context.of("disagreement")
+    assert "disagreement > 6.8" in context.of("disagreement")
     assert "temperature >= 64" in context.of("temperature")
     assert "set by the chart Mode logic with the states Normal, Limp" in context.of("limp")[0]
     others = [c.text for c in context.comparisons if not c.signals]
-    assert "pause * period < valid (period = 0.1, valid = 1.5)" in others
+    assert "pause * period >= settling (period = 0.1, settling = 1.5)" in others
     first, second = context.excerpts
     assert (first.form, first.sha256) == (
         "what the requirement depends on",
@@ -122,6 +123,34 @@ def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "a.bin").write_bytes(b"\0\1\2")
     with pytest.raises(SpecError, match=r"a\.bin: expected text or a Simulink file"):
         read(tmp_path / "a.bin")
+
+
+def fmu_with(path: Path, **entries: bytes) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(f"documentation/{name}.md", content)
+    return path
+
+
+def test_binary_data_inside_an_fmu_is_left_out_with_a_note(tmp_path: Path) -> None:
+    told = "trips count".encode("utf-16")
+    fmu = fmu_with(tmp_path / "m.fmu", picture=b"\x7f\0", words=told)
+    context = gather([], [fmu], seeds=["trips"], signals=SIGNALS)
+    assert [e.text for e in context.excerpts] == ["trips count"]
+    assert context.notes == ("context m.fmu: documentation/picture.md is left out, because it is not text",)
+
+
+def test_a_secret_inside_an_fmu_says_how_to_do_without(tmp_path: Path) -> None:
+    fmu = fmu_with(tmp_path / "m.fmu", notes=b"trips\npassword: operators know it")
+    name = "m.fmu: documentation/notes.md"
+    with pytest.raises(SpecError, match=rf"{name}: line 2 .*unpack the FMU.*checked:{name}"):
+        gather([], [fmu], seeds=["trips"], signals=SIGNALS)
+    context = gather([], [fmu], seeds=["trips"], signals=SIGNALS, checked=[name])
+    assert "operator" in context.excerpts[0].text
+    assert context.notes == (
+        f"context {name}: line 2 looks like a key, token or password, and was allowed",
+        f"context {name}, as it is told: line 2 looks like a key, token or password, and was allowed",
+    )
 
 
 def test_the_inside_of_an_fmu_is_told_as_far_as_it_concerns_the_signals() -> None:

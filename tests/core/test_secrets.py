@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.core.secrets import line_of_secret, redact, scrubbed, without_secrets
+from falsifier.core.secrets import line_of_held_secret, line_of_secret, redact, scrubbed, without_secrets
 
 KEYS = (
     "hf_abcdefghijklmnopqrst",
@@ -73,7 +73,7 @@ def test_the_line_of_a_secret_is_found(key: str, monkeypatch: pytest.MonkeyPatch
     assert line_of_secret("The password must be given.\ntokens: 4000\nAPI_KEY=...\nkeys = [1, 2]") is None
     assert line_of_secret('{"client_secret": "abcdefgh"}') == 1
     monkeypatch.setenv("MY_TOKEN", "quite an ordinary value")
-    assert line_of_secret("a\nb = quite an ordinary value") == 2
+    assert line_of_held_secret("a\nb = quite an ordinary value") == 2
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_without_context_it_finds_nothing_to_aim_at() -> None:
     chat = ScriptedChat(limp_home.reads_thresholds)
     result = falsify("HeaterLimpHome", llm=chat, budget=1)
     assert result.status == "not falsified"
-    assert "9.5" not in chat.requests[0].messages[0].content
+    assert "6.8" not in chat.requests[0].messages[0].content
 
 
 def test_context_stands_in_the_part_that_does_not_change(file: Path) -> None:

@@ -1,7 +1,5 @@
 """Parts of a Simulink package: from XML to the sections that the reader knows."""
 
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import count
@@ -9,9 +7,9 @@ from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from falsifier.context.simulink.tree import Node
-from falsifier.context.xml import parse_xml
 from falsifier.errors import SpecError
-from falsifier.fmu.archive import open_archive
+from falsifier.fmu.archive import UNREADABLE, open_archive
+from falsifier.fmu.xml import read_xml
 
 _DIAGRAM = "simulink/blockdiagram.xml"
 _DEFAULTS = "simulink/bddefaults.xml"
@@ -45,11 +43,12 @@ def read_parts(path: Path) -> dict[str, bytes]:
                 continue
             if entry.file_size > _MAX_PART_BYTES:
                 raise SpecError(
-                    f"{path}: {name} has {entry.file_size >> 20} MiB, more than {_MAX_PART_BYTES >> 20}"
+                    f"{path}: {name} has {entry.file_size >> 20} MiB, more than {_MAX_PART_BYTES >> 20}; "
+                    "save the subsystem that matters as a model of its own"
                 )
             try:
                 parts[name] = archive.read(entry)
-            except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+            except UNREADABLE as error:
                 raise SpecError(f"{path}: {name} is damaged ({error}); save the model again") from None
     return parts
 
@@ -97,7 +96,7 @@ class _Package:
         """Return the root section of a part with all that it refers to."""
         if name not in self.parts:
             raise SpecError(f"{self.shown}: the part {name} is missing; save the model again")
-        element = parse_xml(self.parts[name], f"{self.shown}: {name}")
+        element = read_xml(self.parts[name], f"{self.shown}: {name}", SpecError)
         return self._node(element, (*within, name))
 
     def of(self, name: str) -> tuple[Node, ...]:

@@ -62,7 +62,10 @@ def _tree(path: Path) -> Node:
     try:
         size = path.stat().st_size
         if size > _MAX_TEXT_BYTES:
-            raise SpecError(f"{path}: has {size >> 20} MiB, more than {_MAX_TEXT_BYTES >> 20}")
+            raise SpecError(
+                f"{path}: has {size >> 20} MiB, more than {_MAX_TEXT_BYTES >> 20}; save the subsystem that "
+                "matters as a model of its own"
+            )
         # Old files are in the code page of the machine that wrote them; names in ASCII are read in any case.
         text = path.read_bytes().decode("utf-8", errors="replace")
     except OSError as error:

@@ -16,8 +16,9 @@ def test_states_transitions_and_data() -> None:
         State("Limp.Frozen", "entry: frozen = true;"),
         State("Limp.Winding"),
     )
-    assert Transition("", "Limp.Frozen", "[age < 1.5 || age >= 4]") in chart.transitions
-    assert Transition("Normal", "Limp", "[disagreement > 9.5]{age = t - ended;}") in chart.transitions
+    assert Transition("", "Limp.Frozen", "[age >= 1.5]") in chart.transitions
+    enter = "[disagreement > 6.8 && disagreement < 7.2]{age = t - ended;}"
+    assert Transition("Normal", "Limp", enter) in chart.transitions
     assert Transition("", "Normal") in chart.transitions
     assert ChartData("age", "local", "1e6") in chart.data
     assert ChartData("disagreement", "input") in chart.data

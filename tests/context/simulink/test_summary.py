@@ -12,7 +12,7 @@ def test_names_have_no_parameters(tmp_path: Path) -> None:
     assert "inports disagreement, set point" in text
     assert "Controller: outports power" in text
     assert "Chart Mode logic: Normal, Limp, Limp.Frozen, Limp.Winding" in text
-    assert "9.5" not in text
+    assert "6.8" not in text
 
 
 def test_structure_has_parameters_sources_and_conditions(tmp_path: Path) -> None:
@@ -22,8 +22,8 @@ def test_structure_has_parameters_sources_and_conditions(tmp_path: Path) -> None
         "- Controller: SubSystem <- Mode logic, Mode logic:2, set point, Bath",
         "- Bath: TransferFcn (Numerator = [80], Denominator = [40 1]) <- Controller 'power'",
         "- Limited: Switch (Criteria = u2 >= Threshold, Threshold = 0) <- Limit, limp, Command",
-        "- start -> Limp.Frozen [age < 1.5 || age >= 4]",
-        "- Normal -> Limp [disagreement > 9.5]{age = t - ended;}",
+        "- start -> Limp.Frozen [age >= 1.5]",
+        "- Normal -> Limp [disagreement > 6.8 && disagreement < 7.2]{age = t - ended;}",
         "- Scope: Scope, commented out",
     ):
         assert line in text.splitlines()

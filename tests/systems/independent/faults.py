@@ -75,14 +75,13 @@ def heater(disagreement: Array) -> Array:
     limp, frozen, tripped = False, False, False
     agreed, ended = 0, -1000000
     for tick, apart in enumerate(disagreement):
-        agreed = agreed + 1 if apart < 0.2 else 0
+        agreed = agreed + 1 if 0.1 < apart < 0.3 else 0
         was_limp = limp
-        limp = apart > 9.5 or (limp and agreed < 11)
+        limp = 6.8 < apart < 7.2 or (limp and agreed < 11)
         if was_limp and not limp:
             ended = tick
         if limp and not was_limp:
-            pause = tick - ended
-            frozen = pause < 15 or pause >= 40
+            frozen = tick - ended >= 15
         wish = 5 * (60 - bath) + part
         given = min(max(wish, 0.0), 30.0 if limp else 100.0)
         if limp and not frozen:
