@@ -16,7 +16,9 @@ from falsifier.problem.problem import Problem
 class Scout:
     """Extremes, spread points, changes of good inputs and of inputs that reached something new, in turn.
 
-    All four propose in less than a millisecond. None of them fits every system, so each gets the same share.
+    A proposal takes each of them less than a millisecond. Learning from a simulation takes one to three,
+    nearly all of it to find what the trajectory did. None of the four fits every system, so each gets the
+    same share.
     """
 
     name = "scout"

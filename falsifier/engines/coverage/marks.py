@@ -116,7 +116,8 @@ def _margin(predicate: Predicate, trajectory: Trajectory) -> Floats:
 
 
 def _finite(numbers: ArrayLike) -> Floats:
-    return np.nan_to_num(learnable(numbers))
+    values = learnable(numbers)
+    return values if np.isfinite(values).all() else np.nan_to_num(values)
 
 
 def _values(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
@@ -171,8 +172,10 @@ def _levels(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
         if largest <= 0.0:
             continue
         top = int(np.floor(2 * np.log2(largest)))
-        for level in range(top - _LEVELS + 1, top + 1):
-            yield Mark(name, (direction, level)), int(np.argmax(deviation >= 2.0 ** (level / 2)))
+        levels = np.arange(top - _LEVELS + 1, top + 1)
+        samples = np.searchsorted(np.maximum.accumulate(deviation), 2.0 ** (levels / 2))
+        for level, sample in zip(levels.tolist(), samples.tolist(), strict=True):
+            yield Mark(name, (direction, level)), sample
 
 
 def _nearness(name: str, margin: Floats) -> Iterator[tuple[Mark, int]]:
@@ -181,11 +184,9 @@ def _nearness(name: str, margin: Floats) -> Iterator[tuple[Mark, int]]:
     start = float(distance[0])
     if start <= 0.0:
         return
-    for level in range(_LEVELS):
-        reached = distance <= start / 2.0 ** (level / 2)
-        if not reached[-1]:
-            return
-        yield Mark(name, ("near", level)), int(np.argmax(reached))
+    samples = np.searchsorted(-distance, -start / 2.0 ** (np.arange(_LEVELS) / 2))
+    for level, sample in enumerate(samples[samples < len(distance)].tolist()):
+        yield Mark(name, ("near", level)), sample
 
 
 def _octave(samples: int) -> int:

@@ -7,8 +7,8 @@ smallest (below an always) or largest (below an eventually) margin in the cell f
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any, Literal
 
@@ -31,7 +31,7 @@ from falsifier.stl.formula import (
 )
 
 Envelope = Literal["sample", "low", "high"]
-Extreme = Callable[[Array, Array], Array]
+Extreme = np.ufunc  # np.minimum or np.maximum
 
 # Maximum distance in cells of a window bound from a grid point at which it counts as that point.
 _ROUNDING = 1e-6
@@ -66,6 +66,10 @@ class Node(ABC):
     def value(self, margins: Sequence[Array]) -> Array:
         """Return the robustness at every grid point, computed from the leaves' margins."""
 
+    def start(self, margins: Sequence[Array]) -> Array:
+        """Return the robustness at time 0 only, shape (traces,), which is often cheaper."""
+        return self.value(margins)[:, 0]
+
     @property
     def needs_several(self) -> bool:
         """Whether a violation requires several conditions at once: the formula contains a disjunction."""
@@ -98,6 +102,9 @@ class _Join(Node):
     def value(self, margins: Sequence[Array]) -> Array:
         return reduce(self.extreme, (part.value(margins) for part in self.parts))
 
+    def start(self, margins: Sequence[Array]) -> Array:
+        return reduce(self.extreme, (part.start(margins) for part in self.parts))
+
     @property
     def cellwise(self) -> bool:
         return all(part.cellwise for part in self.parts)
@@ -116,6 +123,12 @@ class _Slide(Node):
 
     def value(self, margins: Sequence[Array]) -> Array:
         return sliding(self.part.value(margins), self.first, self.last, self.extreme)
+
+    def start(self, margins: Sequence[Array]) -> Array:
+        values = self.part.value(margins)
+        last = values.shape[1] - 1
+        within = values[:, min(self.first, last) : min(self.last, last) + 1]
+        return np.asarray(self.extreme.reduce(within, axis=1))
 
     @property
     def needs_several(self) -> bool:
@@ -161,7 +174,7 @@ class CoarseFormula:
 
     def robustness(self, margins: Sequence[Array]) -> Array:
         """Return the robustness at time 0 of m traces, shape (m,), from one margin array (m, n) per leaf."""
-        return self.root.value(margins)[:, 0]
+        return self.root.start(margins)
 
     def deciding(self, margins: Sequence[Array]) -> list[tuple[int, int]]:
         """Return the leaf and the grid index that decide the robustness of each trace.
@@ -234,7 +247,10 @@ class _Builder:
                 first, last = self._indices(window, 1.0, cellwise=False)
                 return _Until(held, reached, first, last, negated=sign < 0)
             case Next(operand):
-                return _Slide(self.build(operand, sign=sign, above=above), 1, 1, np.minimum)
+                part = self.build(operand, sign=sign, above=above)
+                if isinstance(part, _Slide):
+                    return replace(part, first=part.first + 1, last=part.last + 1)
+                return _Slide(part, 1, 1, np.minimum)
         raise TypeError(f"no coarse robustness for {type(formula).__name__}")
 
     def _atom(self, predicate: Predicate, sign: int, above: Extreme | None) -> Node:
@@ -273,20 +289,16 @@ def margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
 
 
 def sliding(values: Array, first: int, last: int, extreme: Extreme) -> Array:
-    """Return the extreme of values[:, k + first ... k + last] for each k, with the last value extended.
+    """Return the extreme of values[:, k + first ... k + last] for each k, with the last value extended."""
+    from falsifier.engines.surrogate.kernels import slide
 
-    Windows of doubling width are combined, so the cost grows with the logarithm of the window's width.
-    """
     count = values.shape[1]
-    first, last = min(first, count - 1), min(last, count - 1)
-    width = last - first + 1
-    padded = np.concatenate([values, np.repeat(values[:, -1:], last, axis=1)], axis=1)
-    covered = 1
-    while 2 * covered <= width:
-        padded = extreme(padded[:, :-covered], padded[:, covered:])
-        covered *= 2
-    tail = first + width - covered
-    return extreme(padded[:, first : first + count], padded[:, tail : tail + count])
+    if first == last:
+        return np.asarray(values[:, np.minimum(np.arange(count) + first, count - 1)])
+    result = np.empty_like(values, order="C")
+    sign = 1 if extreme is np.minimum else -1
+    slide(np.ascontiguousarray(values), min(first, count - 1), min(last, count - 1), sign, result)
+    return result
 
 
 def shifted(values: Array, shift: int) -> Array:

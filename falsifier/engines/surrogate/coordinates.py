@@ -9,6 +9,7 @@ similar.
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -60,11 +61,20 @@ class Coordinates:
 
     def columns(self, values: Array) -> dict[str, Array]:
         """Return the output columns for coordinates, shape (..., dimension), with each reference set to 0."""
-        inverse = np.linalg.pinv(self._differences)
-        for family in self.families:
-            inverse[list(family)] -= inverse[family[0]]
-        outputs = values @ inverse.T.astype(values.dtype)
+        outputs = values
+        if self.families:
+            inverse = _inverse(self).astype(values.dtype)
+            outputs = (values.reshape(-1, self.dimension) @ inverse.T).reshape(*values.shape[:-1], -1)
         return {name: outputs[..., i] for i, name in enumerate(self.outputs)}
+
+
+@lru_cache(maxsize=64)
+def _inverse(coordinates: Coordinates) -> NDArray[np.float64]:
+    """Return the matrix from coordinates to outputs whose families have a reference of 0."""
+    inverse = np.linalg.pinv(coordinates._differences)
+    for family in coordinates.families:
+        inverse[list(family)] -= inverse[family[0]]
+    return np.asarray(inverse)
 
 
 def choose_coordinates(

@@ -37,6 +37,24 @@ class Prediction:
     excess: Array
 
 
+@dataclass(frozen=True, slots=True)
+class Traces:
+    """Simulated traces, stacked: attributes as in ``Trace``, with the traces as the first axis."""
+
+    inputs: Array
+    states: Array
+    excess: Array
+
+    @classmethod
+    def of(cls, traces: Sequence[Trace]) -> "Traces":
+        """Stack traces."""
+        return cls(
+            np.stack([t.inputs for t in traces]),
+            np.stack([t.states for t in traces]),
+            np.stack([t.excess for t in traces]),
+        )
+
+
 class Dynamics(Protocol):
     """Fitted dynamics."""
 
@@ -53,12 +71,12 @@ class Dynamics(Protocol):
 class StartState:
     """The initial state as a linear function of the first inputs and the parameters."""
 
-    def __init__(self, traces: Sequence[Trace]) -> None:
-        first = np.stack([t.states[0] for t in traces])
+    def __init__(self, traces: Traces) -> None:
+        first = traces.states[:, 0]
         self._mean = first.mean(axis=0)
         self._weights = None
         if np.ptp(first, axis=0).max(initial=0.0) > 1e-9 * max(1.0, float(np.abs(first).max(initial=0.0))):
-            inputs = np.stack([t.inputs[0] for t in traces])
+            inputs = traces.inputs[:, 0]
             self._centre = inputs.mean(axis=0)
             z = inputs - self._centre
             gram = z.T @ z + 1e-6 * np.eye(z.shape[1])
@@ -79,9 +97,9 @@ class FourierDynamics:
     """
 
     def __init__(
-        self, traces: Sequence[Trace], best: Sequence[int], settings: Settings, rng: np.random.Generator
+        self, traces: Traces, best: Sequence[int], settings: Settings, rng: np.random.Generator
     ) -> None:
-        states, inputs, excess = _stacked(traces)
+        states, inputs, excess = traces.states, traces.inputs, traces.excess
         weights = np.ones(inputs.shape[:2])
         weights[list(best)] += settings.best_weight
         rows, weight = _drawn(weights, settings.most_rows, rng)
@@ -95,9 +113,13 @@ class FourierDynamics:
         frequencies = rng.standard_normal((width, settings.features)) / scale
         phases = rng.uniform(0, 2 * np.pi, settings.features)
         amplitude = np.sqrt(2 / settings.features)
-        phi = np.ones((len(z), settings.features + width + 1))
-        waves = np.cos(z.astype(np.float32) @ frequencies.astype(np.float32) + phases.astype(np.float32))
-        phi[:, : settings.features] = waves * np.float32(amplitude)
+        # Single precision: rounding is far below the ridge.
+        phi = np.ones((len(z), settings.features + width + 1), np.float32)
+        waves = phi[:, : settings.features]
+        np.matmul(z.astype(np.float32), frequencies.astype(np.float32), out=waves)
+        waves += phases.astype(np.float32)
+        np.cos(waves, out=waves)
+        waves *= np.float32(amplitude)
         phi[:, settings.features : -1] = 0.3 * z
         centre, unit = target.mean(axis=0), target.std(axis=0) + 1e-9
         solution = _ridge(
@@ -113,7 +135,7 @@ class FourierDynamics:
         )
         self._to_turns = to_turns.astype(np.float32)
         self._to_steps = np.ascontiguousarray(to_steps.T, dtype=np.float32)
-        self._low, self._high = (bound.astype(np.float32) for bound in _seen_range(states))
+        self._low, self._high = _seen_range(states)
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
         """Predict m traces in single precision; arguments as in ``Dynamics.predict``."""
@@ -133,12 +155,12 @@ class DeviationDynamics:
     """Linear dynamics of deviations from the best trajectory, with several lags."""
 
     def __init__(
-        self, traces: Sequence[Trace], best: Sequence[int], settings: Settings, rng: np.random.Generator
+        self, traces: Traces, best: Sequence[int], settings: Settings, rng: np.random.Generator
     ) -> None:
-        self._base = traces[best[0]]
+        states, inputs, excess = traces.states, traces.inputs, traces.excess
+        self._base = Trace(inputs[best[0]], states[best[0]], excess[best[0]])
         self._lags = lags = settings.lags
-        states, inputs, excess = _stacked(traces)
-        others = np.arange(len(traces)) != best[0]
+        others = np.arange(len(states)) != best[0]
         self._state_unit = _spread(states[others] - self._base.states) + 1e-12
         self._excess_unit = _spread(excess[others] - self._base.excess) + 1e-12
         # Otherwise an input that has hardly varied so far would become a huge deviation as soon as it does.
@@ -146,13 +168,17 @@ class DeviationDynamics:
         weights = np.repeat(rng.exponential(size=(others.sum(), 1)) + 0.2, inputs.shape[1], axis=1)
         rows, weight = _drawn(weights, settings.most_rows, rng, uniformly=True)
         dy, du = self._deviations(states[others], inputs[others])
-        past = rows[1][:, None] + np.arange(lags)
-        x = np.concatenate([part[rows[0][:, None], past].reshape(len(past), -1) for part in (dy, du)], axis=1)
+        lagged = [_lagged(part, lags)[rows] for part in (dy, du)]
+        x = np.concatenate([part.reshape(len(part), -1) for part in lagged], axis=1)
         de = (excess[others] - self._base.excess)[rows] / self._excess_unit
         target = np.concatenate([dy[rows[0], rows[1] + lags], de], axis=1)
         linear = _ridge(x, target, weight, settings.linear_ridge).T
-        self._own = np.ascontiguousarray(linear[:, : lags * states.shape[2]])
-        self._driving = np.ascontiguousarray(linear[:, lags * states.shape[2] :])
+        own, driving = np.split(linear, [lags * states.shape[2]], axis=1)
+        # Rollouts in single precision: rounding is far below what the dynamics do not know.
+        self._own, self._driving = (
+            np.ascontiguousarray(part.reshape(len(linear), lags, -1), dtype=np.float32)
+            for part in (own, driving)
+        )
         self._low, self._high = _seen_range(states)
 
     def _deviations(self, states: Array, inputs: Array) -> tuple[Array, Array]:
@@ -174,24 +200,28 @@ class DeviationDynamics:
         count, cells, _ = inputs.shape
         n = start.shape[1]
         first, du = self._deviations(start[:, None], inputs)
-        dy = np.empty((count, self._lags + cells, n))
-        dy[:, : self._lags] = first
-        excess = np.empty((count, cells, len(self._own) - n))
-        inputs_in_row, states_in_row = du.reshape(count, -1), dy.reshape(count, -1)
-        roll_out_deviations(self._own, self._driving, _FAR, inputs_in_row, states_in_row, excess)
-        states = self._base.states[: cells + 1] + dy[:, self._lags - 1 :] * self._state_unit
+        driving = np.ascontiguousarray(du.transpose(1, 2, 0), dtype=np.float32)
+        dy = np.empty((self._lags + cells, n, count), np.float32)
+        dy[: self._lags] = first.transpose(1, 2, 0)
+        excess = np.empty((cells, len(self._own) - n, count), np.float32)
+        roll_out_deviations(self._own, self._driving, _FAR, driving, dy, excess)
+        states = _undone(dy[self._lags - 1 :], self._base.states[: cells + 1], self._state_unit)
         return Prediction(
-            np.clip(states, self._low, self._high), self._base.excess[:cells] + excess * self._excess_unit
+            np.clip(states, self._low, self._high),
+            _undone(excess, self._base.excess[:cells], self._excess_unit),
         )
 
 
-def _stacked(traces: Sequence[Trace]) -> tuple[Array, Array, Array]:
-    """Return states, inputs and excesses of all traces, shape (traces, ...)."""
-    return (
-        np.stack([t.states for t in traces]),
-        np.stack([t.inputs for t in traces]),
-        np.stack([t.excess for t in traces]),
-    )
+def _undone(deviations: Array, base: Array, unit: Array) -> Array:
+    """Return m traces, shape (m, cells, n), from deviations, shape (cells, n, m), in their precision."""
+    precision = deviations.dtype
+    traces = deviations * unit.astype(precision)[:, None] + base.astype(precision)[:, :, None]
+    return np.ascontiguousarray(traces.transpose(2, 0, 1))
+
+
+def _lagged(values: Array, lags: int) -> Array:
+    """Return for each trace and cell the values of ``lags`` cells from there, shape (m, cells, lags, n)."""
+    return np.lib.stride_tricks.sliding_window_view(values, lags, axis=1).swapaxes(2, 3)
 
 
 def _drawn(
@@ -215,21 +245,28 @@ def _drawn(
 
 def _ridge(x: Array, target: Array, weights: Array, strength: float) -> Array:
     """Solve a weighted ridge regression; the strength is relative to the mean eigenvalue."""
-    from scipy.linalg.blas import dsyrk
-
-    root = np.sqrt(weights)[:, None]
+    root = np.sqrt(weights)[:, None].astype(x.dtype)
     weighted = x * root
-    # Half of a symmetric matrix takes half the time.
-    gram = dsyrk(1.0, weighted.T)
-    gram += np.triu(gram, 1).T
+    gram = (weighted.T @ weighted).astype(np.float64)
     gram[np.diag_indices_from(gram)] += strength * np.trace(gram) / len(gram) + 1e-12
-    return np.linalg.solve(gram, weighted.T @ (root * target))
+    return np.linalg.solve(gram, weighted.T @ (root * target.astype(x.dtype)))
 
 
 def _spread(deviations: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(deviations**2, axis=(0, 1))))
+    """Return the root mean square of each column, shape (n,), of deviations, shape (m, cells, n)."""
+    flat = _flat(deviations)
+    return np.asarray(np.sqrt(np.diag(flat.T @ flat) / len(flat)))
 
 
-def _seen_range(states: Array) -> tuple[Array, Array]:
-    low, high = states.min(axis=(0, 1)), states.max(axis=(0, 1))
-    return low - _WIDENING * (high - low), high + _WIDENING * (high - low)
+def _seen_range(states: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the lowest and the highest state that is predicted, shape (n,) each."""
+    # A copy by columns: along short rows, minima take ten times as long.
+    columns = np.ascontiguousarray(_flat(states).T)
+    low, high = columns.min(axis=1), columns.max(axis=1)
+    margin = _WIDENING * (high - low)
+    return (low - margin).astype(np.float32), (high + margin).astype(np.float32)
+
+
+def _flat(values: Array) -> Array:
+    """Return values of shape (m, cells, n) as shape (m * cells, n); n may be 0."""
+    return values.reshape(values.shape[0] * values.shape[1], values.shape[2])

@@ -13,6 +13,7 @@ from falsifier.engines.surrogate.dynamics import (
     Dynamics,
     FourierDynamics,
     StartState,
+    Traces,
 )
 from falsifier.engines.surrogate.objective import LeafValues, Objective
 from falsifier.engines.surrogate.settings import Settings
@@ -78,8 +79,9 @@ class Ensemble:
 
     def fit(self, traces: Sequence[Trace], best: Sequence[int], rng: np.random.Generator) -> None:
         """Fit to traces, of which ``best`` have the lowest robustness, and choose the dynamics to plan on."""
-        self._fitted = {name: kind(traces, best, self._settings, rng) for name, kind in _KINDS.items()}
-        self._start = StartState(traces)
+        stacked = Traces.of(traces)
+        self._fitted = {name: kind(stacked, best, self._settings, rng) for name, kind in _KINDS.items()}
+        self._start = StartState(stacked)
         errors = self._recent_errors()
         if errors and rng.random() >= self._settings.exploration:
             self.chosen = min(errors, key=lambda name: errors[name])

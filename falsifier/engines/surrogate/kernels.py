@@ -72,28 +72,70 @@ def roll_out_deviations(
 ) -> None:
     """Predict m traces with linear dynamics that look back on a number of cells.
 
+    The traces are the last axis of all arrays: the compiler then calculates several at a time.
+
     Args:
         own: next states and excesses, linear in the last states, the oldest first, shape
-            (n + leaves, lags * n).
-        driving: the same, linear in the last inputs, shape (n + leaves, lags * u).
+            (n + leaves, lags, n).
+        driving: the same, linear in the last inputs, shape (n + leaves, lags, u).
         far: largest absolute value of a state.
-        inputs: one after the other, shape (m, (lags - 1 + cells) * u); the first are those before the start.
-        states: one after the other, shape (m, (lags + cells) * n); the first ``lags`` are given, the others
-            are filled in.
-        excess: shape (m, cells, leaves), to be filled in.
+        inputs: shape (lags - 1 + cells, u, m); the first are those before the start.
+        states: shape (lags + cells, n, m); the first ``lags`` are given, the others are filled in.
+        excess: shape (cells, leaves, m), to be filled in.
     """
-    count, cells, leaves = excess.shape
-    n = len(own) - leaves
-    driven = driving.shape[1] // (own.shape[1] // n)
-    for row in range(count):
-        for cell in range(cells):
-            for out in range(n + leaves):
-                step = 0.0
-                for i in range(own.shape[1]):
-                    step += own[out, i] * states[row, cell * n + i]
-                for i in range(driving.shape[1]):
-                    step += driving[out, i] * inputs[row, cell * driven + i]
-                if out < n:
-                    states[row, cell * n + own.shape[1] + out] = min(max(step, -far), far)
-                else:
-                    excess[row, cell, out - n] = step
+    cells, _, count = excess.shape
+    outs, lags, n = own.shape
+    driven = driving.shape[2]
+    step = np.empty(count, states.dtype)
+    for cell in range(cells):
+        for out in range(outs):
+            step[:] = 0.0
+            for lag in range(lags):
+                for i in range(n):
+                    weight = own[out, lag, i]
+                    for row in range(count):
+                        step[row] += weight * states[cell + lag, i, row]
+                for i in range(driven):
+                    weight = driving[out, lag, i]
+                    for row in range(count):
+                        step[row] += weight * inputs[cell + lag, i, row]
+            if out < n:
+                for row in range(count):
+                    states[cell + lags, out, row] = min(max(step[row], -far), far)
+            else:
+                for row in range(count):
+                    excess[cell, out - n, row] = step[row]
+
+
+@compiled
+def slide(values: Array, first: int, last: int, sign: float, extremes: Array) -> None:
+    """Find the extreme of a window that slides along each row; the last value continues beyond the end.
+
+    Windows of doubling width are combined, so the cost grows with the logarithm of the window's width.
+
+    Args:
+        values: shape (m, n).
+        first: offset of the window's first value from its place, from 0 to n - 1.
+        last: offset of its last value, from first to n - 1.
+        sign: 1 for the lowest value, -1 for the highest.
+        extremes: shape (m, n), to be filled in.
+    """
+    rows, count = values.shape
+    width = last - first + 1
+    before = np.empty(count + last, values.dtype)
+    after = np.empty(count + last, values.dtype)
+    for row in range(rows):
+        for i in range(count):
+            before[i] = sign * values[row, i]
+        for i in range(count, count + last):
+            before[i] = before[count - 1]
+        covered = 1
+        while 2 * covered <= width:
+            for i in range(count + last - covered):
+                after[i] = min(before[i], before[i + covered])
+            before, after = after, before
+            # What is left of the row is not used: it lies beyond the end of the last window.
+            covered *= 2
+        tail = first + width - covered
+        for i in range(count):
+            extremes[row, i] = sign * min(before[first + i], before[tail + i])

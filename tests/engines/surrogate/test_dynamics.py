@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics, StartState
+from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics, StartState, Traces
 from falsifier.testing import FREE, START, lag_problem
 from tests.engines.surrogate.support import SETTINGS, history_of
 
@@ -12,8 +12,9 @@ def test_dynamics_predict_an_unseen_input_from_a_few_trajectories(
 ) -> None:
     history = history_of(lag_problem(free=FREE, inputs=2, parameters=[START]), simulations=12)
     traces = [s.trace for s in history.samples]
-    fitted = dynamics(traces[:-2], [0, 1, 2], SETTINGS, np.random.default_rng(0))
-    start = StartState(traces[:-2])
+    known = Traces.of(traces[:-2])
+    fitted = dynamics(known, [0, 1, 2], SETTINGS, np.random.default_rng(0))
+    start = StartState(known)
     for trace in traces[-2:]:
         inputs = trace.inputs[None, :50]
         predicted = fitted.predict(inputs, start.predict(inputs)).states[0, :, 0]

@@ -29,16 +29,15 @@ def test_waves_follow_cosines_of_state_and_inputs_within_bounds() -> None:
 
 def test_deviations_follow_the_last_states_and_inputs() -> None:
     rng = np.random.default_rng(1)
-    own = rng.standard_normal((STATES + LEAVES, LAGS * STATES))
-    driving = rng.standard_normal((STATES + LEAVES, LAGS * INPUTS))
-    inputs = rng.standard_normal((TRACES, LAGS - 1 + CELLS, INPUTS))
-    states = np.zeros((TRACES, LAGS + CELLS, STATES))
-    excess = np.empty((TRACES, CELLS, LEAVES))
-    rows = inputs.reshape(TRACES, -1), states.reshape(TRACES, -1)
-    roll_out_deviations(own, driving, 4.0, *rows, excess)
+    own = rng.standard_normal((STATES + LEAVES, LAGS, STATES))
+    driving = rng.standard_normal((STATES + LEAVES, LAGS, INPUTS))
+    inputs = rng.standard_normal((LAGS - 1 + CELLS, INPUTS, TRACES))
+    states = np.zeros((LAGS + CELLS, STATES, TRACES))
+    excess = np.empty((CELLS, LEAVES, TRACES))
+    roll_out_deviations(own, driving, 4.0, inputs, states, excess)
     for k in range(CELLS):
-        step = states[:, k : k + LAGS].reshape(TRACES, -1) @ own.T
-        step += inputs[:, k : k + LAGS].reshape(TRACES, -1) @ driving.T
-        np.testing.assert_allclose(states[:, k + LAGS], np.clip(step[:, :STATES], -4.0, 4.0))
-        np.testing.assert_allclose(excess[:, k], step[:, STATES:])
+        step = np.einsum("oli,lim->om", own, states[k : k + LAGS])
+        step += np.einsum("oli,lim->om", driving, inputs[k : k + LAGS])
+        np.testing.assert_allclose(states[k + LAGS], np.clip(step[:STATES], -4.0, 4.0))
+        np.testing.assert_allclose(excess[k], step[STATES:])
     assert (np.abs(states) == 4.0).any()

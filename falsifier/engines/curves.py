@@ -1,0 +1,59 @@
+"""Monotone cubic curves through many rows of values at once: a plan reads thousands of candidates' inputs.
+
+``core.signals`` has the same curve for one signal. Importing this module imports numba.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.engines.box import Array
+from falsifier.stl.numba_compilation import compiled
+
+
+def read_curves(knots: Array, values: Array, at: Array) -> Array:
+    """Return curves through values, shape (m, k), at times between the k knots, shape (m, times)."""
+    piece = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
+    result = np.empty((len(values), len(at)))
+    _read(np.diff(knots), np.ascontiguousarray(values), piece, at - knots[piece], result)
+    return result
+
+
+@compiled
+def _read(steps: Array, values: Array, piece: NDArray[np.intp], since: Array, result: Array) -> None:
+    """Evaluate the cubic between two knots at times since the first of them."""
+    slopes = np.empty(len(steps) + 1)
+    for row in range(len(values)):
+        secants = np.diff(values[row]) / steps
+        _find_slopes(steps, secants, slopes)
+        for i in range(len(piece)):
+            k, t, h = piece[i], since[i], steps[piece[i]]
+            square = (3.0 * secants[k] - 2.0 * slopes[k] - slopes[k + 1]) / h
+            cube = (slopes[k] + slopes[k + 1] - 2.0 * secants[k]) / (h * h)
+            result[row, i] = values[row, k] + t * (slopes[k] + t * (square + t * cube))
+
+
+@compiled
+def _find_slopes(steps: Array, secants: Array, slopes: Array) -> None:
+    """Find the slopes at the knots; sources in ``core.signals``."""
+    last = len(steps)
+    if last == 1:
+        slopes[:] = secants[0]
+        return
+    slopes[0] = _end_slope(steps[0], steps[1], secants[0], secants[1])
+    slopes[last] = _end_slope(steps[last - 1], steps[last - 2], secants[last - 1], secants[last - 2])
+    for k in range(1, last):
+        left, right = secants[k - 1], secants[k]
+        slopes[k] = 0.0
+        if left * right > 0.0:
+            w_left, w_right = steps[k - 1] + 2.0 * steps[k], 2.0 * steps[k - 1] + steps[k]
+            slopes[k] = (w_left + w_right) / (w_left / left + w_right / right)
+
+
+@compiled
+def _end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
+    slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
+    if slope * secant <= 0.0:
+        return 0.0
+    if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant):
+        return 3.0 * secant
+    return slope
