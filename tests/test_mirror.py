@@ -20,7 +20,6 @@ DECLARATIONS = {
     "engines/protocol.py": "protocols",
     "engines/surrogate/settings.py": "numbers with their reasons",
     "fmu/slot.py": "a record",
-    "fmu/starting.py": "a record and a protocol",
     "fmu/worker_order.py": "a record",
     "llm/prompts/blocks.py": "records",
     "search/events.py": "records",
