@@ -19,6 +19,7 @@ DECLARATIONS = {
     "engines/adviser.py": "a protocol",
     "engines/protocol.py": "protocols",
     "engines/surrogate/settings.py": "numbers with their reasons",
+    "fmu/loop_numbers.py": "numbers",
     "fmu/slot.py": "a record",
     "fmu/worker_order.py": "a record",
     "llm/prompts/blocks.py": "records",

@@ -17,8 +17,7 @@ from falsifier.fmu.output import Output
 from falsifier.fmu.sharing import Shared
 from falsifier.fmu.worker_order import Order
 
-# The process that is started imports numba and may compile the model-exchange solver, slowly on a busy
-# machine.
+# The process that is started may have to compile the model-exchange solver, slowly on a busy machine.
 STARTING_SECONDS = 300.0
 
 _BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
