@@ -1,7 +1,8 @@
-"""File names made from any name, atomic file writes, and the folders bundled with the package."""
+"""File names made from any name, atomic file writes, bundled folders, and a private one for machine code."""
 
 import os
 import re
+import tempfile
 from hashlib import sha256
 from pathlib import Path
 from unicodedata import normalize
@@ -56,6 +57,17 @@ def write_whole(path: Path, content: str | bytes) -> Path:
         os.fsync(file.fileno())
     operating_system.replace(partial, path)
     return path
+
+
+def own_temporary_folder(name: str) -> Path | None:
+    """Return a folder for machine code in the system's temporary folder; None if others can write to it."""
+    folder = Path(tempfile.gettempdir()) / f"{name}-{operating_system.user()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        is_private = operating_system.is_private(folder)
+    except OSError:
+        return None
+    return folder if is_private and os.access(folder, os.W_OK) else None
 
 
 def bundled(folder: str) -> Path:

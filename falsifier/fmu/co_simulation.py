@@ -22,7 +22,6 @@ class CoSimulation(Stepper):
     def __init__(self, description: Description, library: Library, plan: Plan, room: Room) -> None:
         self._in_event_mode = description.major == 3 and description.event_mode
         super().__init__(description, library, plan, room)
-        self._report = np.zeros(3, dtype=np.int64)
         functions = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
         self._addresses = [library.address(name) for name in functions]
 
@@ -32,7 +31,7 @@ class CoSimulation(Stepper):
         Raises:
             SimulationError: if a step fails or the deadline passes.
         """
-        plan, loops, report = self._plan, self._loops, self._report
+        plan, loops = self._plan, self._loops
         version = self._library.description.major
         functions = (self._library.component, *self._addresses, version, int(self._in_event_mode))
         if self._in_event_mode:
@@ -56,10 +55,9 @@ class CoSimulation(Stepper):
         while first < steps:
             started = time.perf_counter()
             last = min(first + chunk, steps)
-            loops.co_simulate(
-                functions, *inputs, *self._record, stop_time, steps, first, last, plan.every, report
+            status, where, done = loops.co_simulate(
+                functions, *inputs, *self._record, stop_time, steps, first, last, plan.every
             )
-            status, where, done = report.tolist()
             if done == steps and where in (loops.DONE, loops.TERMINATED):
                 return
             self._check(status, where, done * step)

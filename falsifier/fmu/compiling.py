@@ -1,8 +1,9 @@
-"""Detects long compilations by numba; they happen once, later processes load the result from the cache."""
+"""Compiles with numba, and says so if that takes long; later processes load the result from the cache."""
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 _LONG_SECONDS = 1.0
 
@@ -36,3 +37,30 @@ def on_long_compilation(tell: Callable[[], None], after: float = _LONG_SECONDS) 
 
     with event.install_listener("numba:compile", Watcher()):
         yield
+
+
+def compiled_object(
+    function: Callable[[int, int], int], machine: Any, tell: Callable[[], None]
+) -> tuple[str, tuple[str, ...], bytes]:
+    """Compile a function of two integers to an object file.
+
+    Args:
+        function: what to compile.
+        machine: LLVM's description of the machine.
+        tell: called if it takes long.
+
+    Returns:
+        The name of its machine code, the names of the functions that it calls, and the object file.
+    """
+    import numba
+    from llvmlite import binding
+
+    signature = (numba.types.intp, numba.types.intp)
+    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
+    with on_long_compilation(tell):
+        compiled.compile(signature)
+    module = binding.parse_assembly(compiled.inspect_llvm(signature))
+    needed = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
+    symbol = compiled.overloads[signature].fndesc.llvm_func_name
+    return symbol, tuple(needed), machine.emit_object(module)

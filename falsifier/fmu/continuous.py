@@ -1,133 +1,25 @@
-"""A model-exchange FMU as a differential equation: inputs, derivatives, event indicators, event iteration.
-
-Functions of stepping.py are compiled into these, and numba's cache does not notice changes there: after
-changing stepping.py, delete ``__pycache__``.
-"""
-
-from math import prod
-from typing import NamedTuple
+"""A model-exchange FMU as a differential equation: inputs, derivatives, event indicators, event iteration."""
 
 import numpy as np
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
-from falsifier.core.operating_system import guarded_memory
-from falsifier.fmu.ports import Addresses, Table
-from falsifier.fmu.stepping import (
+from falsifier.fmu.c_functions import call_mode, call_signature, update_3
+from falsifier.fmu.loop_numbers import (
     DONE,
     EVENT,
+    MOST_ROUNDS,
     PLACE_BYTES,
     SETTING,
     STEPPING,
     STUCK,
     TERMINATED,
-    call_mode,
-    call_signature,
-    compiled,
-    exchange_values,
-    put,
-    rounding,
-    start_of,
-    value_at,
 )
+from falsifier.fmu.solver_memory import JACOBIAN_KNOWN, NEXT_EVENT, TIME
+from falsifier.fmu.stepping import compiled, exchange_values, put, rounding, start_of, value_at
 
 # Rows of the table of function addresses.
 INSTANCE, VERSION, SET_TIME, SET_STATES, GET_STATES, GET_DERIVATIVES, GET_INDICATORS = range(7)
 COMPLETED_STEP, ENTER_EVENT_MODE, UPDATE, ENTER_CONTINUOUS = range(7, 11)
-
-# Rows of Memory.clock (s) and of Memory.counts.
-TIME, NEXT_STEP, NEXT_EVENT = range(3)
-COLUMN, IMPLICIT, STIFF_HITS, OTHER_HITS, EVENTS, JACOBIAN_KNOWN, INDICATORS_KNOWN = range(7)
-
-# Rounds of one event iteration after which the FMU is considered stuck.
-_MAX_ROUNDS = 1000
-Floats = NDArray[np.float64]
-
-
-class Model(NamedTuple):
-    """What does not change during a simulation.
-
-    Attributes:
-        functions: instance, FMI version and function addresses, in the order of the constants above.
-        ports: continuous inputs (``Ports.table``).
-        held_ports: inputs that may change only at events.
-        getters: recorded variables.
-        pieces: address of the continuous inputs' pieces (``Signal.pieces``) and their number per input.
-        held_pieces: the same for the inputs that may change only at events.
-        weights: absolute tolerance of each state, shape (states,).
-        tolerance: relative tolerance.
-        stop_time: stop time in s.
-        max_step: maximum step in s.
-    """
-
-    functions: tuple[int, ...]
-    ports: Addresses
-    held_ports: Addresses
-    getters: Addresses
-    pieces: tuple[int, int]
-    held_pieces: tuple[int, int]
-    weights: Floats
-    tolerance: float
-    stop_time: float
-    max_step: float
-
-
-class Memory(NamedTuple):
-    """What changes during a simulation.
-
-    Attributes:
-        clock: time, proposed step and next time event in s.
-        counts: column to record next, method and counters.
-        piece: current piece of each continuous input, then of each input that may change only at events.
-        x: states.
-        new_x: states at the end of a trial step.
-        stages: derivatives at the stages of a step, shape (7, states).
-        work: scratch vectors, shape (4, states).
-        jacobian: partial derivatives of the state derivatives with respect to the states.
-        factors: LU factors of the implicit step's matrix.
-        pivots: row exchanges of the factorisation.
-        z: event indicators.
-        new_z: event indicators at a trial point.
-        events: memory for the structures that the FMU fills at events, uint8[64].
-    """
-
-    clock: Floats
-    counts: Table
-    piece: Table
-    x: Floats
-    new_x: Floats
-    stages: NDArray[np.float64]
-    work: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    factors: NDArray[np.float64]
-    pivots: Table
-    z: Floats
-    new_z: Floats
-    events: NDArray[np.uint8]
-
-
-def make_memory(states: int, indicators: int, inputs: int) -> Memory:
-    """Return the memory of a simulation that starts at time 0."""
-    return Memory(
-        clock=np.array([0.0, 0.0, np.inf]),
-        counts=np.zeros(7, dtype=np.int64),
-        piece=np.zeros(inputs, dtype=np.int64),
-        x=_written_by_fmu(states),
-        new_x=_written_by_fmu(states),
-        stages=_written_by_fmu(7, states),
-        work=_written_by_fmu(4, states),
-        jacobian=np.zeros((states, states)),
-        factors=np.zeros((states, states)),
-        pivots=np.zeros(states, dtype=np.int64),
-        z=_written_by_fmu(indicators),
-        new_z=_written_by_fmu(indicators),
-        events=np.zeros(64, dtype=np.uint8),
-    )
-
-
-def _written_by_fmu(*shape: int) -> NDArray[np.float64]:
-    """Return zeros; an FMU that writes past their end crashes there, instead of damaging what lies behind."""
-    return np.ndarray(shape, np.float64, guarded_memory(8 * prod(shape)))
 
 
 @intrinsic
@@ -163,11 +55,6 @@ def _update_1(_typing, f, instance, intermediate, info):  # type: ignore[no-unty
 @intrinsic
 def _update_2(_typing, f, instance, info):  # type: ignore[no-untyped-def]
     return call_signature("pp")
-
-
-@intrinsic
-def _update_3(_typing, f, instance, again, end, nominals, states, defined, time):  # type: ignore[no-untyped-def]
-    return call_signature("ppppppp")
 
 
 @compiled
@@ -249,7 +136,7 @@ def _update(m, s):  # type: ignore[no-untyped-def]
         )
         next_time = times[3]
     else:
-        status = _update_3(f[UPDATE], f[INSTANCE], a, a + 1, a + 2, a + 3, a + 4, a + 24)
+        status = update_3(f[UPDATE], f[INSTANCE], a, a + 1, a + 2, a + 3, a + 4, a + 24)
         again, end, changed, defined = s.events[0] != 0, s.events[1] != 0, s.events[3] != 0, s.events[4] != 0
         next_time = times[3]
     s.clock[NEXT_EVENT] = next_time if defined else np.inf
@@ -261,7 +148,7 @@ def settle(m, s):  # type: ignore[no-untyped-def]
     """Iterate events until nothing changes, enter continuous time; return status and where it stopped."""
     f = m.functions
     any_change = False
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MOST_ROUNDS):
         status, again, end, changed = _update(m, s)
         if status > 1:
             return status, EVENT

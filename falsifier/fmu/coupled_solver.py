@@ -5,107 +5,24 @@ neither compile nor load the solver. A *solver* row of eight-byte numbers has th
 (``continuous.Model`` and ``Memory``) as addresses and sizes.
 """
 
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
 from numba import carray, types
-from numba.extending import intrinsic
 
-from falsifier.fmu.continuous import EVENTS, JACOBIAN_KNOWN, TIME, Memory, Model, copy
+from falsifier.fmu.c_functions import load_i8, pointer, store_i8
+from falsifier.fmu.continuous import copy
 from falsifier.fmu.coupled_stepping import (
     BRING_BACK,
     EVENT_AND_SOLVE,
     KEEP,
-    SOLVER_ENDS,
-    SOLVER_STATUS,
 )
+from falsifier.fmu.loop_numbers import DONE, PIECE_BYTES, TERMINATED
 from falsifier.fmu.solver import pass_event, proceed
-from falsifier.fmu.stepping import (
-    DONE,
-    PIECE_BYTES,
-    TERMINATED,
-    compiled,
-    load_f8,
-    load_i8,
-    rounding,
-    store_i8,
-)
-
-# Columns of a solver row: the functions of the model, four addresses or sizes of each table of inputs, the
-# addresses of their pieces, and sizes.
-FUNCTIONS, PORTS, HELD_PORTS = 0, 11, 15
-PIECES, HELD_PIECES, COUNT, STATES, INDICATORS = range(19, 24)
-# The addresses of the weights, of the fields of Memory in their order, and of what is kept.
-WEIGHTS, MEMORY, KEPT = 24, 25, 38
-TOLERANCE, STOP_TIME, MAX_STEP = range(39, 42)
-WIDTH = SOLVER_ENDS + 1
+from falsifier.fmu.solver_memory import EVENTS, JACOBIAN_KNOWN, TIME
+from falsifier.fmu.solver_row import KEPT, SOLVER_ENDS, SOLVER_STATUS
+from falsifier.fmu.solver_views import memory_of, model_of
+from falsifier.fmu.stepping import compiled, rounding
 
 _ARGUMENTS = (types.int64, types.float64, types.float64, types.int64)
-
-
-@intrinsic
-def _pointer(_typing, address):  # type: ignore[no-untyped-def]
-    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-        return builder.inttoptr(values[0], ir.IntType(8).as_pointer())
-
-    return types.voidptr(types.intp), emit
-
-
-@compiled
-def _floats(row, column, size):  # type: ignore[no-untyped-def]
-    return carray(_pointer(load_i8(row + 8 * column)), (size,), np.float64)
-
-
-@compiled
-def _table(row, column, rows, size):  # type: ignore[no-untyped-def]
-    return carray(_pointer(load_i8(row + 8 * column)), (rows, size), np.float64)
-
-
-@compiled
-def _whole(row, column, size):  # type: ignore[no-untyped-def]
-    return carray(_pointer(load_i8(row + 8 * column)), (size,), np.int64)
-
-
-@compiled
-def _model(row):  # type: ignore[no-untyped-def]
-    f, p, h = row + 8 * FUNCTIONS, row + 8 * PORTS, row + 8 * HELD_PORTS
-    count = load_i8(row + 8 * COUNT)
-    return Model(
-        (
-            load_i8(f), load_i8(f + 8), load_i8(f + 16), load_i8(f + 24), load_i8(f + 32), load_i8(f + 40),
-            load_i8(f + 48), load_i8(f + 56), load_i8(f + 64), load_i8(f + 72), load_i8(f + 80),
-        ),
-        (load_i8(p), load_i8(p + 8), load_i8(p + 16), load_i8(p + 24)),
-        (load_i8(h), load_i8(h + 8), load_i8(h + 16), load_i8(h + 24)),
-        (0, 0, 0, 0),
-        (load_i8(row + 8 * PIECES), count),
-        (load_i8(row + 8 * HELD_PIECES), count),
-        _floats(row, WEIGHTS, load_i8(row + 8 * STATES)),
-        load_f8(row + 8 * TOLERANCE),
-        load_f8(row + 8 * STOP_TIME),
-        load_f8(row + 8 * MAX_STEP),
-    )  # fmt: skip
-
-
-@compiled
-def _memory(row, inputs):  # type: ignore[no-untyped-def]
-    n, z, m = load_i8(row + 8 * STATES), load_i8(row + 8 * INDICATORS), MEMORY
-    return Memory(
-        _floats(row, m, 3),
-        _whole(row, m + 1, 7),
-        _whole(row, m + 2, inputs),
-        _floats(row, m + 3, n),
-        _floats(row, m + 4, n),
-        _table(row, m + 5, 7, n),
-        _table(row, m + 6, 4, n),
-        _table(row, m + 7, n, n),
-        _table(row, m + 8, n, n),
-        _whole(row, m + 9, n),
-        _floats(row, m + 10, z),
-        _floats(row, m + 11, z),
-        carray(_pointer(load_i8(row + 8 * (m + 12))), (64,), np.uint8),
-    )
 
 
 @compiled
@@ -121,8 +38,8 @@ def integrate(row, start, end, what):  # type: ignore[no-untyped-def]
     Returns:
         Where it stopped.
     """
-    m = _model(row)
-    s = _memory(row, m.ports[3] + m.held_ports[3])
+    m = model_of(row)
+    s = memory_of(row, m)
     if what in (KEEP, BRING_BACK):
         _move(m, s, load_i8(row + 8 * KEPT), what == KEEP)
         return DONE
@@ -151,7 +68,7 @@ def _move(m, s, kept, is_kept):  # type: ignore[no-untyped-def]
     at = _vector(s.z, at, is_kept)
     at = _lines(m.ports, m.pieces, at, is_kept)
     at = _lines(m.held_ports, m.held_pieces, at, is_kept)
-    numbers = carray(_pointer(at), (7 + s.piece.shape[0],), np.int64)
+    numbers = carray(pointer(at), (7 + s.piece.shape[0],), np.int64)
     for i in range(numbers.shape[0]):
         own, k = (s.counts, i) if i < 7 else (s.piece, i - 7)
         if is_kept:
@@ -163,7 +80,7 @@ def _move(m, s, kept, is_kept):  # type: ignore[no-untyped-def]
 
 @compiled
 def _vector(own, at, is_kept):  # type: ignore[no-untyped-def]
-    other = carray(_pointer(at), own.shape, np.float64)
+    other = carray(pointer(at), own.shape, np.float64)
     if is_kept:
         copy(other, own)
     else:
@@ -175,7 +92,7 @@ def _vector(own, at, is_kept):  # type: ignore[no-untyped-def]
 def _lines(ports, pieces, at, is_kept):  # type: ignore[no-untyped-def]
     """Copy the first piece of each input, which is the line that a connected one follows."""
     for j in range(ports[3]):
-        line = carray(_pointer(pieces[0] + j * pieces[1] * PIECE_BYTES), (5,), np.float64)
+        line = carray(pointer(pieces[0] + j * pieces[1] * PIECE_BYTES), (5,), np.float64)
         at = _vector(line, at, is_kept)
     return at
 

@@ -1,8 +1,7 @@
 """Compiled loops over the C functions of several connected FMUs.
 
 As in stepping.py, everything is passed as integer addresses, and a loop returns after a bounded number of
-steps. Functions of stepping.py are compiled into these, and numba's cache does not notice changes there:
-after changing stepping.py, delete ``__pycache__``.
+steps.
 
 Three kinds of rows of eight-byte numbers describe a system. A *component* row has the component's functions
 and ports; components are in the order in which they step. A *feed* row says where the value of one input
@@ -13,7 +12,16 @@ a solver row too, see coupled_solver.py.
 import numpy as np
 from numba.extending import intrinsic
 
-from falsifier.fmu.stepping import (
+from falsifier.fmu.c_functions import (
+    call_signature,
+    do_step_1,
+    do_step_2,
+    load_f8,
+    load_i8,
+    store_f8,
+    store_i8,
+)
+from falsifier.fmu.loop_numbers import (
     DONE,
     GETTING,
     PLACE_BYTES,
@@ -23,22 +31,18 @@ from falsifier.fmu.stepping import (
     STEPPING,
     TERMINATED,
     WHERE,
+)
+from falsifier.fmu.solver_row import SOLVER_ENDS, SOLVER_STATUS
+from falsifier.fmu.stepping import (
     advance_3,
-    call_signature,
     compiled,
-    do_step_1,
-    do_step_2,
     event_3,
     exchange_values,
     fetch,
     inlined,
-    load_f8,
-    load_i8,
     put,
     rounding,
     start_of,
-    store_f8,
-    store_i8,
     value_at,
 )
 
@@ -70,7 +74,6 @@ _COPY_BYTES = 16
 # What to ask of the function that integrates: a step, a step that begins with an event, keep the present,
 # bring back what was kept. Columns of a solver row for FMI status and whether the FMU ends the simulation.
 SOLVE, EVENT_AND_SOLVE, KEEP, BRING_BACK = range(4)
-SOLVER_STATUS, SOLVER_ENDS = 42, 43
 
 
 @intrinsic

@@ -143,10 +143,10 @@ def describe(path: Path, sha256: str) -> Description:
     described = parse(root, name=str(path), platforms=archive.platforms(names))
     info = described.info
     libraries, said = find_libraries(names, info.fmi_version, described.identifiers)
-    windows, _ = find_libraries(names, info.fmi_version, described.identifiers, archive.WINDOWS)
+    windows, windows_said = find_libraries(names, info.fmi_version, described.identifiers, archive.WINDOWS)
     described = replace(described, libraries=libraries, windows_libraries=windows)
     if any(described.needs_wine(interface) for interface in info.interfaces):
-        said = (*said, windows_text())
+        said = (*said, *windows_said, windows_text())
     return replace(described, info=replace(info, notes=(*info.notes, *said)))
 
 

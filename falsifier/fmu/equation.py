@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import ModelError
-from falsifier.fmu import continuous, stepping
-from falsifier.fmu.continuous import Memory, Model, make_memory
+from falsifier.fmu import loop_numbers, loops, solver_memory
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle
 from falsifier.fmu.plan import Plan, solver_tolerance
-from falsifier.fmu.ports import Addresses
+from falsifier.fmu.ports import Addresses, Table
+from falsifier.fmu.solver_memory import Memory, Model
 
 # Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7).
 _ABSOLUTE_SHARE = 0.01
@@ -94,24 +94,30 @@ class Equation:
             max_step=float(self._plan.max_step),
         )
 
-    def begin(self, model: Model, memory: Memory, lifecycle: Lifecycle) -> None:
-        """Get from initialisation to continuous time, handling the events at time 0."""
+    def begin(self, row: Table, memory: Memory, lifecycle: Lifecycle) -> None:
+        """Get from initialisation to continuous time, handling the events at time 0.
+
+        Args:
+            row: the model and its memory (``solver_row``).
+            memory: the same memory.
+            lifecycle: what the initialisation has reported.
+        """
         self._vector("GetContinuousStates", "GetContinuousStates", memory.x)
-        memory.clock[continuous.NEXT_STEP] = model.max_step
+        memory.clock[solver_memory.NEXT_STEP] = self._plan.max_step
         info = lifecycle.first_events
         if info is None or info.iteration_converged == b"\x00":
-            status, where = continuous.settle(model, memory)
+            status, where = loops.settle(row)
         else:
             if info.terminate != b"\x00":
-                self._check(0, stepping.TERMINATED, 0.0)
+                self._check(0, loop_numbers.TERMINATED, 0.0)
             has_next = info.has_next_time != b"\x00"
-            memory.clock[continuous.NEXT_EVENT] = info.next_time if has_next else np.inf
-            status, where = continuous.refresh(model, memory)
+            memory.clock[solver_memory.NEXT_EVENT] = info.next_time if has_next else np.inf
+            status, where = loops.refresh(row)
         self._check(status, where, 0.0)
         if info is None:
             # Event mode may have changed the states, whether the FMU reports it or not.
             self._vector("GetContinuousStates", "GetContinuousStates", memory.x)
-            status, where = continuous.refresh(model, memory)
+            status, where = loops.refresh(row)
             self._check(status, where, 0.0)
 
     def _vector(self, name_1: str, name: str, values: NDArray[np.float64]) -> None:
@@ -122,7 +128,7 @@ class Equation:
             name_1 if self._description.major == 1 else name, ctypes.c_void_p, ctypes.c_size_t
         )
         status = function(self._library.component, values.ctypes.data, values.size)
-        self._check(status, stepping.GETTING if status > 1 else stepping.DONE, 0.0)
+        self._check(status, loop_numbers.GETTING if status > 1 else loop_numbers.DONE, 0.0)
 
     def _sizes(self) -> tuple[int, int]:
         """Return the number of states and of event indicators; FMI 3 reports them only at run time."""
@@ -147,15 +153,3 @@ class Equation:
                     f"{self._description.info.name}: {number} {what}; expected 0 to {_MOST_VALUES}"
                 )
         return states, indicators
-
-
-def warm_up() -> tuple[Model, Memory]:
-    """Compile what an equation needs, or load it from the cache; return one without states."""
-    from numba import typeof
-
-    table = (0, 0, 0, 0)
-    model = Model((0,) * 11, table, table, table, (0, 0), (0, 0), np.zeros(0), 1e-6, 1.0, 1.0)
-    memory = make_memory(0, 0, 0)
-    for function in (continuous.settle, continuous.refresh):
-        function.compile((typeof(model), typeof(memory)))
-    return model, memory

@@ -1,30 +1,22 @@
 """Workers forked from a nursery: the side of the process that requests simulations."""
 
-import json
 import logging
-import os
 import pickle
 import sys
 import threading
-from pathlib import Path
 
-from falsifier.core import operating_system, posix
-from falsifier.core.memory import check_memory_limits
+from falsifier.core import posix
 from falsifier.errors import ModelError
-from falsifier.fmu import folders, nursery, sharing
+from falsifier.fmu import nursery, sharing
 from falsifier.fmu.channel import Closed, open_channel, receive_reply, send_request
-from falsifier.fmu.environment import protect_secrets, worker_environment
 from falsifier.fmu.output import Output
 from falsifier.fmu.sharing import Shared
-from falsifier.fmu.starting import STARTING_SECONDS, Started
+from falsifier.fmu.starting import STARTING_SECONDS, Started, open_folder, start_program
 from falsifier.fmu.worker_order import Order
 
 assert sys.platform != "win32"
 
 _LOG = logging.getLogger(__name__)
-_BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
-    "from falsifier.fmu.nursery import main; main(Path(sys.argv[2]))"
-)
 # A nursery whose connection is closed ends its workers and removes their folder, then itself.
 _ENDING_SECONDS = 5.0
 
@@ -34,15 +26,10 @@ class Nursery:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        check_memory_limits()
-        protect_secrets(os.environ)
-        folders.sweep()
-        self._folder = folders.WorkFolder()
+        self._folder = open_folder()
         self._root = self._folder.path
         self._sock, theirs = open_channel()
-        paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
-        command = [operating_system.interpreter(), "-I", "-c", _BOOT, paths, str(self._root)]
-        self._process = operating_system.Child(command, worker_environment(os.environ), theirs)
+        self._process = start_program(nursery.__name__, self._root, theirs)
         self._ready = False
 
     @property

@@ -7,7 +7,8 @@ Implicit: ARK4(3)6L[2]SA-ESDIRK of Kennedy and Carpenter, Appl. Numer. Math. 44 
 
 import numpy as np
 
-from falsifier.fmu.continuous import JACOBIAN_KNOWN, TIME, copy, derive
+from falsifier.fmu.continuous import copy, derive
+from falsifier.fmu.solver_memory import JACOBIAN_KNOWN, TIME
 from falsifier.fmu.stepping import compiled
 
 _C = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])

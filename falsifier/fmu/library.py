@@ -11,7 +11,7 @@ from falsifier.core.model import Interface
 from falsifier.errors import ModelError
 from falsifier.fmu import archive
 from falsifier.fmu.description import Description
-from falsifier.fmu.libraries import missing_binary_text
+from falsifier.fmu.libraries import misnamed_text, missing_binary_text
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
 # Type codes by FMI version; they name the functions that read and write values.
@@ -135,13 +135,12 @@ class Library:
         found = self.description.libraries.get(self.interface)
         if found is not None:
             return folder / found
-        expected = archive.library_file(info.fmi_version, self.description.identifiers[self.interface])
-        others = sorted(p.name for p in (folder / expected.parent).glob(f"*{expected.suffix}"))
-        if others:
-            raise ModelError(
-                f"{info.name}: {expected} is missing; the folder contains {', '.join(others)} instead, and "
-                "the model identifier tells which one to load: export the FMU again"
-            )
+        identifier = self.description.identifiers[self.interface]
+        expected = archive.library_file(info.fmi_version, identifier)
+        names = [p.relative_to(folder).as_posix() for p in folder.glob("binaries/*/*")]
+        misnamed = misnamed_text(names, info.fmi_version, [identifier])
+        if misnamed:
+            raise ModelError(f"{info.name}: {misnamed}")
         has_sources = any((folder / "sources").rglob("*.c"))
         wine = self.description.needs_wine(self.interface)
         said = missing_binary_text("FMU", info.platforms, has_sources=has_sources, needs_wine=wine)

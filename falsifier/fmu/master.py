@@ -7,7 +7,7 @@ import numpy as np
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import coupled_stepping as loops
-from falsifier.fmu import stepping
+from falsifier.fmu import loop_numbers, stepping
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.co_simulation import CHUNK_GROWTH, FIRST_CHUNK, QUICK_SECONDS
 from falsifier.fmu.instance import FmuInstance
@@ -124,8 +124,8 @@ class Master:
                 *self._rows, jacobi, coupling.tolerance, coupling.max_rounds, plan.pieces, *self._copies,
                 stop_time, steps, first, last, plan.every, self._running, report,
             )  # fmt: skip
-            reached = int(report[stepping.STEP]) * stop_time / steps
-            if report[stepping.STEP] == steps and report[stepping.WHERE] == stepping.TERMINATED:
+            reached = int(report[loop_numbers.STEP]) * stop_time / steps
+            if report[loop_numbers.STEP] == steps and report[loop_numbers.WHERE] == loop_numbers.TERMINATED:
                 return
             self._check(reached)
             self._watch_clock(deadline, reached)
@@ -142,8 +142,8 @@ class Master:
             self._fail(position, f"{self._not_numbers(position)} became nan", reached)
         if where == loops.RESTORING:
             self._fail(position, f"saving or restoring the state returned {status_name(status)}", reached)
-        if where != stepping.DONE:
-            self._fail(position, what_stopped(stepping, status, where), reached)
+        if where != loop_numbers.DONE:
+            self._fail(position, what_stopped(loop_numbers, status, where), reached)
 
     def _not_numbers(self, position: int) -> str:
         values, member = self._tables.signals[:, loops.VALUE], self._network.order[position]
@@ -216,8 +216,8 @@ class _Starter:
             names = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
             functions = (library.component, *(library.address(name) for name in names), 3, 1)
             status, where = stepping.enter_step_mode(functions)
-            if where != stepping.DONE:
-                what = what_stopped(stepping, status, where)
+            if where != loop_numbers.DONE:
+                what = what_stopped(loop_numbers, status, where)
                 raise SimulationError(f"{self._member.name}: {what} at t = 0 s", time=0.0)
 
     def terminate(self) -> None:

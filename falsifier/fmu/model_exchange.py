@@ -1,25 +1,16 @@
 """Model exchange: the FMU is a differential equation, solved by solver.py."""
 
-import numpy as np
-
-from falsifier.fmu import continuous, equation, solver
+from falsifier.fmu import equation, loops, solver_memory, solver_row
 from falsifier.fmu.buffers import Room
-from falsifier.fmu.continuous import make_memory
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle
 from falsifier.fmu.plan import Plan
+from falsifier.fmu.solver_memory import make_memory
 from falsifier.fmu.stepper import Stepper
 
 # Solver steps between two checks of the time limit.
 _STEPS_PER_CLOCK_CHECK = 2000
-
-
-def warm_up() -> None:
-    """Compile the solver, or load it from the cache; needs no FMU."""
-    model, memory = equation.warm_up()
-    # With no column left to record, this returns before it calls the FMU.
-    solver.advance(model, memory, np.zeros((0, 0)), 1)
 
 
 class ModelExchange(Stepper):
@@ -46,13 +37,16 @@ class ModelExchange(Stepper):
             self._outputs.table,
             ((pieces.ctypes.data, count), (held_pieces.ctypes.data, count)),
         )
-        solved.begin(model, memory, self._lifecycle)
+        row = solver_row.make_row()
+        solver_row.fill(row, model, memory)
+        solver_row.record_to(row, self._room.outputs)
+        solved.begin(row, memory, self._lifecycle)
         self._read_first()
-        memory.counts[continuous.COLUMN] = 1
+        memory.counts[solver_memory.COLUMN] = 1
         while True:
-            status, where = solver.advance(model, memory, self._room.outputs, _STEPS_PER_CLOCK_CHECK)
-            reached = float(memory.clock[continuous.TIME])
-            if where == solver.PAUSED:
+            status, where = loops.advance(row, _STEPS_PER_CLOCK_CHECK)
+            reached = float(memory.clock[solver_memory.TIME])
+            if where == loops.PAUSED:
                 self._watch_clock(deadline, reached)
                 continue
             self._check(status, where, reached)

@@ -15,7 +15,7 @@ from falsifier.errors import ModelError
 from falsifier.fmu import archive
 from falsifier.fmu.description import Description, read_description
 from falsifier.fmu.elf import Elf, read_elf
-from falsifier.fmu.libraries import missing_binary_text
+from falsifier.fmu.libraries import misnamed_text, missing_binary_text
 
 # Larger libraries are not read.
 _MOST_BYTES = 512 << 20
@@ -38,9 +38,14 @@ def binary_remarks(path: Path) -> tuple[str, ...]:
     missing = [i for i in description.identifiers if i not in description.libraries]
     said = []
     if missing and len(missing) == len(description.identifiers):
+        misnamed = misnamed_text(
+            names, description.info.fmi_version, [description.identifiers[i] for i in missing]
+        )
         has_sources = any(n.startswith("sources/") and n.endswith(".c") for n in names)
         wine = any(map(description.needs_wine, missing))
-        if has_sources or not wine:
+        if misnamed:
+            said.append(misnamed)
+        elif has_sources or not wine:
             platforms = description.info.platforms
             text = missing_binary_text(path.name, platforms, has_sources=has_sources, needs_wine=wine)
             said.append(text)

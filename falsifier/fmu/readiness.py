@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from falsifier.core import operating_system
+from falsifier.fmu import machine_code
 from falsifier.fmu.worker_order import Order
 
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
@@ -25,9 +26,7 @@ class Loops:
             return
         members = () if order.network is None else order.network.members
         if order.interface == "model-exchange":
-            from falsifier.fmu import model_exchange
-
-            self._once("solver", model_exchange.warm_up, lambda: tell(_COMPILING))
+            machine_code.load("model_exchange", lambda: tell(_COMPILING))
         if members:
             from falsifier.fmu import master
 

@@ -9,16 +9,7 @@ explicit steps, the rest of the simulation uses implicit ones.
 import numpy as np
 
 from falsifier.fmu.continuous import (
-    COLUMN,
-    EVENTS,
-    IMPLICIT,
     INSTANCE,
-    JACOBIAN_KNOWN,
-    NEXT_EVENT,
-    NEXT_STEP,
-    OTHER_HITS,
-    STIFF_HITS,
-    TIME,
     VERSION,
     complete_step,
     copy,
@@ -29,18 +20,19 @@ from falsifier.fmu.continuous import (
     next_break,
 )
 from falsifier.fmu.integrators import explicit_step, implicit_step, interpolate
-from falsifier.fmu.stepping import (
-    DONE,
-    EVENT,
-    GETTING,
-    STEPPING,
-    STUCK,
-    TERMINATED,
-    TOO_SMALL,
-    compiled,
-    read_row,
-    rounding,
+from falsifier.fmu.loop_numbers import DONE, EVENT, GETTING, PAUSED, STEPPING, STUCK, TERMINATED, TOO_SMALL
+from falsifier.fmu.solver_memory import (
+    COLUMN,
+    EVENTS,
+    IMPLICIT,
+    JACOBIAN_KNOWN,
+    NEXT_EVENT,
+    NEXT_STEP,
+    OTHER_HITS,
+    STIFF_HITS,
+    TIME,
 )
+from falsifier.fmu.stepping import compiled, read_row, rounding, spacing
 
 # Constants of Hairer and Wanner: a problem is stiff after 15 steps with h times the dominant eigenvalue above
 # 3.25 (the method is stable up to 3.3); 6 other steps in a row reset the count.
@@ -48,7 +40,6 @@ _STIFF_BOUND, _STIFF_STEPS, _OTHER_STEPS = 3.25, 15, 6
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 5.0
 # Events within one output interval after which the FMU is considered stuck (Zeno behaviour).
 _MAX_EVENTS = 10_000
-PAUSED = 100
 
 
 @compiled
@@ -195,7 +186,7 @@ def _accepted_step(m, s, h, target):  # type: ignore[no-untyped-def]
         if accepted:
             return status, DONE, h
         # Give up once the step is too small to change the time in floating point.
-        if h < 4.0 * np.spacing(max(abs(s.clock[TIME]), 1e-3 * m.stop_time)):
+        if h < 4.0 * spacing(max(abs(s.clock[TIME]), 1e-3 * m.stop_time)):
             return 0, TOO_SMALL, h
 
 
@@ -251,7 +242,10 @@ def _locate(m, s, h):  # type: ignore[no-untyped-def]
     """
     low, high = 0.0, 1.0
     end_stage = 5 if s.counts[IMPLICIT] else 6
-    z_low, z_high, z = s.z.copy(), s.new_z.copy(), s.new_z.copy()
+    z_low, z_high, z = s.trials[0], s.trials[1], s.trials[2]
+    copy(z_low, s.z)
+    copy(z_high, s.new_z)
+    copy(z, s.new_z)
     state = s.work[0]
     width = max(1e-13, 0.1 * rounding(s.clock[TIME]) / h)
     trial = 0

@@ -6,34 +6,24 @@ the next one is started in advance, so that replacing a worker takes no longer t
 """
 
 import contextlib
-import json
 import logging
-import os
 import pickle
-import sys
 import tempfile
 import threading
 from pathlib import Path
 
 from falsifier.core import operating_system
-from falsifier.core.memory import check_memory_limits
-from falsifier.core.operating_system import Child
 from falsifier.errors import ModelError
-from falsifier.fmu import folders, sharing
+from falsifier.fmu import sharing, spawned
 from falsifier.fmu.channel import Closed, Reply, open_channel, receive_reply, send_request
-from falsifier.fmu.environment import protect_secrets, worker_environment
 from falsifier.fmu.failure_text import last_lines
 from falsifier.fmu.opening import extracted
 from falsifier.fmu.output import Output
 from falsifier.fmu.sharing import Shared
-from falsifier.fmu.spawned import START
-from falsifier.fmu.starting import STARTING_SECONDS, Started
+from falsifier.fmu.starting import STARTING_SECONDS, Started, open_folder, start_program
 from falsifier.fmu.worker_order import Order
 
 _LOG = logging.getLogger(__name__)
-_BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from pathlib import Path; " + (
-    "from falsifier.fmu.spawned import main; main(Path(sys.argv[2]))"
-)
 
 
 class Spawner:
@@ -41,10 +31,7 @@ class Spawner:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        check_memory_limits()
-        protect_secrets(os.environ)
-        folders.sweep()
-        self._folder = folders.WorkFolder()
+        self._folder = open_folder()
         self._root = self._folder.path
         self._workers: dict[int, _Program] = {}
         self._needed = 0
@@ -120,9 +107,7 @@ class _Program:
         self.output = Output()
         self._scratch = Path(tempfile.mkdtemp(prefix="work-", dir=root))
         self.sock, theirs = open_channel()
-        paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
-        command = [operating_system.interpreter(), "-I", "-c", _BOOT, paths, str(root)]
-        self._child = Child(command, worker_environment(os.environ), theirs, self.output.fileno())
+        self._child = start_program(spawned.__name__, root, theirs, self.output.fileno())
         self.pid = self._child.pid
         self._life = operating_system.open_life(self.pid)
 
@@ -140,7 +125,7 @@ class _Program:
         try:
             self._receive()
             self._child.settle()
-            send_request(self.sock, START, pickle.dumps((order, folder, self._scratch)))
+            send_request(self.sock, spawned.START, pickle.dumps((order, folder, self._scratch)))
             reply = self._receive()
             while reply.more:
                 _LOG.warning(reply.text)

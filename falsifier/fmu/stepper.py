@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import SimulationError
+from falsifier.fmu import loops as compiled_loops
+from falsifier.fmu import machine_code
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library, load_binding, status_name
@@ -195,17 +197,11 @@ def write_fixed(ports: Ports, values: NDArray[np.float64]) -> None:
 
 
 def loops() -> Any:
-    """Return the module of the compiled loops, imported here because that takes long."""
-    from falsifier.fmu import stepping
-
-    return stepping
+    """Return the module of the compiled loops."""
+    return compiled_loops
 
 
 def warm_up() -> None:
     """Load what every simulation needs, so that processes forked from this one need not."""
     load_binding()
-    compiled = loops()
-    table, report = (0, 0, 0, 0), np.zeros(3, dtype=np.int64)
-    compiled.write_row(0, 2, table, 0)
-    compiled.read_row(0, 2, table, 0, 0, 0)
-    compiled.co_simulate((0,) * 7, table, (0, 0), table, (0, 0), 0, 0, table, 0, 0, 1.0, 1, 0, 0, 1, report)
+    machine_code.load("co_simulation")

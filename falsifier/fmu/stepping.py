@@ -1,8 +1,7 @@
 """Compiled loops over an FMU's C functions.
 
 numba compiles the loops; small intrinsics emit calls of C functions whose addresses are integers. The machine
-code is therefore the same for every FMU and can be cached on disk. Intrinsics and loops are in one file
-because numba's cache only notices changes in the file of the cached function.
+code is therefore the same for every FMU and can be kept on disk; workers enter it through ``entries``.
 
 Functions, tables and memory are passed as integer addresses, not as arrays: compiled code counts references
 to every array that it touches, which would cost more than the rest of the loop. Every loop returns after a
@@ -13,126 +12,62 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
-from falsifier.stl.numba_compilation import compiled as keep_compiled
-
-# Where a loop stopped, in `report[WHERE]`; DONE: nowhere before its end.
-DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL = range(8)
-STATUS, WHERE, STEP = range(3)
-
-# Rows of the table of function addresses of a co-simulation FMU.
-INSTANCE, DO_STEP, ENTER_EVENT_MODE, UPDATE_DISCRETE_STATES, ENTER_STEP_MODE, FMI_VERSION, EVENT_MODE = range(
-    7
+from falsifier.fmu.c_functions import (
+    call_mode,
+    do_step_1,
+    do_step_2,
+    do_step_3,
+    load_f4,
+    load_f8,
+    load_i1,
+    load_i2,
+    load_i4,
+    load_i8,
+    load_u1,
+    load_u2,
+    load_u4,
+    load_u8,
+    next_number,
+    stack_memory,
+    store_f4,
+    store_f8,
+    store_i1,
+    store_i2,
+    store_i4,
+    store_i8,
+    store_u1,
+    store_u2,
+    store_u4,
+    store_u8,
+    update_3,
+    values_2,
+    values_3,
 )
-
-# Bytes per row in the tables of calls and places (Ports) and of pieces (Signal.pieces).
-CALL_BYTES, PLACE_BYTES, PIECE_BYTES = 40, 32, 40
-
-# Early returns at one time, or rounds of one event iteration, after which the FMU is considered stuck.
-_MAX_ROUNDS = 1000
-
-_BYTE = ir.IntType(8)
-_POINTER = _BYTE.as_pointer()
-_LLVM = {"p": _POINTER, "n": ir.IntType(64), "d": ir.DoubleType(), "i": ir.IntType(32), "b": _BYTE}
-_NUMBA = {"p": types.intp, "n": types.intp, "d": types.float64, "i": types.int32, "b": types.uint8}
-
-
-def call_signature(arguments: str) -> Any:
-    """Signature and code of a call ``int f(...)``: p pointer, n size_t, d double, i int, b bool or char.
-
-    The status is unsigned: a negative one, which FMI does not define, is larger than all others.
-    """
-
-    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-        kind = ir.FunctionType(ir.IntType(32), [_LLVM[a] for a in arguments])
-        function = builder.inttoptr(values[0], kind.as_pointer())
-        passed = [
-            builder.inttoptr(value, _POINTER) if a == "p" else value
-            for a, value in zip(arguments, values[1:], strict=True)
-        ]
-        return builder.call(function, passed)
-
-    return types.uint32(types.intp, *(_NUMBA[a] for a in arguments)), emit
-
-
-def _load(kind: Any, stored: ir.Type) -> Any:
-    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-        return builder.load(builder.inttoptr(values[0], stored.as_pointer()))
-
-    return kind(types.intp), emit
-
-
-def _store(kind: Any, stored: ir.Type) -> Any:
-    def emit(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-        builder.store(values[1], builder.inttoptr(values[0], stored.as_pointer()))
-        return context.get_dummy_value()
-
-    return types.void(types.intp, kind), emit
-
-
-@intrinsic
-def _values_2(_typing, f, instance, references, count, values):  # type: ignore[no-untyped-def]
-    return call_signature("ppnp")
-
-
-@intrinsic
-def _values_3(_typing, f, instance, references, count, values, size):  # type: ignore[no-untyped-def]
-    return call_signature("ppnpn")
-
-
-@intrinsic
-def do_step_1(_typing, f, instance, time, step, new_step):  # type: ignore[no-untyped-def]
-    """Call fmiDoStep of FMI 1."""
-    return call_signature("pddb")
-
-
-@intrinsic
-def do_step_2(_typing, f, instance, time, step, no_return):  # type: ignore[no-untyped-def]
-    """Call fmi2DoStep."""
-    return call_signature("pddi")
-
-
-@intrinsic
-def _do_step_3(_typing, f, instance, time, step, no_return, event, end, early, reached):  # type: ignore[no-untyped-def]
-    return call_signature("pddbpppp")
-
-
-@intrinsic
-def call_mode(_typing, f, instance):  # type: ignore[no-untyped-def]
-    """Call a function whose only argument is the instance."""
-    return call_signature("p")
-
-
-@intrinsic
-def _update_3(_typing, f, instance, again, end, nominals, states, defined, time):  # type: ignore[no-untyped-def]
-    return call_signature("ppppppp")
-
-
-def _typed(kind: Any, stored: ir.Type) -> tuple[Any, Any]:
-    @intrinsic
-    def load(_typing, address):  # type: ignore[no-untyped-def]
-        return _load(kind, stored)
-
-    @intrinsic
-    def store(_typing, address, value):  # type: ignore[no-untyped-def]
-        return _store(kind, stored)
-
-    return load, store
-
-
-load_f8, store_f8 = _typed(types.float64, ir.DoubleType())
-_load_f4, _store_f4 = _typed(types.float32, ir.FloatType())
-_load_i1, _store_i1 = _typed(types.int8, ir.IntType(8))
-load_u1, store_u1 = _typed(types.uint8, ir.IntType(8))
-_load_i2, _store_i2 = _typed(types.int16, ir.IntType(16))
-_load_u2, _store_u2 = _typed(types.uint16, ir.IntType(16))
-_load_i4, _store_i4 = _typed(types.int32, ir.IntType(32))
-_load_u4, _store_u4 = _typed(types.uint32, ir.IntType(32))
-load_i8, store_i8 = _typed(types.int64, ir.IntType(64))
-_load_u8, _store_u8 = _typed(types.uint64, ir.IntType(64))
+from falsifier.fmu.loop_numbers import (
+    CALL_BYTES,
+    DO_STEP,
+    DONE,
+    ENTER_EVENT_MODE,
+    ENTER_STEP_MODE,
+    EVENT,
+    EVENT_MODE,
+    FMI_VERSION,
+    GETTING,
+    INSTANCE,
+    MOST_ROUNDS,
+    PIECE_BYTES,
+    PLACE_BYTES,
+    SETTING,
+    STATUS,
+    STEP,
+    STEPPING,
+    STUCK,
+    TERMINATED,
+    UPDATE_DISCRETE_STATES,
+    WHERE,
+)
+from falsifier.stl.numba_compilation import compiled as keep_compiled
 
 compiled: Any = keep_compiled
 # For functions called in every step: without inlining, each address would be passed as a separate argument.
@@ -146,23 +81,23 @@ def fetch(place):  # type: ignore[no-untyped-def]
     if kind == 0:
         return load_f8(address) * sign
     if kind == 1:
-        value = np.float64(_load_f4(address))
+        value = np.float64(load_f4(address))
     elif kind == 2:
-        value = np.float64(_load_i1(address))
+        value = np.float64(load_i1(address))
     elif kind == 3:
         value = np.float64(load_u1(address))
     elif kind == 4:
-        value = np.float64(_load_i2(address))
+        value = np.float64(load_i2(address))
     elif kind == 5:
-        value = np.float64(_load_u2(address))
+        value = np.float64(load_u2(address))
     elif kind == 6:
-        value = np.float64(_load_i4(address))
+        value = np.float64(load_i4(address))
     elif kind == 7:
-        value = np.float64(_load_u4(address))
+        value = np.float64(load_u4(address))
     elif kind == 8:
         value = np.float64(load_i8(address))
     else:
-        value = np.float64(_load_u8(address))
+        value = np.float64(load_u8(address))
     if load_i8(place + 24):
         # Any non-zero value is true; the negated alias of a Boolean is its complement.
         return 1.0 if (value != 0.0) == (sign > 0) else 0.0
@@ -180,23 +115,23 @@ def put(place, number):  # type: ignore[no-untyped-def]
     if load_i8(place + 24):
         value = 1.0 if (number >= 0.5) == (sign > 0) else 0.0
     if kind == 1:
-        _store_f4(address, np.float32(value))
+        store_f4(address, np.float32(value))
     elif kind == 2:
-        _store_i1(address, np.int8(np.rint(value)))
+        store_i1(address, np.int8(np.rint(value)))
     elif kind == 3:
         store_u1(address, np.uint8(np.rint(value)))
     elif kind == 4:
-        _store_i2(address, np.int16(np.rint(value)))
+        store_i2(address, np.int16(np.rint(value)))
     elif kind == 5:
-        _store_u2(address, np.uint16(np.rint(value)))
+        store_u2(address, np.uint16(np.rint(value)))
     elif kind == 6:
-        _store_i4(address, np.int32(np.rint(value)))
+        store_i4(address, np.int32(np.rint(value)))
     elif kind == 7:
-        _store_u4(address, np.uint32(np.rint(value)))
+        store_u4(address, np.uint32(np.rint(value)))
     elif kind == 8:
         store_i8(address, np.int64(np.rint(value)))
     else:
-        _store_u8(address, np.uint64(np.rint(value)))
+        store_u8(address, np.uint64(np.rint(value)))
 
 
 @inlined
@@ -208,9 +143,9 @@ def exchange_values(instance, version, ports):  # type: ignore[no-untyped-def]
         function, references, count = load_i8(call), load_i8(call + 8), load_i8(call + 16)
         values = load_i8(call + 24)
         if version == 3:
-            status = _values_3(function, instance, references, count, values, load_i8(call + 32))
+            status = values_3(function, instance, references, count, values, load_i8(call + 32))
         else:
-            status = _values_2(function, instance, references, count, values)
+            status = values_2(function, instance, references, count, values)
         worst = max(worst, status)
         if status > 1:
             return worst
@@ -239,6 +174,12 @@ def write_row(instance, version, ports, numbers):  # type: ignore[no-untyped-def
 def rounding(time):  # type: ignore[no-untyped-def]
     """Return the difference in s below which two times are considered equal."""
     return 1e-11 * max(1.0, abs(time))
+
+
+@inlined
+def spacing(number):  # type: ignore[no-untyped-def]
+    """Return the distance from a number that is not negative to the next larger one, as numpy's function."""
+    return next_number(number) - number
 
 
 @inlined
@@ -280,9 +221,9 @@ def settle_3(functions, scratch):  # type: ignore[no-untyped-def]
 
     Returns the status and where it stopped.
     """
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MOST_ROUNDS):
         # Outputs: again, terminate, nominals changed, states changed, next event defined; next event time.
-        status = _update_3(
+        status = update_3(
             functions[UPDATE_DISCRETE_STATES], functions[INSTANCE],
             scratch, scratch + 1, scratch + 2, scratch + 3, scratch + 4, scratch + 8,
         )  # fmt: skip
@@ -321,7 +262,7 @@ def advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
     time, rounds = start, 0
     while True:
         store_f8(scratch + 8, end)
-        status = _do_step_3(
+        status = do_step_3(
             functions[DO_STEP], functions[INSTANCE], time, end - time, np.uint8(1),
             scratch, scratch + 1, scratch + 2, scratch + 8,
         )  # fmt: skip
@@ -339,7 +280,7 @@ def advance_3(functions, start, end, scratch):  # type: ignore[no-untyped-def]
         if ends or end - time <= 1e-12 * max(1.0, abs(end)):
             return status, DONE if end - time <= 1e-9 * max(1.0, abs(end)) else TERMINATED, ends
         rounds = 0 if time > before else rounds + 1
-        if rounds > _MAX_ROUNDS:
+        if rounds > MOST_ROUNDS:
             return 0, STUCK, ends
 
 
@@ -373,8 +314,7 @@ def co_simulate(  # type: ignore[no-untyped-def]
         report: receives FMI status, where it stopped, and number of completed steps, int64[3].
     """
     instance, version = functions[INSTANCE], functions[FMI_VERSION]
-    memory = np.zeros(16, dtype=np.uint8)
-    scratch = memory.ctypes.data
+    scratch = stack_memory()
     status, where, k, step = 0, DONE, first, stop_time / steps
     while k < last and where == DONE:
         start = k * step
@@ -403,8 +343,6 @@ def co_simulate(  # type: ignore[no-untyped-def]
         if ends and where == DONE:
             where = TERMINATED
     report[STATUS], report[WHERE], report[STEP] = status, where, k
-    # A use after the last call: otherwise numba may free the memory while the FMU writes to its address.
-    memory[0] = 0
 
 
 @inlined
@@ -429,10 +367,8 @@ def _set_inputs(  # type: ignore[no-untyped-def]
 @compiled
 def enter_step_mode(functions):  # type: ignore[no-untyped-def]
     """Leave the event mode in which FMI 3 initialisation ends; return status and where it stopped."""
-    memory = np.zeros(16, dtype=np.uint8)
-    status, where = settle_3(functions, memory.ctypes.data)
+    status, where = settle_3(functions, stack_memory())
     if where == DONE:
         status = call_mode(functions[ENTER_STEP_MODE], functions[INSTANCE])
         where = EVENT if status > 1 else DONE
-    memory[0] = 0
     return status, where

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.fmu import coupled_solver as solver
-from falsifier.fmu import equation, stepping
-from falsifier.fmu.continuous import NEXT_EVENT, Memory, make_memory
+from falsifier.fmu import equation, machine_code, solver_row
 from falsifier.fmu.instance import FmuInstance
+from falsifier.fmu.loop_numbers import DONE
 from falsifier.fmu.network import Member
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports
+from falsifier.fmu.solver_memory import NEXT_EVENT, Memory, make_memory
 from falsifier.fmu.stepper import component_failure
 
 
@@ -45,7 +46,7 @@ class SystemSolver:
         self._kept = np.zeros(solver.kept_numbers(states, indicators, inputs))
         self.lines: NDArray[np.float64] = np.zeros((inputs, plan.pieces, 5))
         self.address = solver.address()
-        self.row: NDArray[np.int64] = np.zeros(solver.WIDTH, dtype=np.int64)
+        self.row: NDArray[np.int64] = solver_row.make_row()
 
     def start_again(self, written: Sequence[tuple[NDArray[np.float64], float, float] | None]) -> None:
         """Forget the last simulation.
@@ -85,29 +86,16 @@ class SystemSolver:
         self._model = self._equation.model(
             (plain.table, held.table), (0, 0, 0, 0), ((address, count), (after, count))
         )
-        self._equation.begin(self._model, self._memory, self._part.lifecycle)
-        self._fill()
-
-    def _fill(self) -> None:
-        model, row, numbers = self._model, self.row, self.row.view(np.float64)
-        row[solver.FUNCTIONS : solver.PORTS] = model.functions
-        row[solver.PORTS : solver.HELD_PORTS] = model.ports
-        row[solver.HELD_PORTS : solver.PIECES] = model.held_ports
-        row[solver.PIECES], row[solver.HELD_PIECES] = model.pieces[0], model.held_pieces[0]
-        row[solver.COUNT] = self._plan.pieces
-        row[solver.STATES], row[solver.INDICATORS] = self._equation.states, self._equation.indicators
-        row[solver.WEIGHTS] = model.weights.ctypes.data
-        row[solver.MEMORY : solver.KEPT] = [values.ctypes.data for values in self._memory]
-        row[solver.KEPT] = self._kept.ctypes.data
-        numbers[solver.TOLERANCE], numbers[solver.STOP_TIME] = model.tolerance, model.stop_time
-        numbers[solver.MAX_STEP] = model.max_step
+        solver_row.fill(self.row, self._model, self._memory)
+        self.row[solver_row.KEPT] = self._kept.ctypes.data
+        self._equation.begin(self.row, self._memory, self._part.lifecycle)
 
     def _check(self, status: int, where: int, reached: float) -> None:
-        if where != stepping.DONE:
+        if where != DONE:
             raise component_failure(self._member.name, status, where, reached, self._plan.stop_time)
 
 
 def warm_up() -> None:
     """Compile the solver, or load it from the cache; needs no FMU."""
-    equation.warm_up()
+    machine_code.load("model_exchange")
     solver.address()

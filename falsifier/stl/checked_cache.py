@@ -1,7 +1,10 @@
 """Numba's cache files, checked: machine code that is damaged or older than its sources is compiled again."""
 
 import pickle
+import re
+import sys
 from contextlib import suppress
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -52,6 +55,7 @@ class _QuickCache(FunctionCache):  # type: ignore[misc]
         return super().load_overload(sig, target_context) if found is None else found
 
 
+_IMPORTS = re.compile(r"^from ([\w.]+) import", re.MULTILINE)
 # Sources of the compiled functions of each module, with those of the compiled functions that it imports.
 _SOURCES: dict[str, frozenset[str]] = {}
 
@@ -72,11 +76,26 @@ def check_cache(function: Any) -> None:
 
 
 def _sources(function: Any) -> frozenset[str]:
-    """Return the files of a function's module and of the modules with compiled functions that it imports."""
+    """Return the files of a function's module and of what it imports: compiled functions, and constants.
+
+    Constants are those of modules of the same package.
+    """
     used = {getattr(value, "__module__", None) for value in function.__globals__.values()}
     imported = (_SOURCES[module] for module in used - {function.__module__} if module in _SOURCES)
-    _SOURCES[function.__module__] = frozenset({function.__code__.co_filename}).union(*imported)
+    file = function.__code__.co_filename
+    constants = _constants(file, function.__module__.partition(".")[0])
+    _SOURCES[function.__module__] = frozenset({file, *constants}).union(*imported)
     return _SOURCES[function.__module__]
+
+
+@cache
+def _constants(file: str, package: str) -> tuple[str, ...]:
+    """Return the files of the modules of a package from which a file imports names."""
+    with suppress(OSError):  # code that was typed in has no file
+        text = Path(file).read_text(encoding="utf-8")
+        modules = (sys.modules.get(name) for name in _IMPORTS.findall(text) if name.startswith(f"{package}."))
+        return tuple(found for m in modules if (found := getattr(m, "__file__", None)))
+    return ()
 
 
 def _stamp(source: Path) -> tuple[str, float, int]:

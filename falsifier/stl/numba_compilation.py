@@ -1,12 +1,9 @@
 """Numba's decorator, with an on-disk cache that works even if the package folder is read-only."""
 
-import os
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
-from falsifier.core import operating_system
+from falsifier.core.files import own_temporary_folder
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -33,20 +30,9 @@ def compiled(function: _Function, *, forceinline: bool = False, fastmath: bool =
     try:
         result: _Function = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # numba found no writable cache folder
-        folder = _own_temporary_folder()
+        folder = own_temporary_folder("falsifier-numba")
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)
         result = numba.njit(cache=folder is not None, **options)(function)
     check_cache(result)
     return result
-
-
-def _own_temporary_folder() -> Path | None:
-    """Return a temporary folder that no other user can write to, because machine code is loaded from it."""
-    folder = Path(tempfile.gettempdir()) / f"falsifier-numba-{operating_system.user()}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        is_private = operating_system.is_private(folder)
-    except OSError:
-        return None
-    return folder if is_private and os.access(folder, os.W_OK) else None

@@ -1,10 +1,11 @@
 import os
+import tempfile
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from falsifier.core.files import bundled, write_whole
+from falsifier.core.files import bundled, own_temporary_folder, write_whole
 
 
 def test_text_and_bytes_are_written_into_folders_that_are_made(tmp_path: Path) -> None:
@@ -46,3 +47,14 @@ def test_what_lies_inside_the_package_goes_before_what_lies_beside_it(
     assert bundled("specs") == package.parent / "specs"
     (package / "specs").mkdir()
     assert bundled("specs") == package / "specs"
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
+def test_a_temporary_folder_that_others_can_write_to_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    own = own_temporary_folder("falsifier-test")
+    assert own is not None and own.stat().st_mode & 0o777 == 0o700
+    own.chmod(0o777)
+    assert own_temporary_folder("falsifier-test") is None

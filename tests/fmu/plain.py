@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from falsifier.fmu.ports import STORAGE, Addresses, Table
+from falsifier.fmu.ports import STORAGE, Addresses
 
 DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
 STATUS, WHERE, STEP = range(3)
@@ -103,8 +103,8 @@ def enter_step_mode(functions: Functions) -> tuple[int, int]:
 def co_simulate(
     functions: Functions, ports: Addresses, pieces: Pieces, held_ports: Addresses, held_pieces: Pieces,
     current: int, values: int, getters: Addresses, outputs: int, width: int,
-    stop_time: float, steps: int, first: int, last: int, every: int, report: Table,
-) -> None:  # fmt: skip
+    stop_time: float, steps: int, first: int, last: int, every: int,
+) -> tuple[int, int, int]:  # fmt: skip
     """Do the communication steps first..last-1; see stepping.co_simulate."""
     del current
     instance, version = functions[INSTANCE], functions[FMI_VERSION]
@@ -133,7 +133,7 @@ def co_simulate(
             where = GETTING if status > 1 else DONE
         if ends and where == DONE:
             where = TERMINATED
-    report[:] = status, where, k
+    return status, where, k
 
 
 def _put_inputs(ports: Addresses, pieces: Pieces, time: float) -> list[float]:

@@ -1,11 +1,11 @@
 """Pieces of inputs and the rows of a run, without an FMU."""
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from falsifier.core.signals import Signal
-from falsifier.fmu.continuous import TIME, Memory, Model, copy, enter_pieces, make_memory, next_break
+from falsifier.fmu.continuous import copy, enter_pieces, next_break
+from falsifier.fmu.solver_memory import TIME, Memory, Model, make_memory
 
 NOTHING = (0, 0, 0, 0)
 STOP = 10.0
@@ -78,14 +78,6 @@ def test_inputs_that_change_at_events_only_always_ask_for_one() -> None:
     assert next_break(model, memory) == 4.0
     assert enter_pieces(model, memory), "although it has no height"
     assert memory.piece.tolist() == [1, 2]
-
-
-@pytest.mark.parametrize(("states", "indicators"), [(0, 0), (3, 2)])
-def test_a_run_begins_at_time_zero_without_events(states: int, indicators: int) -> None:
-    memory = make_memory(states, indicators, 1)
-    assert memory.clock.tolist() == [0.0, 0.0, np.inf]
-    assert not memory.counts.any()
-    assert (memory.x.shape, memory.stages.shape, memory.z.shape) == ((states,), (7, states), (indicators,))
 
 
 def test_vectors_are_copied() -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.fmu import forking
+from falsifier.fmu import forking, starting
 from falsifier.fmu.nursery import REAP
 
 # A nursery that says something, and then the exit code of the worker that it is asked for.
@@ -20,7 +20,7 @@ send_reply(sock, Reply(text="7"))
 def test_what_the_nursery_says_is_logged_and_is_not_the_answer(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(forking, "_BOOT", TALKING)
+    monkeypatch.setattr(starting, "_BOOT", TALKING)
     nursery = forking.Nursery()
     assert nursery.end(1 << 30) == 7
     nursery.close()

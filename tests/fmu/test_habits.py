@@ -194,7 +194,7 @@ def test_of_several_libraries_none_is_guessed(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("binaries/linux64/helper.so", b"not a library")
     assert read_info(path).notes == ()
-    with pytest.raises(ModelError, match=r"contains helper\.so, plant_win_and_linux\.so instead"):
+    with pytest.raises(ModelError, match=r"contains helper\.so, plant_win_and_linux\.so, but not Other"):
         run(FmuModel(path), ("y",))
 
 

@@ -150,6 +150,13 @@ def test_a_windows_binary_that_runs_through_wine_is_not_called_missing(tmp_path:
     )
 
 
+def test_of_several_libraries_with_other_names_none_is_guessed(tmp_path: Path) -> None:
+    (said,) = binary_remarks(fmu(tmp_path, a__so=library(), b__so=library()))
+    assert said.startswith(
+        "binaries/linux64 contains a.so, b.so, but not M.so, and the model identifier tells"
+    )
+
+
 def test_a_damaged_binary_is_an_error(tmp_path: Path) -> None:
     copy = tmp_path / "copy.fmu"
     shutil.copy(path("Lag_2"), copy)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from falsifier.errors import SimulationError
-from falsifier.fmu import solver
+from falsifier.fmu import loops
 from tests.fmu.fixtures import ME, local, run
 
 BALLS = ["Ball_1me", "Ball_2", "Ball_3"]
@@ -35,13 +35,13 @@ def test_state_events_are_located(name: str) -> None:
 
 def test_stiff_models_are_solved_by_implicit_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """x' = -1e6 (x - cos t) - sin t: an explicit method would need three million steps."""
-    advance, steps = solver.advance, []
+    advance, steps = loops.advance, []
 
-    def counted(m: Any, s: Any, outputs: Any, most: int) -> Any:
+    def counted(row: Any, most: int) -> Any:
         steps.append(most)
-        return advance(m, s, outputs, most)
+        return advance(row, most)
 
-    monkeypatch.setattr(solver, "advance", counted)
+    monkeypatch.setattr(loops, "advance", counted)
     got = run(local("Stiff_2", ME), ("x",), stop=10.0, interval=0.05)
     assert sum(steps) <= 10_000
     np.testing.assert_allclose(got["x"], np.cos(got.times), atol=1e-7)

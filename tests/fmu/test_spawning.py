@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import FmuModel, spawning
+from falsifier.fmu import FmuModel, starting
 from falsifier.fmu.isolation import REGISTRY
 from falsifier.fmu.simulator import _order
 from falsifier.fmu.spawning import Spawner
@@ -34,7 +34,7 @@ def order() -> Order:
 @pytest.fixture
 def spawner(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Iterator[Spawner]:
     answer = getattr(request, "param", "send_reply(sock, Reply())")
-    monkeypatch.setattr(spawning, "_BOOT", QUICK.replace("ANSWER", answer))
+    monkeypatch.setattr(starting, "_BOOT", QUICK.replace("ANSWER", answer))
     found = Spawner()
     yield found
     found.close()

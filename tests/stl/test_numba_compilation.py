@@ -1,12 +1,7 @@
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
-
-import pytest
-
-from falsifier.stl import numba_compilation
 
 CODE = """
 import numba.core.caching as caching
@@ -33,14 +28,3 @@ def test_the_cache_goes_to_a_temporary_folder_where_no_other_can_be_written(tmp_
     )
     assert done.stdout.strip() == "3.0", done.stderr
     assert list(tmp_path.glob("falsifier-numba-*/**/*.nbi"))
-
-
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
-def test_a_temporary_folder_that_others_can_write_to_is_not_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    own = numba_compilation._own_temporary_folder()
-    assert own is not None and own.stat().st_mode & 0o777 == 0o700
-    own.chmod(0o777)
-    assert numba_compilation._own_temporary_folder() is None

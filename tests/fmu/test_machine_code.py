@@ -1,0 +1,110 @@
+"""Machine code in files: found again, compiled again if damaged, and loaded without numba."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import ModelError
+from falsifier.fmu import compiling, machine_code
+from falsifier.fmu.machine_code import SOURCES, Code, keep, kept
+from tests.command import ROOT
+
+CODE = Code("symbol", ("sqrt",), b"\0machine\ncode")
+NAME = "co_simulation"
+# Only its types are used.
+_NOT_COMPILED = {"ports"}
+
+LOADING = """
+import sys
+from falsifier.fmu import machine_code
+from falsifier.fmu.stepper import warm_up
+warm_up()
+machine_code.load("model_exchange")
+print("numba" in sys.modules)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_what_was_kept_is_found_and_replaces_what_is_outdated(folder: Path) -> None:
+    assert kept(NAME) is None
+    keep(NAME, CODE)
+    assert kept(NAME) == CODE
+    assert kept("model_exchange") is None
+    (file,) = folder.iterdir()
+    start, _, sources = file.name.rpartition("-")
+    outdated, elsewhere = folder / f"{start}-{sources[::-1]}", folder / file.name.replace("-", "-other")
+    outdated.touch()
+    elsewhere.touch()
+    keep(NAME, CODE)
+    assert set(folder.iterdir()) == {file, elsewhere}, "that of another machine stays"
+
+
+@pytest.mark.parametrize("damage", [b"", b"short", b"x" * 100])
+def test_damaged_machine_code_is_as_if_it_were_not_there(folder: Path, damage: bytes) -> None:
+    keep(NAME, CODE)
+    (file,) = folder.iterdir()
+    file.write_bytes(damage)
+    assert kept(NAME) is None
+
+
+def test_one_changed_byte_is_noticed(folder: Path) -> None:
+    keep(NAME, CODE)
+    (file,) = folder.iterdir()
+    content = bytearray(file.read_bytes())
+    content[-1] ^= 1
+    file.write_bytes(content)
+    assert kept(NAME) is None
+
+
+def test_a_folder_that_takes_nothing_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    folders = [tmp_path / "file", tmp_path / "second", tmp_path / "third"]
+    monkeypatch.setattr(machine_code, "_folders", lambda: iter(folders))
+    keep(NAME, CODE)
+    assert kept(NAME) == CODE
+    assert not folders[2].exists()
+
+
+def test_a_file_belongs_to_its_sources(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = machine_code._sources(NAME)
+    assert machine_code._sources(NAME) == before != machine_code._sources("model_exchange")
+    monkeypatch.setattr(machine_code, "_numba_version", lambda: b"another")
+    assert machine_code._sources(NAME) != before
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_the_sources_of_an_entry_are_complete(name: str) -> None:
+    package = Path(machine_code.__file__).parent
+    for module in SOURCES[name]:
+        tree = ast.parse((package / f"{module}.py").read_text(encoding="utf-8"))
+        imported = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        near = {m.rpartition(".")[2] for m in imported if m.startswith("falsifier.fmu.")}
+        assert near <= {*SOURCES[name], *_NOT_COMPILED}, module
+
+
+def test_functions_that_are_not_there_are_named() -> None:
+    with pytest.raises(ModelError, match="need no_such_function, which this system lacks"):
+        machine_code._resolve(("sqrt", "no_such_function"))
+
+
+def test_a_compiled_function_can_be_called_from_its_object_file() -> None:
+    machine, tell = machine_code._machine(), lambda: None
+    compiled = compiling.compiled_object(lambda what, number: 2 * what + number, machine, tell)
+    assert machine_code._callable(Code(*compiled))(20, 2) == 42
+
+
+def test_workers_need_no_compiler() -> None:
+    for name in SOURCES:
+        machine_code.load(name)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", LOADING], env=environment, capture_output=True, text=True)
+    assert done.stdout == "False\n", done.stderr
