@@ -30,6 +30,8 @@ from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.problem import Problem
 
+# Folder of an export in which each component has one.
+FOLDER = "components"
 # Names that formulas can use as they are.
 _PLAIN_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 # Share by which the outputs may leave the range that they had in the system.
@@ -55,21 +57,26 @@ class Seen:
     step: float
 
 
+def copy_of(member: Member) -> Path:
+    """Return the path of the copy of a component's FMU in an export."""
+    return Path(FOLDER, file_name(member.name), member.path.name)
+
+
 def write_components(problem: Problem, candidate: Candidate, directory: Path) -> list[Path]:
     """Write a folder per component of a problem's system; return the files.
 
     Args:
         problem: a problem whose model is a system.
         candidate: the inputs to simulate.
-        directory: where to write the folders.
+        directory: folder of the export, in which the folder ``components`` is written.
     """
     assert isinstance(problem.model, System), "only systems have components"
     files = []
     for member, seen in zip(problem.model.network.members, all_seen(problem, candidate), strict=True):
-        folder = directory / file_name(member.name)
+        fmu = directory / copy_of(member)
+        folder = fmu.parent
         folder.mkdir(parents=True, exist_ok=True)
         model = FmuModel(member.path, member.interface)
-        fmu = folder / member.path.name
         shutil.copyfile(member.path, fmu)
         files += [fmu, write_json(seen.start, folder / "start_values.json", model)]
         if seen.inputs.columns:
