@@ -12,7 +12,7 @@ from falsifier.core import operating_system, posix
 from falsifier.core.memory import check_memory_limits
 from falsifier.errors import ModelError
 from falsifier.fmu import folders, nursery, sharing
-from falsifier.fmu.channel import Closed, open_channel, receive_reply, send_request
+from falsifier.fmu.channel import Closed, Reply, open_channel, receive_reply, send_request
 from falsifier.fmu.environment import protect_secrets, worker_environment
 from falsifier.fmu.output import Output
 from falsifier.fmu.sharing import Shared
@@ -90,14 +90,11 @@ class Nursery:
         with self._lock:
             try:
                 if not self._ready:
-                    receive_reply(self._sock, STARTING_SECONDS)
+                    self._receive()
                     self._process.settle()
                     self._ready = True
                 send_request(self._sock, kind, payload, descriptors)
-                reply = receive_reply(self._sock, STARTING_SECONDS)
-                while reply.more:
-                    _LOG.warning(reply.text)
-                    reply = receive_reply(self._sock, STARTING_SECONDS)
+                reply = self._receive()
             except (Closed, TimeoutError) as error:
                 raise ModelError(
                     "the process that starts the FMU workers has ended or hangs; see the messages above"
@@ -105,3 +102,11 @@ class Nursery:
         if reply.status != "ok":
             raise ModelError(reply.text)
         return reply.text
+
+    def _receive(self) -> Reply:
+        """Wait for the reply to a request; what is said before is told to the user."""
+        reply = receive_reply(self._sock, STARTING_SECONDS)
+        while reply.more:
+            _LOG.warning(reply.text)
+            reply = receive_reply(self._sock, STARTING_SECONDS)
+        return reply

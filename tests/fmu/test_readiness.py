@@ -1,12 +1,29 @@
 import sys
+from collections.abc import Callable
 
+import numba
 import pytest
 
-from falsifier.fmu import FmuModel, master, model_exchange
+from falsifier.fmu import FmuModel, master, model_exchange, readiness
 from falsifier.fmu.readiness import Loops
 from falsifier.fmu.simulator import _order
 from tests.core.children import in_child
 from tests.fmu.fixtures import ME, path
+
+
+def test_the_user_hears_of_a_compilation_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard: list[str] = []
+    compiled: Callable[[float], float] = numba.njit(lambda x: 2.0 * x)
+
+    def warm_up() -> None:
+        heard.append(f"twice 2 is {compiled(2.0):g}")
+
+    monkeypatch.setattr(readiness, "warm_up", warm_up)
+    monkeypatch.setattr(model_exchange, "warm_up", warm_up)
+    readiness.load_first(heard.append)
+    assert heard == ["compiling the loops that step FMUs, once per installation", "twice 2 is 4"]
+    Loops().load(_order(FmuModel(path("Lag_2"), ME)), heard.append)
+    assert heard[2:] == ["twice 2 is 4"]  # nothing is compiled, and nothing is said
 
 
 def test_loops_are_loaded_once_and_only_if_needed(monkeypatch: pytest.MonkeyPatch) -> None:
