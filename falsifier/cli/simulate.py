@@ -114,14 +114,14 @@ def _read(file: Path | None, problem: Problem) -> dict[str, Signal]:
 def _loaded(source: ProblemSource, file: Path | None, given: Mapping[str, float]) -> Problem:
     """Load the problem; the inputs themselves give the ranges that an FMU without a spec needs."""
     if source.parts.kind != "fmu" or source.stl is None or not Path(source.parts.file).is_file():
-        return load_source(source)
+        return load_source(source, searches=False)
     given_file = Path(source.parts.file)
     info = read_package(given_file).info if is_package(given_file) else read_info(given_file)
     signals = dict(read_inputs(file, info).signals) if file else {}
     signals |= {v.name: _constant(given[v.name]) for v in info.inputs if v.name in given}
     own = {name: InputSection(range=_range(info[name], signal)) for name, signal in signals.items()}
     changes = source.changes.model_copy(update={"inputs": own | source.changes.inputs})
-    return load_source(source.model_copy(update={"changes": changes}))
+    return load_source(source.model_copy(update={"changes": changes}), searches=False)
 
 
 def _range(variable: Variable, signal: Signal) -> tuple[float, float]:

@@ -1,53 +1,37 @@
-"""Compiles with numba, and says so if that takes long; later processes load the result from the cache."""
+"""Compiles with numba, and notices that; later processes load the result from the cache."""
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-_LONG_SECONDS = 1.0
-
 
 @contextmanager
-def on_long_compilation(tell: Callable[[], None], after: float = _LONG_SECONDS) -> Iterator[None]:
-    """Call ``tell`` once if numba is still compiling ``after`` seconds after its first compilation started.
-
-    Loading from numba's cache is not a compilation. Functions are compiled nested and in sequence; the clock
-    is checked at the start and the end of each.
-    """
+def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
+    """Call ``tell`` once, when numba starts to compile the first function that is not in its cache."""
     from numba.core import event
 
-    started: float | None = None
     told = False
-
-    def check_clock() -> None:
-        nonlocal started, told
-        now = time.perf_counter()
-        started = now if started is None else started
-        if not told and now - started > after:
-            told = True
-            tell()
 
     class Watcher(event.Listener):  # type: ignore[misc]
         def on_start(self, _event: object) -> None:
-            check_clock()
+            nonlocal told
+            if not told:
+                told = True
+                tell()
 
         def on_end(self, _event: object) -> None:
-            check_clock()
+            pass
 
     with event.install_listener("numba:compile", Watcher()):
         yield
 
 
-def compiled_object(
-    function: Callable[[int, int], int], machine: Any, tell: Callable[[], None]
-) -> tuple[str, tuple[str, ...], bytes]:
+def compiled_object(function: Callable[[int, int], int], machine: Any) -> tuple[str, tuple[str, ...], bytes]:
     """Compile a function of two integers to an object file.
 
     Args:
         function: what to compile.
         machine: LLVM's description of the machine.
-        tell: called if it takes long.
 
     Returns:
         The name of its machine code, the names of the functions that it calls, and the object file.
@@ -58,8 +42,7 @@ def compiled_object(
     signature = (numba.types.intp, numba.types.intp)
     options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
-    with on_long_compilation(tell):
-        compiled.compile(signature)
+    compiled.compile(signature)
     module = binding.parse_assembly(compiled.inspect_llvm(signature))
     needed = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
     symbol = compiled.overloads[signature].fndesc.llvm_func_name

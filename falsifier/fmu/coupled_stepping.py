@@ -340,8 +340,13 @@ def record(components, number, copies, copied, column, report):  # type: ignore[
 
 
 @compiled
-def start_round(components, number, count, running, report):  # type: ignore[no-untyped-def]
-    """In initialisation: give each component its inputs at time 0 and read its outputs, in their order."""
+def start_round(components, number, count, tolerance, running, report):  # type: ignore[no-untyped-def]
+    """In initialisation: give each component its inputs at time 0 and read its outputs, in their order.
+
+    Returns whether any connected output has changed since the round before. The report gets the first
+    component with an output that is NaN, -1 if there is none.
+    """
+    moves, missing = False, -1
     for c in range(number):
         store_f8(running, float(c))
         component = components + c * _COMPONENT_BYTES
@@ -352,13 +357,17 @@ def start_round(components, number, count, running, report):  # type: ignore[no-
             status = exchange_values(instance, version, _table(component, HELD))
         if status > 1:
             report[STATUS], report[WHERE], report[COMPONENT] = status, SETTING, c
-            return
+            return True
         store_i8(component + 8 * CHANGED, 0)
-        status = read_signals(component, 0.0)
-        if status > 1:
+        status, where = _read(component, 0.0)
+        if where == GETTING:
             report[STATUS], report[WHERE], report[COMPONENT] = status, GETTING, c
-            return
-    report[WHERE] = DONE
+            return True
+        moves = moves or _moves(component, tolerance)
+        if where == NOT_A_NUMBER and missing < 0:
+            missing = c
+    report[WHERE], report[COMPONENT] = DONE, missing
+    return moves
 
 
 @compiled

@@ -8,7 +8,7 @@ import threading
 from falsifier.core import posix
 from falsifier.errors import ModelError
 from falsifier.fmu import nursery, sharing
-from falsifier.fmu.channel import Closed, open_channel, receive_reply, send_request
+from falsifier.fmu.channel import Closed, Reply, open_channel, receive_reply, send_request
 from falsifier.fmu.output import Output
 from falsifier.fmu.sharing import Shared
 from falsifier.fmu.starting import STARTING_SECONDS, Started, open_folder, start_program
@@ -77,14 +77,11 @@ class Nursery:
         with self._lock:
             try:
                 if not self._ready:
-                    receive_reply(self._sock, STARTING_SECONDS)
+                    self._receive()
                     self._process.settle()
                     self._ready = True
                 send_request(self._sock, kind, payload, descriptors)
-                reply = receive_reply(self._sock, STARTING_SECONDS)
-                while reply.more:
-                    _LOG.warning(reply.text)
-                    reply = receive_reply(self._sock, STARTING_SECONDS)
+                reply = self._receive()
             except (Closed, TimeoutError) as error:
                 raise ModelError(
                     "the process that starts the FMU workers has ended or hangs; see the messages above"
@@ -92,3 +89,11 @@ class Nursery:
         if reply.status != "ok":
             raise ModelError(reply.text)
         return reply.text
+
+    def _receive(self) -> Reply:
+        """Wait for the reply to a request; what is said before is told to the user."""
+        reply = receive_reply(self._sock, STARTING_SECONDS)
+        while reply.more:
+            _LOG.warning(reply.text)
+            reply = receive_reply(self._sock, STARTING_SECONDS)
+        return reply

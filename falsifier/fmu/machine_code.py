@@ -89,12 +89,13 @@ def model_exchange() -> Entry:
 
 
 def load(name: str, tell: Callable[[], None] = lambda: None) -> None:
-    """Load one entry; call ``tell`` if it must be compiled first and that takes long."""
+    """Load one entry; call ``tell`` before it is compiled, if it must be."""
     with _LOCK:
         if name not in _LOADED:
             code = kept(name)
             if code is None:
-                code = compile_entry(name, tell)
+                tell()
+                code = compile_entry(name)
                 keep(name, code)
             _LOADED[name] = _callable(code)
 
@@ -139,12 +140,12 @@ def keep(name: str, code: Code) -> None:
             return
 
 
-def compile_entry(name: str, tell: Callable[[], None]) -> Code:
-    """Compile an entry; call ``tell`` if that takes long."""
+def compile_entry(name: str) -> Code:
+    """Compile an entry."""
     from falsifier.fmu import entries
     from falsifier.fmu.compiling import compiled_object
 
-    return Code(*compiled_object(getattr(entries, name), _machine(), tell))
+    return Code(*compiled_object(getattr(entries, name), _machine()))
 
 
 def _callable(code: Code) -> Entry:

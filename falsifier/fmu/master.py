@@ -75,17 +75,26 @@ class Master:
 
     def _find_first_values(self) -> None:
         """Repeat rounds through all components until the connected outputs at time 0 no longer change."""
-        coupling, values = self._network.coupling, self._tables.signals[:, loops.VALUE]
-        before = np.full_like(values, np.inf)
-        for _ in range(coupling.max_rounds):
-            loops.start_round(*self._rows, self._plan.pieces, self._running, self._report)
+        coupling, tables, origin = self._network.coupling, self._tables, -1
+        for turn in range(coupling.max_rounds):
+            moves = loops.start_round(
+                *self._rows, self._plan.pieces, coupling.tolerance, self._running, self._report
+            )
             self._check(0.0)
-            with np.errstate(invalid="ignore"):  # an FMU may return infinite values
-                change = np.abs(values - before)
-            moving = ~(change <= coupling.tolerance * np.maximum(1.0, np.abs(values)))
-            if not moving.any():
+            # The first round compares with what the simulation before has left.
+            if not moves and (turn or not len(tables.signals)):
                 return
-            before = values.copy()
+            # In the first round with a NaN, the first component that has one did not receive it. It may go
+            # again: at first, not all inputs are known.
+            missing = int(self._report[loops.COMPONENT])
+            origin = missing if origin < 0 or missing < 0 else origin
+        if origin >= 0:
+            origin = origin if self._not_numbers(origin) else missing
+            name, outputs = self._network.stepped(origin), self._not_numbers(origin)
+            raise SimulationError(f"{name}: {outputs} is nan at t = 0 s, in the initialisation", time=0.0)
+        value = tables.signals[:, loops.VALUE]
+        change = np.abs(value - tables.signals[:, loops.TRIED])
+        moving = ~(change <= coupling.tolerance * np.maximum(1.0, np.abs(value)))
         raise SimulationError(self._not_converged(np.flatnonzero(moving).tolist(), change.tolist()), time=0.0)
 
     def _not_converged(self, moving: Sequence[int], change: Sequence[float]) -> str:
@@ -244,7 +253,7 @@ class _Starter:
 def warm_up() -> None:
     """Load what every simulation of a system needs, so that processes forked from this one need not."""
     report = np.zeros(4, dtype=np.int64)
-    loops.start_round(0, 0, 1, 0, report)
+    loops.start_round(0, 0, 1, 1e-9, 0, report)
     loops.record(0, 0, 0, 0, 0, report)
     row = np.zeros(loops.COMPONENT_WIDTH, dtype=np.int64)
     loops.read_signals(row.ctypes.data, 0.0)

@@ -6,12 +6,14 @@ from pathlib import Path
 
 from falsifier.core import operating_system
 from falsifier.fmu import machine_code
+from falsifier.fmu.library import load_binding
 from falsifier.fmu.worker_order import Order
 
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
+_COMPILING_STEPS = "compiling the loops that step FMUs, once per installation"
 _COMPILING_MASTER = "compiling the loop that steps systems of FMUs, once per installation"
-_COMPILING = "compiling the model-exchange solver, once per installation; this takes about half a minute"
+_COMPILING = "compiling the model-exchange solver, once per installation; this takes half a minute or more"
 
 
 class Loops:
@@ -21,7 +23,7 @@ class Loops:
         self._loaded: set[str] = set()
 
     def load(self, order: Order, tell: Callable[[str], None]) -> None:
-        """Load what an order needs, outside any time limit; ``tell`` hears of long compilations."""
+        """Load what an order needs, outside any time limit; ``tell`` hears before anything is compiled."""
         if order.through_wine:  # its worker has loops of its own
             return
         members = () if order.network is None else order.network.members
@@ -37,12 +39,18 @@ class Loops:
             self._once("system solver", system_solver.warm_up, lambda: tell(_COMPILING))
 
     def _once(self, name: str, warm_up: Callable[[], None], tell: Callable[[], None]) -> None:
-        from falsifier.fmu.compiling import on_long_compilation
-
         if name not in self._loaded:
-            with on_long_compilation(tell):
+            from falsifier.fmu.compiling import on_compilation
+
+            with on_compilation(tell):
                 warm_up()
             self._loaded.add(name)
+
+
+def load_first(tell: Callable[[str], None]) -> None:
+    """Load what every simulation needs; ``tell`` hears of a compilation before it starts."""
+    load_binding()
+    machine_code.load("co_simulation", lambda: tell(_COMPILING_STEPS))
 
 
 def settle_in(scratch: Path) -> None:

@@ -160,6 +160,7 @@ def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
     return REGISTRY.fmu(order) if model.isolate else in_process.fmu(order)
 
 
+@lru_cache(maxsize=64)
 def _order(model: FmuModel) -> Order:
     description = describe(model.path, model.sha256)
     return Order(

@@ -18,8 +18,7 @@ from falsifier.errors import FalsifierError
 from falsifier.fmu import worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
 from falsifier.fmu.folders import REMOVING, remove_work_folder
-from falsifier.fmu.readiness import Loops, settle_in
-from falsifier.fmu.stepper import warm_up
+from falsifier.fmu.readiness import Loops, load_first, settle_in
 from falsifier.fmu.worker_order import Order
 
 START = 1
@@ -34,7 +33,7 @@ def main(root: Path) -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     code = 1
     try:
-        warm_up()
+        load_first(lambda text: send_reply(sock, Reply(text=text, more=True)))
         send_reply(sock, Reply())
         _, payload, _ = receive_request(sock)
         order, folder, scratch = pickle.loads(payload)

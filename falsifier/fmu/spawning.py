@@ -127,9 +127,6 @@ class _Program:
             self._child.settle()
             send_request(self.sock, spawned.START, pickle.dumps((order, folder, self._scratch)))
             reply = self._receive()
-            while reply.more:
-                _LOG.warning(reply.text)
-                reply = self._receive()
         except (Closed, TimeoutError) as error:
             how = "hangs" if isinstance(error, TimeoutError) else "has ended"
             log = self.output.take()
@@ -156,4 +153,9 @@ class _Program:
         self._child.forget()
 
     def _receive(self) -> Reply:
-        return receive_reply(self.sock, STARTING_SECONDS, self._life)
+        """Wait for the reply to a request; what is said before is told to the user."""
+        reply = receive_reply(self.sock, STARTING_SECONDS, self._life)
+        while reply.more:
+            _LOG.warning(reply.text)
+            reply = receive_reply(self.sock, STARTING_SECONDS, self._life)
+        return reply

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import SimulationError
 from falsifier.fmu import loops as compiled_loops
-from falsifier.fmu import machine_code
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
-from falsifier.fmu.library import Library, load_binding, status_name
+from falsifier.fmu.library import Library, status_name
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, fixed_elements, make_ports
 from falsifier.fmu.strings import set_strings
@@ -199,9 +198,3 @@ def write_fixed(ports: Ports, values: NDArray[np.float64]) -> None:
 def loops() -> Any:
     """Return the module of the compiled loops."""
     return compiled_loops
-
-
-def warm_up() -> None:
-    """Load what every simulation needs, so that processes forked from this one need not."""
-    load_binding()
-    machine_code.load("co_simulation")

@@ -46,6 +46,7 @@ def join(
     stl_name: str = STL_NAME,
     changes: ModelChanges | None = None,
     model: Model | None = None,
+    searches: bool = True,
 ) -> Joined:
     """Join a validated spec with its FMU or system.
 
@@ -58,6 +59,7 @@ def join(
         stl_name: name of the requirement that this formula makes.
         changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
         model: the model; None: the one that the spec names.
+        searches: whether to refuse a spec in which everything is fixed.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -80,6 +82,8 @@ def join(
     formulas = spec_formulas(spec, experiment.stop_time) if stl is None else [stl]
     inputs |= _with_points(inputs, changes, formulas, experiment)
     space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    if searches:
+        _check_searched(space, inputs, model.info, file)
     check_sizes(experiment, space, file)
     strings = _strings(parameters, model.info, path.parent)
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
@@ -106,13 +110,19 @@ def join(
 
 
 def join_fmu(
-    fmu: Path, stl: str | Mapping[str, object], *, changes: ModelChanges, name: str = STL_NAME
+    fmu: Path,
+    stl: str | Mapping[str, object],
+    *,
+    changes: ModelChanges,
+    name: str = STL_NAME,
+    searches: bool = True,
 ) -> Joined:
     """Join an FMU and a formula, or the section of a template, without a spec.
 
     The requirement gets the given name.
 
-    If no input or parameter is to be searched, all real inputs with a min and a max are searched.
+    If no input or parameter is to be searched, all real inputs with a min and a max are searched. There must
+    be one, unless the problem is made for other things than a search.
 
     Raises:
         SpecError: naming what is unknown and the option that specifies it.
@@ -123,7 +133,7 @@ def join_fmu(
     if is_package(fmu):
         _refuse_interface(changes, fmu)
         system = replace(read_package(fmu), logging=bool(changes.logging))
-        return join_system(system, stl, path=fmu, changes=changes, name=name)
+        return join_system(system, stl, path=fmu, changes=changes, name=name, searches=searches)
     info = read_info(fmu)
     interface = changes.interface or default_interface(info)
     return _join_formula(
@@ -133,6 +143,7 @@ def join_fmu(
         path=fmu,
         changes=changes,
         name=name,
+        searches=searches,
     )
 
 
@@ -150,6 +161,7 @@ def join_system(
     path: Path,
     changes: ModelChanges,
     name: str = STL_NAME,
+    searches: bool = True,
 ) -> Joined:
     """Join a system and a formula, without a spec; otherwise like ``join_fmu``.
 
@@ -159,13 +171,21 @@ def join_system(
         path: where the system comes from, for error messages.
         changes: overrides for experiment, inputs and parameters.
         name: name of the requirement.
+        searches: whether to refuse a system in which there is nothing to search.
 
     Raises:
         SpecError: naming what is unknown and the option that specifies it.
     """
     components = {each: {"fmu": str(part.fmu)} for each, part in system.parts.items()}
     return _join_formula(
-        {"components": components}, system.info, stl, path=path, changes=changes, name=name, model=system
+        {"components": components},
+        system.info,
+        stl,
+        path=path,
+        changes=changes,
+        name=name,
+        searches=searches,
+        model=system,
     )
 
 
@@ -177,6 +197,7 @@ def _join_formula(
     path: Path,
     changes: ModelChanges,
     name: str,
+    searches: bool,
     model: Model | None = None,
 ) -> Joined:
     stop_time = changes.stop_time or info.stop_time
@@ -192,7 +213,7 @@ def _join_formula(
     }
     spec = parse_spec(data, file=str(path))
     bounded = {} if searched else _bounded_inputs(info)
-    if not searched and not bounded:
+    if searches and not searched and not bounded:
         inputs = [v.name for v in info.inputs]
         why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
@@ -200,7 +221,7 @@ def _join_formula(
             f"{did_you_mean('', inputs)}"
         )
     every = changes.model_copy(update={"inputs": bounded | changes.inputs})
-    joined = join(spec, name, path=path, changes=every, model=model)
+    joined = join(spec, name, path=path, changes=every, model=model, searches=searches)
     unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
     if searched or not unbounded:
         return joined
@@ -371,16 +392,21 @@ def _space(
             ranges.append(parameter_range(variable, parameter.range, file=file, key=f"{key}.range"))
         elif parameter.value is not None:
             fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
-    if not searched and not ranges:
-        if file.endswith(MODEL_FILES):  # there is no spec file
-            raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
-        raise SpecError(
-            "nothing to search; add [inputs.NAME] with range and control_points, "
-            "or [parameters.NAME] with range",
-            file=file,
-            key="inputs",
-        )
     return SearchSpace(tuple(searched), tuple(ranges), experiment.stop_time), fixed
+
+
+def _check_searched(
+    space: SearchSpace, inputs: Mapping[str, InputSection], info: ModelInfo, file: str
+) -> None:
+    if space.names:
+        return
+    if file.endswith(MODEL_FILES):  # there is no spec file
+        raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
+    raise SpecError(
+        "nothing to search; add [inputs.NAME] with range and control_points, or [parameters.NAME] with range",
+        file=file,
+        key="inputs",
+    )
 
 
 def _check_unconnected(name: str, info: ModelInfo, file: str, key: str) -> None:

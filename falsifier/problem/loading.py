@@ -151,8 +151,12 @@ def spec_file(source: ProblemSource) -> Path | None:
     return find_spec(source.target)[0]
 
 
-def load_source(source: ProblemSource) -> Problem:
+def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
     """Load the problem that a source describes.
+
+    Args:
+        source: the source.
+        searches: whether to refuse a problem in which there is nothing to search.
 
     Raises:
         SpecError: naming what is wrong and the remedy.
@@ -172,11 +176,17 @@ def load_source(source: ProblemSource) -> Problem:
         if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
         problem = Problem.from_parts(
-            join_fmu(Path(source.target), source.stl or "", changes=source.changes, name=source.stl_name),
+            join_fmu(
+                Path(source.target),
+                source.stl or "",
+                changes=source.changes,
+                name=source.stl_name,
+                searches=searches,
+            ),
             source,
         )
     else:
-        problem = _of_spec(source)
+        problem = _of_spec(source, searches=searches)
     if kind in ("python", "fmu") and source.context:  # a problem made in Python may name its own
         problem = replace(problem, named_context=named_context(source))
     if source.shortest_piece is not None:
@@ -206,7 +216,7 @@ def reloadable(problem: Problem) -> ProblemSource | None:
     return problem.source
 
 
-def _of_spec(source: ProblemSource) -> Problem:
+def _of_spec(source: ProblemSource, *, searches: bool) -> Problem:
     path, requirement = find_spec(source.target)
     spec = read_spec(path)
     if requirement is None and path.stem in spec.requirements:
@@ -229,6 +239,7 @@ def _of_spec(source: ProblemSource) -> Problem:
         stl=source.stl,
         stl_name=source.stl_name,
         changes=source.changes,
+        searches=searches,
     )
     return replace(Problem.from_parts(joined, source), named_context=named_context(source, spec, path))
 

@@ -45,6 +45,21 @@ def test_an_fmu_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
     assert done.json["signals"]["u"]["values"] == [2.0]
 
 
+def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tmp_path: Path) -> None:
+    lag = fixture("Lag_2")
+    (tmp_path / "lag.toml").write_text(f"""
+        model = {{ fmu = '{lag}', interface = 'co-simulation', stop_time = 1.0 }}
+        inputs.u.value = 2.0
+        requirements.R.formula = 'G (y <= 5)'
+    """)
+    done = falsifier("simulate", "lag.toml", "--json", cwd=tmp_path)
+    assert done.code == 0, done.err
+    alone = falsifier("simulate", str(lag), "--stl", "G[0,1] (y <= 5)", "--json", cwd=tmp_path)
+    assert alone.code == 0 and alone.json["robustness"] > done.json["robustness"], alone.err
+    searched = falsifier("check", "lag.toml", cwd=tmp_path)
+    assert searched.code == 2 and "nothing to search" in searched.err
+
+
 def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
     package = str(write(tmp_path / "plant.ssp", structure(system(PLANT)), "Plant_2"))
     formula = "G[0,1] (plant.y <= 5)"

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numba
-import pytest
 
-from falsifier.fmu.compiling import on_long_compilation
+from falsifier.fmu.compiling import on_compilation
 
 # As where neither the package's folder nor a home can be written.
 NO_FOLDER = """
@@ -27,19 +26,19 @@ def doubled() -> Callable[[float], float]:
     return double
 
 
-@pytest.mark.parametrize(("after", "said"), [(0.0, ["compiling"]), (100.0, [])])
-def test_a_compilation_is_told_of_once_when_it_takes_long(after: float, said: list[str]) -> None:
+def test_a_compilation_is_told_of_once_before_it_starts() -> None:
     told: list[str] = []
-    with on_long_compilation(lambda: told.append("compiling"), after):
-        assert doubled()(1.5) + doubled()(0.5) == 4.0
-    assert told == said
+    double = doubled()
+    with on_compilation(lambda: told.append(f"{len(double.signatures)} are compiled")):  # type: ignore[attr-defined]
+        assert double(1.5) + doubled()(0.5) == 4.0
+    assert told == ["0 are compiled"]
 
 
 def test_what_is_compiled_already_is_not_told_of() -> None:
     told: list[str] = []
     double = doubled()
     double(1.0)
-    with on_long_compilation(lambda: told.append("compiling"), 0.0):
+    with on_compilation(lambda: told.append("compiling")):
         assert double(2.0) == 4.0
     assert told == []
 

@@ -21,8 +21,8 @@ _NOT_COMPILED = {"ports"}
 LOADING = """
 import sys
 from falsifier.fmu import machine_code
-from falsifier.fmu.stepper import warm_up
-warm_up()
+from falsifier.fmu.readiness import load_first
+load_first(print)
 machine_code.load("model_exchange")
 print("numba" in sys.modules)
 """
@@ -97,8 +97,7 @@ def test_functions_that_are_not_there_are_named() -> None:
 
 
 def test_a_compiled_function_can_be_called_from_its_object_file() -> None:
-    machine, tell = machine_code._machine(), lambda: None
-    compiled = compiling.compiled_object(lambda what, number: 2 * what + number, machine, tell)
+    compiled = compiling.compiled_object(lambda what, number: 2 * what + number, machine_code._machine())
     assert machine_code._callable(Code(*compiled))(20, 2) == 42
 
 

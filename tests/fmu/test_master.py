@@ -175,6 +175,21 @@ def test_an_output_that_becomes_nan_is_named_and_not_the_component_that_receives
         run(model, "plant.x", parameters={"bad.misdeed": 5.0, "pi.k": 1.0})
 
 
+@pytest.mark.parametrize(
+    ("parameter", "named"),
+    [("plant.x", r"plant: plant\.y"), ("pi.k", r"pi: pi\.y"), ("bad.k", r"bad: bad\.y")],
+)
+def test_an_output_that_is_nan_at_time_0_is_named_and_not_the_loop_that_it_spreads_in(
+    parameter: str, named: str
+) -> None:
+    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Gain_3"}, links, DELAY)
+    with pytest.raises(SimulationError, match=f"^{named} is nan at t = 0 s, in the init") as failed:
+        run(model, "plant.x", parameters={"pi.k": 0.5, parameter: float("nan")})
+    assert failed.value.time == 0.0
+    assert np.isfinite(run(model, "plant.x", parameters={"pi.k": 0.5})["plant.x"]).all()
+
+
 def test_discrete_inputs_of_fmi_3_change_at_events() -> None:
     """The second Ticker counts its events; its input is continuous, those of Echo are discrete."""
     model = system(

@@ -15,7 +15,7 @@ import json, sys
 sys.path[:] = json.loads(sys.argv[1])
 from pathlib import Path
 from falsifier.fmu import spawned
-spawned.warm_up = lambda: None
+spawned.load_first = lambda tell: None
 spawned.main(Path(sys.argv[2]))
 """
 

@@ -31,6 +31,8 @@ from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.problem import Problem
 from falsifier.stl.names import name_text
 
+# Folder of an export in which each component has one.
+FOLDER = "components"
 # Share by which the outputs may leave the range that they had in the system.
 _MARGIN = 1e-6
 
@@ -54,21 +56,26 @@ class Seen:
     step: float
 
 
+def copy_of(member: Member) -> Path:
+    """Return the path of the copy of a component's FMU in an export."""
+    return Path(FOLDER, file_name(member.name), member.path.name)
+
+
 def write_components(problem: Problem, candidate: Candidate, directory: Path) -> list[Path]:
     """Write a folder per component of a problem's system; return the files.
 
     Args:
         problem: a problem whose model is a system.
         candidate: the inputs to simulate.
-        directory: where to write the folders.
+        directory: folder of the export, in which the folder ``components`` is written.
     """
     assert isinstance(problem.model, System), "only systems have components"
     files = []
     for member, seen in zip(problem.model.network.members, all_seen(problem, candidate), strict=True):
-        folder = directory / file_name(member.name)
+        fmu = directory / copy_of(member)
+        folder = fmu.parent
         folder.mkdir(parents=True, exist_ok=True)
         model = FmuModel(member.path, member.interface)
-        fmu = folder / member.path.name
         shutil.copyfile(member.path, fmu)
         files += [fmu, write_json(seen.start, folder / "start_values.json", model)]
         if seen.inputs.columns:

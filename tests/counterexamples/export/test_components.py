@@ -11,7 +11,7 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.export.components import write_components
+from falsifier.counterexamples.export.components import FOLDER, write_components
 from falsifier.evaluation.evaluate import simulate
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import Component, Connection, Coupling, System
@@ -61,7 +61,7 @@ def test_each_component_alone_does_what_it_did_in_the_system(
     whole = problem_of(system({"plant": plant, "pi": pi}, links, coupling))
     write_components(whole, DRIVE, tmp_path)
     for name in ("plant", "pi"):
-        folder = tmp_path / name
+        folder = tmp_path / "components" / name
         alone = load_problem(str(folder / f"{name}.toml"))
         inputs = read_inputs(folder / "input.csv", alone.info)
         again = simulate(alone, inputs.signals).trajectory
@@ -70,13 +70,13 @@ def test_each_component_alone_does_what_it_did_in_the_system(
         # At time 0, the controller alone has its input of the first step; see docs/systems.md.
         np.testing.assert_allclose(again["y"][1:], in_system["y"][1:], atol=1e-6)
         alone.model.close()
-    assert json.loads((tmp_path / "plant" / "start_values.json").read_text()) == {"T": 1.5}
+    assert json.loads((tmp_path / "components" / "plant" / "start_values.json").read_text()) == {"T": 1.5}
 
 
 def test_a_constant_input_at_its_upper_limit_gets_a_range_that_the_fmu_allows(tmp_path: Path) -> None:
     whole = problem_of(system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP))
     write_components(whole, Candidate({"pi.r": Signal((0.0,), (2.0,))}, {"plant.T": 1.5}), tmp_path)
-    alone = load_problem(str(tmp_path / "pi" / "pi.toml"))
+    alone = load_problem(str(tmp_path / "components" / "pi" / "pi.toml"))
     assert alone.info["r"].high == 2.0
     assert (1.0, 2.0) in [(r.low, r.high) for r in alone.space.inputs if r.name == "r"]
     alone.model.close()
@@ -102,6 +102,6 @@ def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> N
         output_interval=0.1,
     )
     write_components(whole, Candidate({"pi.r": Signal((0.0,), (1.0,))}, {}), tmp_path)
-    alone = load_problem(str(tmp_path / "plant" / "plant.toml"))
+    alone = load_problem(str(tmp_path / FOLDER / "plant" / "plant.toml"))
     assert [r.name for r in alone.space.inputs] == [odd["u"]]
     assert alone.requirement.formula.signals == (odd["y"],)
