@@ -22,8 +22,6 @@ from pathlib import Path
 from pkgutil import walk_packages
 from typing import IO, Any, NoReturn
 
-import numpy as np
-
 from tests.patience import HANG
 
 # Imported by commands when they need them.
@@ -98,13 +96,18 @@ def forker() -> Forker:
 
 def serve(descriptor: int) -> None:
     """Fork for each request; the copies run it and end."""
+    from falsifier.llm.tokens import count_tokens
+    from tests.compiling import load_common
+    from tests.spare import Spare
+
     importlib.import_module("falsifier.llm.litellm_import").load_litellm()
     large = [importlib.import_module(name) for name in _LARGE]
     parts = [m.name for package in large for m in walk_packages(package.__path__, f"{package.__name__}.")]
     for name in (*_SLOW, *parts):
         if name not in _NEVER:
             importlib.import_module(name)
-    _load_monitor()
+    load_common()
+    count_tokens("")
     gc.freeze()
     requests = socket.socket(fileno=descriptor)
     while True:
@@ -114,22 +117,15 @@ def serve(descriptor: int) -> None:
         pid = os.fork()
         if not pid:
             requests.close()
+            spare = Spare()
             _become(json.loads(data), streams)
+            spare.offer()
             _run_and_end()
         for stream in streams:
             os.close(stream)
         requests.send(str(pid).encode())
         _, status = os.waitpid(pid, 0)
         requests.send(str(os.waitstatus_to_exitcode(status)).encode())
-
-
-def _load_monitor() -> None:
-    """Load the compiled monitor from its cache, or compile it."""
-    from falsifier.core.trajectory import Trajectory
-    from falsifier.stl import Monitor, parse
-
-    times = np.linspace(0.0, 1.0, 11)
-    Monitor(parse("G[0,1] (x < 1)"), step=0.1, samples=11).evaluate(Trajectory(times, {"x": times}))
 
 
 def _become(request: dict[str, Any], streams: list[int]) -> None:

@@ -62,18 +62,43 @@ def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
     assert "not falsified after 3 simulations" in done.out
 
 
+_ONE_AFTER_THE_OTHER = """
+import json, sys
+from contextlib import redirect_stderr
+from io import StringIO
+from falsifier.cli import main
+ended = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv, said = ["falsifier", *arguments], StringIO()
+    try:
+        with redirect_stderr(said):
+            main()
+    except SystemExit as ending:
+        ended.append((ending.code, said.getvalue()))
+print(json.dumps(ended))
+"""
+
+
 def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path) -> None:
-    """A stand-in for litellm that cannot be imported is never asked for."""
+    """A stand-in for litellm that cannot be imported is not asked for until everything else is right."""
     (tmp_path / "litellm.py").write_text("raise ImportError('this is imported')")
-    path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
-    wrong = {"--variant": "MP9", "--fallback": "corner", "--engine": "uniform"}
-    for option, value in wrong.items():
-        done = falsifier("run", "AT1", "--llm", "nobody/x", option, value, cwd=tmp_path, env=path, fresh=True)
-        assert (done.code, "imported" in done.err) == (2, False), done.err
-    done = falsifier("run", "AT1", "--llm", "openai/x", "--max-cost", "1", cwd=tmp_path, env=path, fresh=True)
-    assert (done.code, "OPENAI_API_KEY" in done.err) == (2, True), done.err
-    done = falsifier("run", "AT1", "--llm", "nobody/x", cwd=tmp_path, env=path, fresh=True)
-    assert (done.code, "imported" in done.err) == (3, True), done.err
+    run = ("run", "AT1", "--llm")
+    wrong = [(*run, "nobody/x", *more) for more in (("--variant", "MP9"), ("--fallback", "corner"))]
+    mixed, no_key = (*run, "nobody/x", "--engine", "uniform"), (*run, "openai/x", "--max-cost", "1")
+    done = subprocess.run(
+        [sys.executable, "-c", _ONE_AFTER_THE_OTHER, json.dumps([*wrong, mixed, no_key, (*run, "nobody/x")])],
+        cwd=tmp_path,
+        env={k: v for k, v in os.environ.items() if not k.endswith("_API_KEY")}
+        | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        capture_output=True,
+        text=True,
+        timeout=HANG,
+        check=True,
+    )
+    *early, last = json.loads(done.stdout)
+    assert [(code, "imported" in text) for code, text in early] == [(2, False)] * 4
+    assert "OPENAI_API_KEY" in early[-1][1]
+    assert (last[0], "imported" in last[1]) == (3, True), last
 
 
 def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path) -> None:
