@@ -69,8 +69,19 @@ def search(problem: Problem, engine: str, *, seed: int, budget: int) -> Search:
     return Search(False, budget, time.perf_counter() - started, simulating)
 
 
-def peer_search(problem: Problem, optimizer: str, python: Path, *, seed: int, budget: int) -> Search:
-    """Search with an optimizer of psy-taliro, which runs in its own process; its start is not counted."""
+def peer_search(
+    problem: Problem, optimizer: str, python: Path, *, seed: int, budget: int, limit: float = float("inf")
+) -> Search:
+    """Search with an optimizer of psy-taliro, which runs in its own process; its start is not counted.
+
+    Args:
+        problem: the problem.
+        optimizer: one of PEERS.
+        python: interpreter that can import staliro.
+        seed: seed of the optimizer.
+        budget: maximum number of simulations.
+        limit: maximum duration in s.
+    """
     task = {"optimizer": optimizer, "seed": seed, "budget": budget, "bounds": problem.space.bounds.tolist()}
     script = Path(__file__).with_name("peer_taliro.py")
     with subprocess.Popen(
@@ -80,7 +91,7 @@ def peer_search(problem: Problem, optimizer: str, python: Path, *, seed: int, bu
         print(json.dumps(task), file=peer.stdin, flush=True)
         line, count, simulating = peer.stdout.readline(), 0, 0.0
         started = time.perf_counter()
-        while line and count < budget:
+        while line and count < budget and time.perf_counter() - started < limit:
             count += 1
             begun = time.perf_counter()
             candidate = problem.space.decode(np.array(json.loads(line)), origin="psy-taliro", rationale="")
@@ -92,7 +103,7 @@ def peer_search(problem: Problem, optimizer: str, python: Path, *, seed: int, bu
             print(evaluation.robustness, file=peer.stdin, flush=True)
             line = peer.stdout.readline()
         peer.kill()
-    return Search(False, budget, time.perf_counter() - started, simulating)
+    return Search(False, count, time.perf_counter() - started, simulating)
 
 
 def _violates(evaluation: Evaluation) -> bool:

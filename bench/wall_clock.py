@@ -3,12 +3,14 @@
     python bench/wall_clock.py                                    # engines beside the surrogate, one core
     python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a CC3 AFC27
     python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a CC5 --slower 0.5
+    python bench/wall_clock.py --peer PEER/bin/python             # psy-taliro too, see peers.py
 
 A method is an engine, with the objective after a colon. A run that finds nothing in --seconds counts as that.
 The methods take turns seed by seed, so that another load of the machine hits all of them. Seconds are those
 of a run until its counterexample is confirmed, with the start of the FMU and of worker processes, without
-loading the spec; --slower lets each simulation wait that much longer, as a larger FMU would take.
-Committed result: bench/wall_clock.md.
+loading the spec; --slower lets each simulation wait that much longer, as a larger FMU would take. Those of
+psy-taliro are without the start of its process and of the FMU and without a confirmation; it searches the
+fixed parameterization. Committed result: bench/wall_clock.md.
 """
 
 import argparse
@@ -17,13 +19,15 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 from statistics import mean, stdev
 
 # For the engines' small matrices, threads of the linear algebra cost more than they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from falsifier import Budget, Problem, Result, falsify, load_problem
+from bench.peers import PEERS, peer_search
+from falsifier import Budget, Problem, falsify, load_problem
 from falsifier.core.model import Experiment, Model, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
@@ -61,10 +65,19 @@ class Slower:
         self.model.close()
 
 
-def run(problem: Problem, method: str, *, jobs: int, seed: int, seconds: float) -> Result:
-    """Search with one method."""
+@dataclass(frozen=True)
+class Run:
+    """One search: whether it found a violation, after how many simulations and s."""
+
+    falsified: bool
+    simulations: int
+    seconds: float
+
+
+def run(problem: Problem, method: str, *, jobs: int, seed: int, seconds: float) -> Run:
+    """Search with one engine."""
     engine, _, objective = method.partition(":")
-    return falsify(
+    result = falsify(
         problem,
         engine,
         objective="time" if objective == "time" else "simulations",
@@ -72,12 +85,20 @@ def run(problem: Problem, method: str, *, jobs: int, seed: int, seconds: float) 
         jobs=jobs,
         seed=seed,
     )
+    return Run(result.falsified, result.spent.simulations, result.spent.seconds)
 
 
-def cells(results: list[Result], limit: float) -> list[str]:
+def run_peer(problem: Problem, optimizer: str, python: Path, *, seed: int, seconds: float) -> Run:
+    """Search with psy-taliro."""
+    most = 1_000_000
+    found = peer_search(problem, optimizer, python, seed=seed, budget=most, limit=seconds)
+    return Run(found.falsified, found.simulations, found.seconds)
+
+
+def cells(results: list[Run], limit: float) -> list[str]:
     """Falsified runs, simulations and seconds; a run that found nothing counts as the limit."""
-    seconds = [r.spent.seconds if r.falsified else limit for r in results]
-    simulations = [r.spent.simulations for r in results if r.falsified]
+    seconds = [r.seconds if r.falsified else limit for r in results]
+    simulations = [r.simulations for r in results if r.falsified]
     error = f" ± {stdev(seconds) / len(seconds) ** 0.5:.1f}" if len(seconds) > 1 else ""
     return [
         f"{len(simulations)}/{len(results)}",
@@ -95,6 +116,7 @@ def main() -> None:
     parser.add_argument("--slower", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--seconds", type=float, default=60.0, help="limit of each run")
     parser.add_argument("--seeds", type=int, nargs=2, default=(100, 104), metavar=("FIRST", "LAST"))
+    parser.add_argument("--peer", type=Path, help="interpreter that can import staliro")
     options = parser.parse_args()
     print("| requirement | method | jobs | FR | simulations | seconds |\n|---|---|---|---|---|---|")
     for name in options.requirements:
@@ -103,11 +125,17 @@ def main() -> None:
             problem = replace(problem, model=Slower(problem.model, options.slower))
         run(problem, "corners", jobs=1, seed=0, seconds=5.0)  # compiles what is compiled once
         ways = list(product(options.methods, options.jobs))
-        results: dict[tuple[str, int], list[Result]] = {way: [] for way in ways}
+        fixed = load_problem(name, parameterization="fixed")
+        peers = PEERS if options.peer else ()
+        results: dict[tuple[str, int], list[Run]] = {way: [] for way in ways}
+        results |= {(f"psy-taliro, {peer}", 1): [] for peer in peers}
         for seed in range(options.seeds[0], options.seeds[1] + 1):
             for method, jobs in ways:
                 found = run(problem, method, jobs=jobs, seed=seed, seconds=options.seconds)
                 results[method, jobs].append(found)
+            for peer in peers:
+                found = run_peer(fixed, peer, options.peer, seed=seed, seconds=options.seconds)
+                results[f"psy-taliro, {peer}", 1].append(found)
         for (method, jobs), all_found in results.items():
             words = " | ".join(cells(all_found, options.seconds))
             print(f"| {name} | {method} | {jobs} | {words} |", flush=True)

@@ -21,9 +21,10 @@ def read_curves(knots: Array, values: Array, at: Array) -> Array:
 @compiled
 def _read(steps: Array, values: Array, piece: NDArray[np.intp], since: Array, result: Array) -> None:
     """Evaluate the cubic between two knots at times since the first of them."""
-    slopes = np.empty(len(steps) + 1)
+    secants, slopes = np.empty(len(steps)), np.empty(len(steps) + 1)
     for row in range(len(values)):
-        secants = np.diff(values[row]) / steps
+        for k in range(len(steps)):
+            secants[k] = (values[row, k + 1] - values[row, k]) / steps[k]
         _find_slopes(steps, secants, slopes)
         for i in range(len(piece)):
             k, t, h = piece[i], since[i], steps[piece[i]]
@@ -37,7 +38,7 @@ def _find_slopes(steps: Array, secants: Array, slopes: Array) -> None:
     """Find the slopes at the knots; sources in ``core.signals``."""
     last = len(steps)
     if last == 1:
-        slopes[:] = secants[0]
+        slopes[0] = slopes[1] = secants[0]
         return
     slopes[0] = _end_slope(steps[0], steps[1], secants[0], secants[1])
     slopes[last] = _end_slope(steps[last - 1], steps[last - 2], secants[last - 1], secants[last - 2])

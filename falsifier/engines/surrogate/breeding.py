@@ -89,7 +89,8 @@ def cross(
         for group in range(len(ends)):
             size = ends[group] - start
             kept = int(time * size) if group < inputs else size * int(rng.random() * 2)
-            children[row, start + kept : ends[group]] = other[start + kept : ends[group]]
+            for i in range(start + kept, ends[group]):
+                children[row, i] = other[i]
             start = ends[group]
 
 
@@ -120,8 +121,9 @@ def _change_pieces(values: Array, until: float, rng: np.random.Generator) -> Non
     size, kind = len(values), rng.random()
     reach = max(1, int(_REACH * size))
     if kind >= _SWITCH_MOVED:
-        shift = int(rng.random() * (2 * reach + 1)) - reach
-        values[:] = np.roll(values, shift)
+        shift, before = int(rng.random() * (2 * reach + 1)) - reach, values.copy()
+        for i in range(size):
+            values[i] = before[(i - shift) % size]
         return
     if kind >= _STEPPED:
         _move_switch(values, 1 + int(reach * rng.random()), rng)
@@ -133,25 +135,28 @@ def _change_pieces(values: Array, until: float, rng: np.random.Generator) -> Non
     if not np.isnan(until) and rng.random() < 0.5:
         stop = min(size, int(until * size + 1))
         start = max(0, stop - length)
-    if kind < _TO_LEVEL:
-        level = rng.random()
-        values[start:stop] = np.rint(level) if kind < _TO_BOUND else level
-    else:
-        step = _step(rng)
-        for i in range(start, stop):
-            values[i] = min(max(values[i] + step, 0.0), 1.0)
+    level = np.rint(rng.random()) if kind < _TO_BOUND else rng.random()
+    step = _step(rng)
+    for i in range(start, stop):
+        values[i] = level if kind < _TO_LEVEL else min(max(values[i] + step, 0.0), 1.0)
 
 
 @compiled
 def _move_switch(values: Array, shift: int, rng: np.random.Generator) -> None:
     """Move one switch of a held signal to an earlier or a later cell."""
-    switches = np.flatnonzero(np.diff(values)) + 1
-    if len(switches):
-        at = switches[int(len(switches) * rng.random())]
-        if rng.random() < 0.5:
-            values[max(0, at - shift) : at] = values[at]
-        else:
-            values[at : at + shift] = values[at - 1]
+    size, at, seen = len(values), 0, 0
+    for i in range(1, size):
+        if values[i] != values[i - 1]:
+            seen += 1
+            # In the end, each switch is equally likely to be this one.
+            if rng.random() * seen < 1.0:
+                at = i
+    if at == 0:
+        return
+    before, after, earlier = values[at - 1], values[at], rng.random() < 0.5
+    start, stop = (max(0, at - shift), at) if earlier else (at, min(size, at + shift))
+    for i in range(start, stop):
+        values[i] = after if earlier else before
 
 
 @compiled
@@ -177,4 +182,5 @@ def _step(rng: np.random.Generator) -> float:
     """Draw a small change: its standard deviation is coarse, medium or fine, equally likely."""
     kind = rng.random()
     spread = 0.3 if kind < 1 / 3 else 0.1 if kind < 2 / 3 else 0.03
-    return spread * float(rng.standard_normal())
+    # Box and Muller's normal numbers: numba's take seconds to compile.
+    return float(spread * np.sqrt(-2.0 * np.log(1.0 - rng.random())) * np.cos(2.0 * np.pi * rng.random()))
