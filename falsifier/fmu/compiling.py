@@ -6,6 +6,9 @@ from contextlib import contextmanager
 from typing import Any
 
 _LONG_SECONDS = 1.0
+# What numba calls when an array that owns its memory is no longer needed, and the name that it gets in object
+# files: loops own no arrays, and what numba's name stands for in this process must stay.
+_NUMBAS_NAME, FREES_ARRAYS = "NRT_MemInfo_call_dtor", "falsifier_frees_arrays"
 
 
 @contextmanager
@@ -60,7 +63,8 @@ def compiled_object(
     compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
     with on_long_compilation(tell):
         compiled.compile(signature)
-    module = binding.parse_assembly(compiled.inspect_llvm(signature))
+    text = compiled.inspect_llvm(signature).replace(_NUMBAS_NAME, FREES_ARRAYS)
+    module = binding.parse_assembly(text)
     needed = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
     symbol = compiled.overloads[signature].fndesc.llvm_func_name
     return symbol, tuple(needed), machine.emit_object(module)

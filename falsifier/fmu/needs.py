@@ -53,33 +53,29 @@ def binary_remarks(path: Path) -> tuple[str, ...]:
             platforms = description.info.platforms
             text = missing_binary_text(path.name, platforms, has_sources=has_sources, needs_wine=wine)
             said.append(text)
-    if archive.this_platform().endswith("-linux"):
-        said += _missing_on_linux(path, description)
-    if any(map(description.needs_wine, missing)):
-        said += _missing_in_wine(path, description)
+    try:
+        with archive.open_archive(path) as packed:
+            if archive.this_platform().endswith("-linux"):
+                said += _missing_on_linux(packed, description)
+            if any(map(description.needs_wine, missing)):
+                said += _missing_in_wine(packed, description)
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError) as error:
+        raise ModelError(f"{path}: a binary is damaged ({error}); copy or export the FMU again") from error
     return tuple(dict.fromkeys(said))
 
 
-def _missing_on_linux(path: Path, description: Description) -> Iterator[str]:
-    try:
-        with archive.open_archive(path) as packed:
-            bundled = {PurePosixPath(name) for name in packed.namelist()}
-            for library in dict.fromkeys(description.libraries.values()):
-                yield from _Look(packed, bundled).missing(library)
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError) as error:
-        raise ModelError(f"{path}: a binary is damaged ({error}); copy or export the FMU again") from error
+def _missing_on_linux(packed: zipfile.ZipFile, description: Description) -> Iterator[str]:
+    bundled = {PurePosixPath(name) for name in packed.namelist()}
+    for library in dict.fromkeys(description.libraries.values()):
+        yield from _Look(packed, bundled).missing(library)
 
 
-def _missing_in_wine(path: Path, description: Description) -> Iterator[str]:
+def _missing_in_wine(packed: zipfile.ZipFile, description: Description) -> Iterator[str]:
     """Yield what the libraries for Windows need that is neither beside them nor part of Wine."""
-    with archive.open_archive(path) as packed:
-        for library in dict.fromkeys(description.windows_libraries.values()):
-            beside = {
-                PurePosixPath(name).name.lower(): name
-                for name in packed.namelist()
-                if PurePosixPath(name).parent == library.parent
-            }
-            yield from _lacking_in_wine(packed, library.name, beside)
+    entries = [PurePosixPath(name) for name in packed.namelist()]
+    for library in dict.fromkeys(description.windows_libraries.values()):
+        beside = {entry.name.lower(): str(entry) for entry in entries if entry.parent == library.parent}
+        yield from _lacking_in_wine(packed, library.name, beside)
 
 
 def _lacking_in_wine(packed: zipfile.ZipFile, first: str, beside: Mapping[str, str]) -> Iterator[str]:
