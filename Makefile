@@ -27,7 +27,8 @@ pytest: .venv/test .venv-export/installed
 
 # The tests of simulations again, with each FMU worker started as on systems without fork. Takes several minutes.
 test-spawn: .venv/test
-	FALSIFIER_WORKERS=spawn $(BIN)/pytest -n 2 --dist worksteal tests/fmu tests/evaluation tests/hostile tests/search tests/problem
+	FALSIFIER_WORKERS=spawn $(BIN)/pytest -n 2 --dist worksteal tests/fmu tests/evaluation tests/hostile tests/search \
+		tests/problem tests/systems tests/counterexamples tests/campaigns
 
 docs: .venv/test
 	$(BIN)/mkdocs build --strict

@@ -3,13 +3,13 @@
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.fmu import master, model_exchange, stepper, system_solver
+from falsifier.fmu import machine_code, master, readiness, system_solver
 from falsifier.stl import Monitor, parse
 
 
 def load_common() -> None:
     """Load the monitor and the stepper of co-simulation from numba's cache, or compile them."""
-    stepper.warm_up()
+    readiness.load_first(print)
     times = np.linspace(0.0, 1.0, 11)
     Monitor(parse("G[0,1] (x < 1)"), step=0.1, samples=11).evaluate(Trajectory(times, {"x": times}))
 
@@ -17,7 +17,7 @@ def load_common() -> None:
 def load_all() -> None:
     """Load everything that is compiled."""
     load_common()
-    model_exchange.warm_up()
+    machine_code.load("model_exchange")
     master.warm_up()
     system_solver.warm_up()
 

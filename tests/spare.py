@@ -15,7 +15,7 @@ from time import monotonic, sleep
 from typing import Any, NoReturn
 
 from falsifier.core import linux, operating_system, posix
-from falsifier.fmu import forking, nursery
+from falsifier.fmu import nursery
 
 _REQUEST_BYTES = 1_000_000
 _PAUSE = 0.002
@@ -43,10 +43,10 @@ class Spare:
             connection: socket.socket,
             output: int | None = None,
         ) -> Spare | posix.Child:
-            if self._is_taken or forking._BOOT not in command:
+            if self._is_taken or nursery.__name__ not in command:
                 return posix.Child(command, environment, connection, output)
             self._is_taken = True
-            request = {"arguments": command[-2:], "environment": dict(environment)}
+            request = {"paths": command[-3], "root": command[-1], "environment": dict(environment)}
             with self._socket, connection:
                 socket.send_fds(self._socket, [json.dumps(request).encode()], [connection.fileno()])
             return self
@@ -105,7 +105,6 @@ def _become_nursery(request: dict[str, Any], descriptor: int) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     os.environ.clear()
     os.environ.update(request["environment"])
-    paths, root = request["arguments"]
-    sys.path[:] = json.loads(paths)
+    sys.path[:] = json.loads(request["paths"])
     posix.receive_connection = lambda: (socket.socket(fileno=descriptor), 0)
-    nursery.main(Path(root))
+    nursery.main(Path(request["root"]))

@@ -4,6 +4,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+# What numba calls when an array that owns its memory is no longer needed, and the name that it gets in object
+# files: loops own no arrays, and what numba's name stands for in this process must stay.
+_NUMBAS_NAME, FREES_ARRAYS = "NRT_MemInfo_call_dtor", "falsifier_frees_arrays"
+
 
 @contextmanager
 def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
@@ -43,7 +47,8 @@ def compiled_object(function: Callable[[int, int], int], machine: Any) -> tuple[
     options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
     compiled.compile(signature)
-    module = binding.parse_assembly(compiled.inspect_llvm(signature))
+    text = compiled.inspect_llvm(signature).replace(_NUMBAS_NAME, FREES_ARRAYS)
+    module = binding.parse_assembly(text)
     needed = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
     symbol = compiled.overloads[signature].fndesc.llvm_func_name
     return symbol, tuple(needed), machine.emit_object(module)

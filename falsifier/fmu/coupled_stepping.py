@@ -47,7 +47,7 @@ from falsifier.fmu.stepping import (
 )
 
 COMPONENT = 3  # in the report, after STATUS, WHERE and STEP
-NOT_CONVERGED, RESTORING, NOT_A_NUMBER = 9, 10, 11  # where a loop stopped, beside those of stepping.py
+NOT_CONVERGED, RESTORING, NOT_A_NUMBER = 9, 10, 11  # where a loop stopped, beside those of loop_numbers.py
 
 # Columns of a component: the functions as for co_simulate, then four tables of ports (Ports.table).
 FUNCTIONS, PLAIN, HELD, SOURCES, RECORDED = 0, 7, 11, 15, 19

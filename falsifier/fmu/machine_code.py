@@ -1,8 +1,8 @@
 """Machine code of the compiled loops, in files that a worker loads without the compiler.
 
-A worker uses two functions (``entries``). Importing numba and loading the functions from its cache took half
-of a worker's start; LLVM alone loads an object file in milliseconds. A file belongs to the sources, to the
-versions of numba and LLVM and to the processor; one that is missing or damaged is compiled again.
+A worker uses two functions (``entries``). Importing numba and loading the functions from its cache took two
+thirds of a worker's start; LLVM alone loads an object file in milliseconds. A file belongs to the sources, to
+the versions of numba and LLVM and to the processor; one that is missing or damaged is compiled again.
 """
 
 import ctypes
@@ -21,6 +21,7 @@ from typing import Any
 
 from falsifier.core.files import own_temporary_folder, write_whole
 from falsifier.errors import ModelError
+from falsifier.fmu.compiling import FREES_ARRAYS, compiled_object
 
 # What the machine code of each entry is compiled from, in this folder.
 _STEPPING = ("c_functions", "loop_numbers", "stepping")
@@ -36,8 +37,6 @@ Entry = Callable[[int, "bytes | int"], int]
 _PROTOTYPE = ctypes.CFUNCTYPE(
     ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p
 )
-# Numba's function for arrays that own their memory. The loops have none, and numba's is not at hand.
-_FREES_ARRAYS = "NRT_MemInfo_call_dtor"
 
 
 class _Results(threading.local):
@@ -51,6 +50,7 @@ class _Results(threading.local):
 
 _RESULTS = _Results()
 _LOCK = threading.Lock()
+_LOADED: dict[str, Entry] = {}
 _SUM_LENGTH = sha256().digest_size
 # Machine code that has been loaded stays; so must what owns it.
 _ENGINES: list[Any] = []
@@ -100,9 +100,6 @@ def load(name: str, tell: Callable[[], None] = lambda: None) -> None:
             _LOADED[name] = _callable(code)
 
 
-_LOADED: dict[str, Entry] = {}
-
-
 def _entry(name: str) -> Entry:
     found = _LOADED.get(name)
     if found is None:
@@ -143,7 +140,6 @@ def keep(name: str, code: Code) -> None:
 def compile_entry(name: str) -> Code:
     """Compile an entry."""
     from falsifier.fmu import entries
-    from falsifier.fmu.compiling import compiled_object
 
     return Code(*compiled_object(getattr(entries, name), _machine()))
 
@@ -177,7 +173,7 @@ def _resolve(names: tuple[str, ...]) -> None:
     """
     from llvmlite import binding
 
-    binding.add_symbol(_FREES_ARRAYS, ctypes.cast(_NEVER_CALLED, ctypes.c_void_p).value)
+    binding.add_symbol(FREES_ARRAYS, ctypes.cast(_NEVER_CALLED, ctypes.c_void_p).value)
     missing = [name for name in names if not binding.address_of_symbol(name)]
     if missing:
         raise ModelError(

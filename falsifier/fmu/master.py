@@ -7,12 +7,13 @@ import numpy as np
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import coupled_stepping as loops
-from falsifier.fmu import loop_numbers, stepping
+from falsifier.fmu import loop_numbers
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.co_simulation import CHUNK_GROWTH, FIRST_CHUNK, QUICK_SECONDS
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import status_name
 from falsifier.fmu.lifecycle import ModalLifecycle
+from falsifier.fmu.loops import enter_step_mode, write_row
 from falsifier.fmu.network import Member, Network
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
@@ -224,7 +225,7 @@ class _Starter:
         if steps_with_events(self._member):
             names = ("DoStep", "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode")
             functions = (library.component, *(library.address(name) for name in names), 3, 1)
-            status, where = stepping.enter_step_mode(functions)
+            status, where = enter_step_mode(functions)
             if where != loop_numbers.DONE:
                 what = what_stopped(loop_numbers, status, where)
                 raise SimulationError(f"{self._member.name}: {what} at t = 0 s", time=0.0)
@@ -241,7 +242,7 @@ class _Starter:
         if self._ports.is_limited:
             check_range(self._member.name, self._names, self._ports, values[:, np.newaxis])
         library = self._part.library
-        status = stepping.write_row(
+        status = write_row(
             library.component, self._member.description.major, self._ports.table, values.ctypes.data
         )
         if status > 1:

@@ -16,6 +16,8 @@ from falsifier.fmu import archive
 from falsifier.fmu.description import Description, read_description
 from falsifier.fmu.elf import Elf, read_elf
 from falsifier.fmu.libraries import misnamed_text, missing_binary_text
+from falsifier.fmu.pe import read_pe
+from falsifier.fmu.wine import wine_libraries
 
 # Larger libraries are not read.
 _MOST_BYTES = 512 << 20
@@ -28,7 +30,8 @@ _BITS = 64 if sys.maxsize > 1 << 32 else 32
 def binary_remarks(path: Path) -> tuple[str, ...]:
     """Return why an FMU's binary cannot be loaded on this machine, one sentence each; none if it can.
 
-    That it runs through Wine is among the notes of its description, so here only what makes Wine superfluous.
+    That it runs through Wine is among the notes of its description; here only what prevents that, and what
+    makes Wine superfluous.
 
     Raises:
         ModelError: if the file is not an FMU.
@@ -49,19 +52,62 @@ def binary_remarks(path: Path) -> tuple[str, ...]:
             platforms = description.info.platforms
             text = missing_binary_text(path.name, platforms, has_sources=has_sources, needs_wine=wine)
             said.append(text)
-    if archive.this_platform().endswith("-linux"):
-        said += _missing_on_linux(path, description)
+    try:
+        with archive.open_archive(path) as packed:
+            if archive.this_platform().endswith("-linux"):
+                said += _missing_on_linux(packed, description)
+            if any(map(description.needs_wine, missing)):
+                said += _missing_in_wine(packed, description)
+    except archive.UNREADABLE as error:
+        raise ModelError(f"{path}: a binary is damaged ({error}); copy or export the FMU again") from error
     return tuple(dict.fromkeys(said))
 
 
-def _missing_on_linux(path: Path, description: Description) -> Iterator[str]:
-    try:
-        with archive.open_archive(path) as packed:
-            bundled = {PurePosixPath(name) for name in packed.namelist()}
-            for library in dict.fromkeys(description.libraries.values()):
-                yield from _Look(packed, bundled).missing(library)
-    except archive.UNREADABLE as error:
-        raise ModelError(f"{path}: a binary is damaged ({error}); copy or export the FMU again") from error
+def _missing_on_linux(packed: zipfile.ZipFile, description: Description) -> Iterator[str]:
+    bundled = {PurePosixPath(name) for name in packed.namelist()}
+    for library in dict.fromkeys(description.libraries.values()):
+        yield from _Look(packed, bundled).missing(library)
+
+
+def _missing_in_wine(packed: zipfile.ZipFile, description: Description) -> Iterator[str]:
+    """Yield what the libraries for Windows need that is neither beside them nor part of Wine."""
+    entries = [PurePosixPath(name) for name in packed.namelist()]
+    for library in dict.fromkeys(description.windows_libraries.values()):
+        beside = {entry.name.lower(): str(entry) for entry in entries if entry.parent == library.parent}
+        yield from _lacking_in_wine(packed, library.name, beside)
+
+
+def _lacking_in_wine(packed: zipfile.ZipFile, first: str, beside: Mapping[str, str]) -> Iterator[str]:
+    offered = wine_libraries()
+    looked_at, seen = [first.lower()], {first.lower()}
+    for name in looked_at:
+        entry = beside[name]
+        if packed.getinfo(entry).file_size > _MOST_BYTES:
+            continue
+        own = PurePosixPath(entry).name
+        try:
+            library = read_pe(packed.read(entry))
+        except ValueError as error:
+            yield f"{own} is {error}; export the FMU again"
+            continue
+        if not library.is_64:
+            yield f"{own} is not for 64-bit Windows on x86, which is what Wine runs; export it again"
+            continue
+        for needed in library.needed:
+            found = needed.lower()
+            if found in beside and found not in seen:
+                looked_at.append(found)
+                seen.add(found)
+            if found not in beside and offered and found not in offered and not _is_api_set(found):
+                yield (
+                    f"{own} needs {needed}, which is neither beside it in the FMU nor part of Wine; export "
+                    "the FMU with it"
+                )
+
+
+def _is_api_set(name: str) -> bool:
+    """Whether a name stands for functions of several libraries of Windows, which Wine knows."""
+    return name.startswith(("api-ms-win-", "ext-ms-"))
 
 
 class _Look:

@@ -10,7 +10,6 @@ from typing import Protocol
 
 from falsifier.core import operating_system
 from falsifier.core.memory import check_memory_limits
-from falsifier.core.operating_system import Child
 from falsifier.fmu import folders
 from falsifier.fmu.environment import protect_secrets, worker_environment
 from falsifier.fmu.output import Output
@@ -85,7 +84,9 @@ def open_folder() -> folders.WorkFolder:
     return folders.WorkFolder()
 
 
-def start_program(module: str, root: Path, connection: socket.socket, output: int | None = None) -> Child:
+def start_program(
+    module: str, root: Path, connection: socket.socket, output: int | None = None
+) -> operating_system.Child:
     """Start a Python program with this process's modules and an environment without secrets.
 
     Args:
@@ -96,4 +97,4 @@ def start_program(module: str, root: Path, connection: socket.socket, output: in
     """
     paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
     command = [operating_system.interpreter(), "-I", "-c", _BOOT, paths, module, str(root)]
-    return Child(command, worker_environment(os.environ), connection, output)
+    return operating_system.Child(command, worker_environment(os.environ), connection, output)

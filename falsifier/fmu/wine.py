@@ -1,6 +1,7 @@
 """Wine: found on this machine, and what users are told about it."""
 
 import shutil
+from functools import lru_cache
 from pathlib import Path
 
 from falsifier.errors import ModelError
@@ -13,6 +14,8 @@ HOW_TO_INSTALL = (
 
 # Debian's wine64 is in no folder of the search path.
 _DEBIAN = Path("/usr/lib/wine/wine64")
+# Where Wine's own libraries are, below a folder above its program.
+_OWN_LIBRARIES = ("lib*/wine/x86_64-windows", "lib*/*/wine/x86_64-windows")
 # These are not part of a name, or of no name that Wine finds.
 _UNKNOWN = frozenset('\\"')
 
@@ -23,6 +26,17 @@ def find_wine() -> Path | None:
         if found := shutil.which(name):
             return Path(found)
     return None
+
+
+@lru_cache(maxsize=1)
+def wine_libraries() -> frozenset[str]:
+    """Return the names of Wine's own libraries for 64-bit programs, in lower case; none if unknown."""
+    found = find_wine()
+    for folder in found.resolve().parents if found is not None else ():
+        for pattern in _OWN_LIBRARIES:
+            for place in folder.glob(pattern):
+                return frozenset(path.name.lower() for path in place.iterdir())
+    return frozenset()
 
 
 def can_run_windows() -> bool:

@@ -34,7 +34,7 @@ if sys.platform != "win32":
 assert sys.platform != "win32"
 
 _LOAD, _PREPARE, _SIMULATE, _RESET, _TAKE, _RESTORE, _FORGET, _RENEW = range(1, 9)
-# Where a simulation stopped, besides the places in stepping.py; see ``enum where`` in worker.h.
+# Where a simulation stopped, besides the places in loop_numbers.py; see ``enum where`` in worker.h.
 _DONE = 0
 _CALLING, _WRITING, _TEXT, _TIMEOUT, _IMPOSSIBLE = range(20, 25)
 

@@ -156,7 +156,10 @@ class WineProcess:
         """
         if not self._connected:
             self.close()
-            raise ModelError(f"{self._wine} cannot run {WORKER} (exit code {code}); is it a 64-bit Wine?")
+            raise ModelError(
+                f"{self._wine} cannot run {WORKER} (exit code {code}); a Wine for 64-bit programs is needed: "
+                f"{HOW_TO_INSTALL}"
+            )
         found = _SIGNALS.get(code) or (-code if code < 0 else None)
         with REMOVING:
             if found is not None:

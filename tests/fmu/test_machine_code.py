@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from falsifier.errors import ModelError
 from falsifier.fmu import compiling, machine_code
+from falsifier.fmu.compiling import FREES_ARRAYS
 from falsifier.fmu.machine_code import SOURCES, Code, keep, kept
 from tests.command import ROOT
 
@@ -99,6 +101,21 @@ def test_functions_that_are_not_there_are_named() -> None:
 def test_a_compiled_function_can_be_called_from_its_object_file() -> None:
     compiled = compiling.compiled_object(lambda what, number: 2 * what + number, machine_code._machine())
     assert machine_code._callable(Code(*compiled))(20, 2) == 42
+
+
+def test_what_numba_does_with_arrays_of_its_own_stays() -> None:
+    """The loops' stand-in for numba's function must not take its place in this process."""
+    import numba
+    from llvmlite import binding
+
+    assert numba.njit(lambda n: np.ones(n).sum())(3) == 3.0
+    before = binding.address_of_symbol("NRT_MemInfo_call_dtor")
+    assert before
+    machine_code._resolve((FREES_ARRAYS,))
+    assert binding.address_of_symbol("NRT_MemInfo_call_dtor") == before
+    machine_code.load(NAME)
+    code = kept(NAME)
+    assert code is not None and set(code.needed) <= {FREES_ARRAYS}
 
 
 def test_workers_need_no_compiler() -> None:

@@ -12,6 +12,7 @@ from falsifier.fmu.needs import binary_remarks
 from falsifier.fmu.wine import can_run_windows
 from tests.fmu.fixtures import FOLDER, path
 from tests.fmu.test_elf import library
+from tests.fmu.test_pe import windows_library
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads libraries of Linux")
 
@@ -140,7 +141,7 @@ def test_a_windows_binary_that_runs_through_wine_is_not_called_missing(tmp_path:
     packed = tmp_path / "my.fmu"
     with zipfile.ZipFile(packed, "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION)
-        archive.writestr("binaries/win64/M.dll", b"")
+        archive.writestr("binaries/win64/M.dll", windows_library())
     assert binary_remarks(packed) == ()
     with zipfile.ZipFile(packed, "a") as archive:
         archive.writestr("sources/all.c", b"")
@@ -148,6 +149,30 @@ def test_a_windows_binary_that_runs_through_wine_is_not_called_missing(tmp_path:
         "no binary for x86_64-linux, only for x86_64-windows; that for Windows runs through Wine; it "
         "contains C sources: compile them with `falsifier build my.fmu` to run without Wine",
     )
+
+
+def test_what_a_windows_library_needs_beside_wine_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("falsifier.fmu.archive.this_platform", lambda: "x86_64-linux")
+    monkeypatch.setattr("falsifier.fmu.needs.wine_libraries", lambda: frozenset({"kernel32.dll"}))
+    packed = tmp_path / "my.fmu"
+
+    def said(**files: bytes) -> tuple[str, ...]:
+        with zipfile.ZipFile(packed, "w") as archive:
+            archive.writestr("modelDescription.xml", DESCRIPTION)
+            for name, content in files.items():
+                archive.writestr(f"binaries/win64/{name}.dll", content)
+        return binary_remarks(packed)
+
+    usual = windows_library("KERNEL32.dll", "api-ms-win-crt-heap-l1-1-0.dll", "Beside.dll")
+    assert said(M=usual, beside=windows_library("kernel32.DLL", "M.dll")) == ()
+    (text,) = said(M=usual, beside=windows_library("Licence.dll"))
+    assert text.startswith("beside.dll needs Licence.dll, which is neither beside it in the FMU nor part of")
+    assert said(M=windows_library(machine=0x14C)) == (
+        "M.dll is not for 64-bit Windows on x86, which is what Wine runs; export it again",
+    )
+    assert said(M=b"") == ("M.dll is not a Windows library; export the FMU again",)
 
 
 def test_of_several_libraries_with_other_names_none_is_guessed(tmp_path: Path) -> None:
