@@ -17,7 +17,6 @@ from falsifier.fmu.network import Member, Network
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.stepper import check_range, what_stopped
-from falsifier.fmu.strings import set_strings
 from falsifier.fmu.system_tables import SystemTables, steps_with_events
 
 # Maximum number of variables that the error of an initialisation that does not converge names.
@@ -234,7 +233,7 @@ class _Starter:
         self._lifecycle.terminate()
 
     def _set_parameters(self) -> None:
-        set_strings(self._part.library, self._strings)
+        self._part.set_strings(self._strings)
         if not self._rows:
             return
         values = self._room.parameters[self._rows]

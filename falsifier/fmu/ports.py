@@ -116,6 +116,11 @@ def make_ports(
     )
 
 
+def bytes_per_value(major: int, code: str) -> int:
+    """Return the size of a value of a type in calls of this FMI version."""
+    return np.dtype(_STORED[major][code]).itemsize
+
+
 def fixed_elements(description: Description, inputs: Sequence[str], parameters: Sequence[str]) -> list[int]:
     """Return the positions of the parameters that are other elements of the inputs' arrays (FMI 3).
 
