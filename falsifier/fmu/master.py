@@ -92,7 +92,8 @@ class Master:
             name, outputs = self._network.stepped(origin), self._not_numbers(origin)
             raise SimulationError(f"{name}: {outputs} is nan at t = 0 s, in the initialisation", time=0.0)
         value = tables.signals[:, loops.VALUE]
-        change = np.abs(value - tables.signals[:, loops.TRIED])
+        with np.errstate(invalid="ignore"):  # an FMU may return infinite values
+            change = np.abs(value - tables.signals[:, loops.TRIED])
         moving = ~(change <= coupling.tolerance * np.maximum(1.0, np.abs(value)))
         raise SimulationError(self._not_converged(np.flatnonzero(moving).tolist(), change.tolist()), time=0.0)
 

@@ -46,10 +46,10 @@ class Ports:
         places: one row per variable: storage code, address of the value, sign (-1 for a negated alias), and
             1 for a Boolean.
         fixed: the same for elements that are fixed; see ``make_ports``.
-        limits: smallest and largest number of each variable's type, shape (n, 2); infinite for floating
-        point. memory: the arrays to which the addresses point; a reference keeps them alive. table: argument
-        of the compiled loops: address and number of calls, address and number of places. is_limited: whether
-        any of the variables has limits.
+        limits: smallest and largest number of each variable's type, shape (n, 2); infinite for reals.
+        memory: the arrays to which the addresses point; a reference keeps them alive.
+        table: argument of the compiled loops: address and number of calls, address and number of places.
+        is_limited: whether any of the variables has limits.
     """
 
     calls: Table

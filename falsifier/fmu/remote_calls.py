@@ -52,8 +52,8 @@ GET, SET, STEP_2, STEP_3, MODE, UPDATE, GET_STATE, SET_STATE, OTHER = range(9)
 # How often to look for a reply before sleeping, and how often between two moments in which others may have
 # the processor; some 0.1 ms if nobody else wants it.
 _LOOKS, _LOOKS_PER_YIELD = 40_000, 200
-# Lengths of a sleep in ns. They grow, so that an idle process hardly uses the processor; a reply is noticed
-# late by some 3 % of the time that it took.
+# Lengths of a sleep in ns. They grow, so that an idle process uses less than 1 % of a processor; a reply is
+# noticed late by some 3 % of the time that it took.
 _FIRST_NAP, _LONGEST_NAP = 50_000, 2_000_000
 _NO_HANG = 1  # WNOHANG
 _ERROR, _FATAL = 3, 4

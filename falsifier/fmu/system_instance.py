@@ -1,4 +1,4 @@
-"""All components of a system, loaded into one process: they start, step and start again together."""
+"""All components of a system, in one process or one each: they start, step and start again together."""
 
 import sys
 from collections.abc import Callable
