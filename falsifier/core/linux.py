@@ -14,6 +14,7 @@ import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from subprocess import PIPE, Popen
+from typing import NoReturn
 
 assert sys.platform != "win32"
 
@@ -154,6 +155,20 @@ def wait_for_any(descriptors: Iterable[int], seconds: float | None = None) -> No
 def end_by(number: int) -> None:
     """Send this process a signal."""
     os.kill(os.getpid(), number)
+
+
+def await_end(pid: int) -> int:
+    """Wait until a child ends; return how, as the system says it."""
+    return os.waitpid(pid, 0)[1]
+
+
+def end_like(status: int) -> NoReturn:
+    """End this process as another has ended; ``status``: see ``await_end``."""
+    if os.WIFSIGNALED(status):
+        with contextlib.suppress(OSError):  # that of SIGKILL cannot be changed
+            signal.signal(os.WTERMSIG(status), signal.SIG_DFL)
+        os.kill(os.getpid(), os.WTERMSIG(status))
+    os._exit(os.WEXITSTATUS(status))
 
 
 def children() -> list[int]:

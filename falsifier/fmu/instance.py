@@ -1,5 +1,6 @@
 """One loaded FMU: its library, its life cycle, and how it starts again."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -12,6 +13,7 @@ from falsifier.fmu.lifecycle import make_lifecycle
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import Stepper
+from falsifier.fmu.strings import set_strings
 
 
 class Instance(Protocol):
@@ -25,6 +27,11 @@ class Instance(Protocol):
     @property
     def is_taken(self) -> bool:
         """Whether there is a saved state to start from."""
+        ...
+
+    @property
+    def memory_elsewhere(self) -> int:
+        """Largest memory in KiB that other processes have used for it."""
         ...
 
     def prepare(self, plan: Plan, room: Room) -> None:
@@ -114,6 +121,15 @@ class FmuInstance:
         """See Instance."""
         return self._saved.is_taken
 
+    @property
+    def memory_elsewhere(self) -> int:
+        """See Instance."""
+        return 0
+
+    def set_strings(self, strings: Sequence[tuple[str, str]]) -> None:
+        """Set string variables before initialisation; see ``set_strings``."""
+        set_strings(self.library, strings)
+
     def prepare(self, plan: Plan, room: Room) -> None:
         """See Instance."""
         self._plan = plan
@@ -145,6 +161,9 @@ class FmuInstance:
     def renew(self) -> None:
         """See Instance."""
         self.library.renew()
+
+    def check(self) -> None:
+        """Nothing to do: if this FMU had crashed, this process would have."""
 
     def close(self) -> None:
         """See Instance."""

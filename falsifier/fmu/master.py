@@ -18,7 +18,6 @@ from falsifier.fmu.network import Member, Network
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.stepper import check_range, what_stopped
-from falsifier.fmu.strings import set_strings
 from falsifier.fmu.system_tables import SystemTables, steps_with_events
 
 # Maximum number of variables that the error of an initialisation that does not converge names.
@@ -94,7 +93,8 @@ class Master:
             name, outputs = self._network.stepped(origin), self._not_numbers(origin)
             raise SimulationError(f"{name}: {outputs} is nan at t = 0 s, in the initialisation", time=0.0)
         value = tables.signals[:, loops.VALUE]
-        change = np.abs(value - tables.signals[:, loops.TRIED])
+        with np.errstate(invalid="ignore"):  # an FMU may return infinite values
+            change = np.abs(value - tables.signals[:, loops.TRIED])
         moving = ~(change <= coupling.tolerance * np.maximum(1.0, np.abs(value)))
         raise SimulationError(self._not_converged(np.flatnonzero(moving).tolist(), change.tolist()), time=0.0)
 
@@ -235,7 +235,7 @@ class _Starter:
         self._lifecycle.terminate()
 
     def _set_parameters(self) -> None:
-        set_strings(self._part.library, self._strings)
+        self._part.set_strings(self._strings)
         if not self._rows:
             return
         values = self._room.parameters[self._rows]

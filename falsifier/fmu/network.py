@@ -11,6 +11,7 @@ from falsifier.fmu.description import Description
 Method = Literal["gauss-seidel", "jacobi"]
 Loops = Literal["refuse", "delay", "iterate"]
 Extrapolation = Literal["hold", "linear"]
+Isolation = Literal["together", "each"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,7 @@ class Coupling:
         tolerance: change, relative for values above 1, below which an initialisation or iteration has
             converged.
         max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
+        isolation: ``together``: all components run in one process; ``each``: each in one of its own.
     """
 
     method: Method = "gauss-seidel"
@@ -35,6 +37,7 @@ class Coupling:
     extrapolation: Extrapolation = "hold"
     tolerance: float = 1e-9
     max_rounds: int = 100
+    isolation: Isolation = "together"
 
 
 # Position of the system itself in a Place: an input of the whole, which feeds inputs of components.

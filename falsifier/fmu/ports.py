@@ -46,10 +46,10 @@ class Ports:
         places: one row per variable: storage code, address of the value, sign (-1 for a negated alias), and
             1 for a Boolean.
         fixed: the same for elements that are fixed; see ``make_ports``.
-        limits: smallest and largest number of each variable's type, shape (n, 2); infinite for floating
-        point. memory: the arrays to which the addresses point; a reference keeps them alive. table: argument
-        of the compiled loops: address and number of calls, address and number of places. is_limited: whether
-        any of the variables has limits.
+        limits: smallest and largest number of each variable's type, shape (n, 2); infinite for reals.
+        memory: the arrays to which the addresses point; a reference keeps them alive.
+        table: argument of the compiled loops: address and number of calls, address and number of places.
+        is_limited: whether any of the variables has limits.
     """
 
     calls: Table
@@ -114,6 +114,11 @@ def make_ports(
         table=(rows.ctypes.data, len(rows), places.ctypes.data, len(names)),
         is_limited=bool(np.isfinite(limits[: len(names)]).any()),
     )
+
+
+def bytes_per_value(major: int, code: str) -> int:
+    """Return the size of a value of a type in calls of this FMI version."""
+    return np.dtype(_STORED[major][code]).itemsize
 
 
 def fixed_elements(description: Description, inputs: Sequence[str], parameters: Sequence[str]) -> list[int]:

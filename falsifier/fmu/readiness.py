@@ -1,6 +1,7 @@
 """What a worker does before it simulates, however it was started."""
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from falsifier.fmu.worker_order import Order
 _MEMORY_SHARE = 0.8
 _COMPILING_STEPS = "compiling the loops that step FMUs, once per installation"
 _COMPILING_MASTER = "compiling the loop that steps systems of FMUs, once per installation"
+_COMPILING_CALLS = "compiling the calls of components in processes of their own, once per installation"
 _COMPILING = "compiling the model-exchange solver, once per installation; this takes half a minute or more"
 
 
@@ -37,6 +39,11 @@ class Loops:
             from falsifier.fmu import system_solver
 
             self._once("system solver", system_solver.warm_up, lambda: tell(_COMPILING))
+        is_each = order.network is not None and order.network.coupling.isolation == "each"
+        if sys.platform == "linux" and is_each:
+            from falsifier.fmu import remote_component
+
+            _load(lambda: remote_component.warm_up(members), lambda: tell(_COMPILING_CALLS))
 
     def _once(self, name: str, warm_up: Callable[[], None], tell: Callable[[], None]) -> None:
         if name not in self._loaded:

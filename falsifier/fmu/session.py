@@ -29,6 +29,11 @@ class Session:
         self._state: Literal["new", "broken", "finished"] = "new"
         self.reuse: Reuse = "instance"
 
+    @property
+    def memory_elsewhere(self) -> int:
+        """See Instance."""
+        return self._instance.memory_elsewhere
+
     def prepare(self, plan: Plan, room: Room) -> None:
         """Prepare for the simulations of a plan.
 

@@ -14,7 +14,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.fmu import archive, in_process
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
-from falsifier.fmu.network import Coupling, Extrapolation, Frame, Loops, Method, Network
+from falsifier.fmu.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
 from falsifier.fmu.plan import make_plan
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
 from falsifier.fmu.wiring import Connection, make_network
@@ -103,6 +103,8 @@ class System:
         object.__setattr__(self, "components", components)
         object.__setattr__(self, "connections", connections)
         _check_coupling(self.coupling)
+        if self.coupling.isolation == "each" and not self.isolate:
+            raise SpecError('coupling.isolation: "each" needs worker processes; leave out isolate=False')
         object.__setattr__(self, "key", _key(self))
         _network(self)
 
@@ -241,6 +243,7 @@ def _check_coupling(coupling: Coupling) -> None:
     one_of("coupling.method", coupling.method, get_args(Method))
     one_of("coupling.loops", coupling.loops, get_args(Loops))
     one_of("coupling.extrapolation", coupling.extrapolation, get_args(Extrapolation))
+    one_of("coupling.isolation", coupling.isolation, get_args(Isolation))
     positive("coupling.tolerance", coupling.tolerance)
     whole("coupling.max_rounds", coupling.max_rounds, least=1)
     if coupling.loops == "iterate" and coupling.method == "jacobi":

@@ -1,8 +1,11 @@
-"""All components of a system, loaded into one process: they start, step and start again together."""
+"""All components of a system, in one process or one each: they start, step and start again together."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
+from falsifier.errors import ModelError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import LogSink
@@ -37,13 +40,12 @@ class SystemInstance:
         self._network = network
         self._parts: list[FmuInstance] = []
         self._master: Master | None = None
+        make = _maker(network)
         try:
             for k, member in enumerate(network.members):
                 announce(network.order.index(k))
                 self._parts.append(
-                    FmuInstance(
-                        member.description, folder / member.folder, member.interface, log, logging=logging
-                    )
+                    make(member.description, folder / member.folder, member.interface, log, logging=logging)
                 )
         except BaseException:
             self.close()
@@ -59,6 +61,11 @@ class SystemInstance:
         """Whether all components have a saved state to start from."""
         return all(part.is_taken for part in self._parts)
 
+    @property
+    def memory_elsewhere(self) -> int:
+        """See Instance."""
+        return sum(part.memory_elsewhere for part in self._parts)
+
     def prepare(self, plan: Plan, room: Room) -> None:
         """See Instance."""
         if self._master is not None:
@@ -68,7 +75,11 @@ class SystemInstance:
     def simulate(self, deadline: float) -> None:
         """See Instance."""
         assert self._master is not None, "prepare must be called before simulate"
-        self._master.simulate(deadline)
+        try:
+            self._master.simulate(deadline)
+        finally:
+            for part in self._parts:
+                part.check()
 
     def reset(self) -> bool:
         """Reset all components; return False if one cannot."""
@@ -101,3 +112,16 @@ class SystemInstance:
         """See Instance."""
         for part in reversed(self._parts):
             part.close()
+
+
+def _maker(network: Network) -> Callable[..., FmuInstance]:
+    if network.coupling.isolation == "together":
+        return FmuInstance
+    if sys.platform != "linux":
+        raise ModelError(
+            f'{network.name}: components run in processes of their own (isolation = "each") on Linux only; '
+            'use isolation = "together"'
+        )
+    from falsifier.fmu.remote_component import RemoteComponent
+
+    return cast(Callable[..., FmuInstance], RemoteComponent)

@@ -85,6 +85,11 @@ class WineInstance:
         """See Instance."""
         return self._saved
 
+    @property
+    def memory_elsewhere(self) -> int:
+        """See Instance; unknown here."""
+        return 0
+
     def prepare(self, plan: Plan, room: Room) -> None:
         """See Instance."""
         self._room = room

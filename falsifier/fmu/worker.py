@@ -135,7 +135,8 @@ class _Worker:
         """Whether this process should be replaced: too many instances, or too much memory."""
         if self._instances >= _MAX_INSTANCES or self._reuse == "process":
             return True
-        size = operating_system.most_memory_used()
+        elsewhere = self._session.memory_elsewhere if self._session is not None else 0
+        size = operating_system.most_memory_used() + elsewhere
         self._first_size = self._first_size or (size if self._instances else 0)
         return bool(self._first_size) and size > self._first_size + _MAX_GROWTH_KIB
 

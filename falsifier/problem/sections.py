@@ -15,7 +15,7 @@ from pydantic import (
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
-from falsifier.fmu.network import Extrapolation, Loops, Method
+from falsifier.fmu.network import Extrapolation, Isolation, Loops, Method
 from falsifier.problem.templates import (
     TEMPLATES,
     Dwell,
@@ -184,6 +184,11 @@ class CouplingSection(Strict):
     )
     max_rounds: int = Field(
         100, ge=1, description="Maximum number of rounds of an initialisation, and of an iterated step."
+    )
+    isolation: Isolation = Field(
+        "together",
+        description="together: all components run in one process; each: each in a process of its own (Linux, "
+        "co-simulation), for libraries that cannot be loaded into one process.",
     )
 
 

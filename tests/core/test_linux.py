@@ -136,3 +136,19 @@ print(os.read(reading, 100).decode(), flush=True)
     assert not is_gone(pid)
     linux.end_marked("FALSIFIER_TEST_MARK", "this-one")
     wait_until(lambda: is_gone(pid))
+
+
+def test_a_process_ends_as_another_has_ended() -> None:
+    code = """
+from falsifier.core import linux, posix
+for number, signal in ((7, 0), (0, 9), (0, 11)):
+    pid = posix.fork()
+    if not pid:
+        os.kill(os.getpid(), signal) if signal else os._exit(number)
+    status = linux.await_end(pid)
+    pid = posix.fork()
+    if not pid:
+        linux.end_like(status)
+    print([os.WIFSIGNALED(s) and os.WTERMSIG(s) or os.WEXITSTATUS(s) for s in (status, linux.await_end(pid))])
+"""
+    assert in_child(code) == "[7, 7]\n[9, 9]\n[11, 11]\n"

@@ -14,7 +14,7 @@ SYSTEMS = {
     "core/windows_files.py",
 }
 # Used only where processes can be forked, or Wine can be installed.
-FORKING = {"fmu/forking.py", "fmu/nursery.py"}
+FORKING = {"fmu/forking.py", "fmu/nursery.py", "fmu/remote_component.py"}
 WINE = {"fmu/wine_process.py"}
 
 MODULES = {

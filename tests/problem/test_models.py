@@ -58,11 +58,12 @@ def test_coupling_and_conversions_reach_the_system(tmp_path: Path) -> None:
 [coupling]
 method = "jacobi"
 loops = "delay"
+isolation = "each"
 """
     )
     model = load_problem(write(tmp_path, text + REST)).model
     assert isinstance(model, System)
-    assert model.coupling == Coupling("jacobi", "delay")
+    assert model.coupling == Coupling("jacobi", "delay", isolation="each")
     link = model.network.links[1]
     assert (link.factor, link.offset, link.is_linear) == (2.0, 1.0, True)
     assert model.parts["pi"].step == 0.1
