@@ -47,10 +47,7 @@ class Loops:
 
     def _once(self, name: str, warm_up: Callable[[], None], tell: Callable[[], None]) -> None:
         if name not in self._loaded:
-            from falsifier.fmu.compiling import on_compilation
-
-            with on_compilation(tell):
-                warm_up()
+            _load(warm_up, tell)
             self._loaded.add(name)
 
 
@@ -58,6 +55,13 @@ def load_first(tell: Callable[[str], None]) -> None:
     """Load what every simulation needs; ``tell`` hears of a compilation before it starts."""
     load_binding()
     machine_code.load("co_simulation", lambda: tell(_COMPILING_STEPS))
+
+
+def _load(warm_up: Callable[[], None], tell: Callable[[], None]) -> None:
+    from falsifier.fmu.compiling import on_compilation
+
+    with on_compilation(tell):
+        warm_up()
 
 
 def settle_in(scratch: Path) -> None:

@@ -5,7 +5,7 @@ the loops of coupled_stepping.py, the box is the component's instance, and its f
 Each writes what it was called with to the box, counts up the requests, and waits until the other process has
 counted up the replies. Both wait awake for a short time and sleep then.
 
-As in stepping.py, functions of other modules are compiled into these: after changes there, delete
+Numba's cache of the functions with addresses does not notice changes in c_functions.py: after these, delete
 ``__pycache__``.
 """
 
@@ -17,24 +17,24 @@ import numpy as np
 from numba import cfunc, types
 from numba.extending import intrinsic
 
-from falsifier.fmu.library import TYPES
-from falsifier.fmu.ports import bytes_per_value
-from falsifier.fmu.stepping import (
-    _do_step_3,
-    _update_3,
-    _values_2,
-    _values_3,
+from falsifier.fmu.c_functions import (
     call_mode,
     call_signature,
-    compiled,
     do_step_2,
+    do_step_3,
     load_f8,
     load_i8,
     load_u1,
     store_f8,
     store_i8,
     store_u1,
+    update_3,
+    values_2,
+    values_3,
 )
+from falsifier.fmu.library import TYPES
+from falsifier.fmu.ports import bytes_per_value
+from falsifier.fmu.stepping import compiled
 
 # Words of a box: requests and replies so far, what to do, which function, how many references and values,
 # bytes per value, two times in s, the FMI status, and 16 bytes that FMI 3 writes to.
@@ -199,18 +199,18 @@ def _called(box, instance, version, what, function):  # type: ignore[no-untyped-
     start, step = load_f8(box + 8 * START), load_f8(box + 8 * STEP)
     if what in (GET, SET):
         if version == 3:
-            return _values_3(function, instance, data, count, values, size)
-        return _values_2(function, instance, data, count, values)
+            return values_3(function, instance, data, count, values, size)
+        return values_2(function, instance, data, count, values)
     if what == STEP_2:
         return do_step_2(function, instance, start, step, np.int32(1))
     if what == STEP_3:
-        return _do_step_3(
+        return do_step_3(
             function, instance, start, step, np.uint8(1), results, results + 1, results + 2, results + 8
         )
     if what == MODE:
         return call_mode(function, instance)
     if what == UPDATE:
-        return _update_3(
+        return update_3(
             function, instance, results, results + 1, results + 2, results + 3, results + 4, results + 8
         )
     if what == GET_STATE:
