@@ -91,7 +91,9 @@ def evolve(counter: Counter, seed: int) -> None:
     """Run scipy's differential evolution again and again, each time with another seed."""
     bounds = [(0.0, 1.0)] * counter.box.dimension
     while True:
-        differential_evolution(counter.robustness, bounds, rng=seed, maxiter=200, polish=False)
+        differential_evolution(
+            counter.robustness, bounds, seed=np.random.default_rng(seed), maxiter=200, polish=False
+        )
         seed += 1
 
 
