@@ -5,6 +5,7 @@ an exchange of single ones that starts from random corners. Each ends early if i
 requirement that none of them violates may still be violated somewhere: this is evidence, not a proof.
 
     python -m bench.fixed_space --simulations 100000
+    python -m bench.fixed_space --requirements NNb --optimisers cma --simulations 5000
 """
 
 import argparse
@@ -90,7 +91,9 @@ def evolve(counter: Counter, seed: int) -> None:
     """Run scipy's differential evolution again and again, each time with another seed."""
     bounds = [(0.0, 1.0)] * counter.box.dimension
     while True:
-        differential_evolution(counter.robustness, bounds, rng=seed, maxiter=200, polish=False)
+        differential_evolution(
+            counter.robustness, bounds, seed=np.random.default_rng(seed), maxiter=200, polish=False
+        )
         seed += 1
 
 
@@ -130,16 +133,17 @@ def main() -> None:
     parser.add_argument(
         "--requirements", nargs="+", choices=sorted(REQUIREMENTS), default=sorted(REQUIREMENTS)
     )
+    parser.add_argument("--optimisers", nargs="+", choices=list(METHODS), default=list(METHODS))
     parser.add_argument("--simulations", type=int, default=100_000, help="per requirement, by all optimisers")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     print("| requirement | optimiser | simulations | failed | lowest robustness |\n|---|---|---|---|---|")
     for name in options.requirements:
         problem = load_problem(REQUIREMENTS[name], parameterization="fixed")
-        for optimiser, method in METHODS.items():
-            counter = Counter(problem, options.simulations // len(METHODS))
+        for optimiser in options.optimisers:
+            counter = Counter(problem, options.simulations // len(options.optimisers))
             with suppress(Ended):
-                method(counter, options.seed)
+                METHODS[optimiser](counter, options.seed)
             cells = (name, optimiser, str(counter.used), str(counter.failed), f"{counter.lowest:.5f}")
             print(f"| {' | '.join(cells)} |", flush=True)
             if counter.lowest < 0.0 and counter.best is not None:
