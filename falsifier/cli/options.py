@@ -336,7 +336,8 @@ def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
     Raises:
         click.UsageError: naming the option.
     """
-    used = [ENGINES[engine or DEFAULT_ENGINE].uses_context for engine in engines]
+    found = (ENGINES.get(engine or DEFAULT_ENGINE) for engine in engines)
+    used = [engine is None or engine.uses_context for engine in found]  # unknown names are refused later
     if set(named) - {NOTHING} and used and not any(used):
         raise click.UsageError(
             "--context: applies to language models and to the engine surrogate; add --llm NAME, or drop it"

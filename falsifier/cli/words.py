@@ -108,8 +108,7 @@ def formalize(
         advice = advised_templates(sentence, subject_of(target).problem.info)
         say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(sentence, advice))
         return
-    is_written = choose is not None or name is not None or out is not None
-    if is_written or (_may_ask() and not as_json):  # before anything is paid for
+    if choose is not None or name is not None or out is not None:  # before anything is paid for
         subject = subject_of(target)
         with_requirement(subject, _file(subject, out), "true", name=name)
     from falsifier.search.formalize import formalize as ask
@@ -121,7 +120,7 @@ def formalize(
         say(json.dumps(formalized_json(found) | {"written": written and list(written)}, indent=2))
         return
     say(formalized_text(found))
-    if choose is None and _may_ask():
+    if choose is None and _may_ask() and _can_write(found.subject, out):
         choose = _asked(len(found.readings))
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
@@ -174,6 +173,14 @@ def _file(subject: Subject, out: Path | None) -> Path:
     if not is_same and file.exists():
         raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
     return file
+
+
+def _can_write(subject: Subject, out: Path | None) -> bool:
+    try:
+        _file(subject, out)
+    except SpecError:
+        return False
+    return True
 
 
 def _are(count: int) -> str:

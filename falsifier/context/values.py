@@ -91,7 +91,7 @@ class Named:
     checked: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.files) or self.fmu
+        return bool(self.files) or self.fmu or bool(self.checked)
 
     @classmethod
     def of(cls, names: Iterable[str]) -> Self:
