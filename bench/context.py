@@ -1,8 +1,8 @@
 """How many simulations context saves, how long reading takes, and how many tokens it costs.
 
-HeaterLimpHome shows its fault only if limp-home mode begins again 1.5 s to 4 s after it ended. A scripted
-language model aims at these thresholds if its prompt tells them; the surrogate has none to aim at. The
-Simulink files are the equivalent model of the tests.
+HeaterLimpHome shows its fault only if limp-home mode begins again within 1.5 s after it ended. A scripted
+language model aims at these thresholds if its prompt tells them; the surrogate tries the levels that the
+files give. The Simulink files are the equivalent model of the tests.
 
     nice -n 15 python -m bench.context
     nice -n 15 python -m bench.context --seeds 0-4
@@ -10,7 +10,6 @@ Simulink files are the equivalent model of the tests.
 
 import argparse
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
@@ -29,7 +28,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from tests.fixtures import limp_home, simulink
 
-BUDGET = 300
+BUDGET = 1000
 LINES = 10_000
 
 
@@ -40,30 +39,39 @@ def main() -> None:
     first, last = map(int, parser.parse_args().seeds.split("-"))
     print("| search | context | falsified | simulations: mean | median | largest | tokens of the prompt |")
     print("|---|---|---|---|---|---|---|")
-    print(_surrogate(range(first, last + 1)))
     with TemporaryDirectory() as folder:
-        for row in _scripted(Path(folder)):
+        files = (None, *_files(Path(folder)))
+        for file in files:
+            print(_surrogate(range(first, last + 1), file), flush=True)
+        for row in map(_scripted, files):
             print(row, flush=True)
         print(f"\n{_reading(Path(folder))}")
 
 
-def _surrogate(seeds: range) -> str:
-    results = [falsify("HeaterLimpHome", "surrogate", budget=BUDGET, seed=seed) for seed in seeds]
-    return _row("surrogate", "none", results, "")
-
-
-def _scripted(folder: Path) -> Iterator[str]:
+def _files(folder: Path) -> tuple[Path, ...]:
     slx, mdl, mo = folder / "limphome.slx", folder / "limphome.mdl", folder / "HeaterLimpHome.mo"
     simulink.write_slx(slx)
     mdl.write_text(simulink.MDL)
     mo.write_text(limp_home.SOURCE.read_text())
-    for context in ((), (slx,), (mdl,), (mo,)):
-        source = ProblemSource(target="HeaterLimpHome", context=tuple(map(str, context)))
-        # Without thresholds it repeats itself, so one answer says all.
-        budget = BUDGET if context else 1
-        result = falsify(source, llm=ScriptedChat(limp_home.reads_thresholds), budget=budget)
-        sent = sum(count_tokens(m.content) for m in preview(load_source(source)))
-        yield _row("scripted LLM", context[0].name if context else "none", [result], str(sent))
+    return slx, mdl, mo
+
+
+def _source(file: Path | None) -> ProblemSource:
+    return ProblemSource(target="HeaterLimpHome", context=(str(file),) if file else ())
+
+
+def _surrogate(seeds: range, file: Path | None) -> str:
+    name = file.name if file else "none"
+    results = [falsify(_source(file), "surrogate", budget=BUDGET, seed=seed) for seed in seeds]
+    return _row("surrogate with context" if file else "surrogate", name, results, "")
+
+
+def _scripted(file: Path | None) -> str:
+    # Without thresholds it repeats itself, so one answer says all.
+    budget = BUDGET if file else 1
+    result = falsify(_source(file), llm=ScriptedChat(limp_home.reads_thresholds), budget=budget)
+    sent = sum(count_tokens(m.content) for m in preview(load_source(_source(file))))
+    return _row("scripted LLM", file.name if file else "none", [result], str(sent))
 
 
 def _row(search: str, context: str, results: list[Result], tokens: str) -> str:

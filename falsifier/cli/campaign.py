@@ -3,6 +3,7 @@
 import shlex
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import product
@@ -33,6 +34,8 @@ from falsifier.cli.options import (
     asking,
     asking_options,
     budget_option,
+    check_context,
+    context_option,
     directory_argument,
     effort_option,
     engine_option,
@@ -94,6 +97,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
 @effort_option
 @variant_option(multiple=True)
 @asking_options
+@context_option
 @click.option(
     "--runs",
     type=click.IntRange(1),
@@ -136,6 +140,7 @@ def bench(
     llms: tuple[str, ...],
     effort: str | None,
     variants: tuple[str, ...],
+    context: tuple[str, ...],
     runs: int,
     seed: int,
     budget: int | None,
@@ -164,6 +169,8 @@ def bench(
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
+    check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
+    problems = _with_context(problems, context)
     if not llms:
         refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     if not parameterization:
@@ -263,6 +270,10 @@ def _agree(request: CampaignRequest, *, yes: bool) -> None:
     warn(most.text)
     if not yes and most.cost != 0 and sys.stdin.isatty():
         click.confirm("Start?", abort=True, err=True)
+
+
+def _with_context(problems: Sequence[ProblemSource], context: tuple[str, ...]) -> list[ProblemSource]:
+    return [source.model_copy(update={"context": (*source.context, *context)}) for source in problems]
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:

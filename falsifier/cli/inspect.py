@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import json_option, out_option, profile_option
+from falsifier.cli.options import json_option, out_option, profile_option, template_option, with_template
 from falsifier.cli.output import say
 from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.core.files import bundled
@@ -21,9 +21,10 @@ from falsifier.errors import SpecError
 from falsifier.fmu import is_package, read_package
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
-from falsifier.problem.loading import find_spec, load_problems
+from falsifier.problem.loading import find_spec, load_problems, load_source
 from falsifier.problem.models import is_system, make_system
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
 from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
@@ -190,9 +191,16 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
 @click.command()
 @click.argument("target")
 @profile_option
-def check(*, target: str, profile: str | None) -> None:
-    """Check the keys, signals, ranges and formulas of a spec file without simulating."""
-    problems = load_problems(target, profile=profile)
+@template_option
+def check(*, target: str, profile: str | None, template: str | None) -> None:
+    """Check the keys, signals, ranges and formulas of a spec file without simulating.
+
+    With --template, only the requirement that the template makes of TARGET, a spec or FMU.
+    """
+    if template is None:
+        problems = load_problems(target, profile=profile)
+    else:
+        problems = [load_source(with_template(ProblemSource(target=target, profile=profile), template))]
     for problem in problems:
         say(_problem_line(problem))
     for note in dict.fromkeys(note for problem in problems for note in problem.notes):

@@ -6,7 +6,7 @@ or add a remark, a function makes the option.
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 import click
 
+from falsifier.context.values import NOTHING
 from falsifier.core.secrets import is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.messages import ReplyKind
@@ -62,6 +63,16 @@ def parameterization_option(*, multiple: bool = False, suite: Parameterization =
     )
 
 
+def template_option(command: Function) -> Function:
+    return click.option(
+        "--template",
+        multiple=True,
+        callback=_only_one,
+        metavar="'NAME KEY=VALUE ...'",
+        help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
+    )(command)
+
+
 def problem_options(command: Function) -> Function:
     """Add the target and everything that changes a problem."""
     return _add(
@@ -74,13 +85,7 @@ def problem_options(command: Function) -> Function:
             metavar="FORMULA",
             help="Formula to use instead of the spec's requirement.",
         ),
-        click.option(
-            "--template",
-            multiple=True,
-            callback=_only_one,
-            metavar="'NAME KEY=VALUE ...'",
-            help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
-        ),
+        template_option,
         profile_option,
         parameterization_option(),
         click.option(
@@ -146,10 +151,15 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     }
     source = ProblemSource(**stated, changes=changes, context=context)
     template = options.pop("template")
+    if template is not None and source.stl is not None:
+        raise click.UsageError("--stl and --template both state the requirement; drop one of them")
+    return with_template(source, template)
+
+
+def with_template(source: ProblemSource, template: str | None) -> ProblemSource:
+    """Return a source with the formula of ``--template``, if that is given."""
     if template is None:
         return source
-    if source.stl is not None:
-        raise click.UsageError("--stl and --template both state the requirement; drop one of them")
     from falsifier.problem.template_option import formula_of_template
 
     return source.model_copy(update={"stl": formula_of_template(source, template)})
@@ -314,6 +324,24 @@ def refuse_limits_without_llm(*, max_tokens: int | None, max_cost: float | None)
         click.UsageError: naming the options.
     """
     _refuse_without_llm({"max_tokens": max_tokens, "max_cost": max_cost})
+
+
+def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
+    """Refuse context that nothing reads.
+
+    Args:
+        named: values of ``--context``.
+        engines: engines without a language model, None for the default one; empty if one is asked.
+
+    Raises:
+        click.UsageError: naming the option.
+    """
+    found = (ENGINES.get(engine or DEFAULT_ENGINE) for engine in engines)
+    used = [engine is None or engine.uses_context for engine in found]  # unknown names are refused later
+    if set(named) - {NOTHING} and used and not any(used):
+        raise click.UsageError(
+            "--context: applies to language models and to the engine surrogate; add --llm NAME, or drop it"
+        )
 
 
 def _refuse_without_llm(given: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ from falsifier.cli.campaign import resume_campaign
 from falsifier.cli.files import write_counterexample
 from falsifier.cli.options import (
     budget_option,
+    check_context,
     context_option,
     directory_argument,
     engine_option,
@@ -125,8 +126,7 @@ def run(
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     source, llm = problem_source(options), llm_settings(options)
-    if source.context and llm is None:
-        raise click.UsageError("--context: applies to language models only; add --llm NAME, or drop it")
+    check_context(source.context, [engine] if llm is None else [])
     logs = [FmuLog(fmu_log)] if fmu_log else []
     if fmu_log:
         changes = source.changes.model_copy(update={"logging": True})

@@ -16,12 +16,15 @@ from falsifier.cli.options import (
     llm_option,
     out_option,
     profile_option,
+    template_option,
+    with_template,
 )
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
+from falsifier.problem.source import ProblemSource
 from falsifier.problem.subject import Subject, subject_of, with_requirement
 from falsifier.search.lint import SIMULATIONS, LintFinding
 from falsifier.search.lint import lint as find
@@ -40,14 +43,16 @@ if TYPE_CHECKING:
     show_default=True,
     help="Simulations that measure whether inputs move a requirement; 0: only what the FMU declares.",
 )
+@template_option
 @json_option
-def lint(*, target: str, profile: str | None, simulations: int, as_json: bool) -> None:
+def lint(*, target: str, profile: str | None, simulations: int, template: str | None, as_json: bool) -> None:
     """Find requirements that say nothing: nothing moves them, or they cannot fail or hold.
 
     Also windows and parts that do not matter, units that do not fit, and requirements that repeat others. The
-    exit code is 1 if something was found.
+    exit code is 1 if something was found. With --template, only the requirement that the template makes.
     """
-    findings = find(target, profile=profile, simulations=simulations)
+    source = with_template(ProblemSource(target=target, profile=profile), template)
+    findings = find(source, simulations=simulations)
     code = 1 if findings else 0
     if as_json:
         conclude(json.dumps([finding.as_json() for finding in findings], indent=2), code)
@@ -101,7 +106,7 @@ def formalize(
         from falsifier.problem.template_advice import advised_templates
 
         advice = advised_templates(sentence, subject_of(target).problem.info)
-        say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(advice))
+        say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(sentence, advice))
         return
     if choose is not None or name is not None or out is not None:  # before anything is paid for
         subject = subject_of(target)
@@ -115,7 +120,7 @@ def formalize(
         say(json.dumps(formalized_json(found) | {"written": written and list(written)}, indent=2))
         return
     say(formalized_text(found))
-    if choose is None and _may_ask():
+    if choose is None and _may_ask() and _can_write(found.subject, out):
         choose = _asked(len(found.readings))
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
@@ -159,10 +164,23 @@ def _file(subject: Subject, out: Path | None) -> Path:
     if out is None and subject.spec is None:
         raise SpecError("a bundled spec stays as it is: give another file with --out")
     file = out or subject.spec or Path()
-    is_same = subject.spec is not None and file.resolve() == subject.spec.resolve()
+    if out is None and subject.is_new and file.exists():
+        raise SpecError(
+            f"{file} belongs to this FMU: name it in place of the FMU, so that the choice is added, or "
+            "write to another file with --out"
+        )
+    is_same = not subject.is_new and subject.spec is not None and file.resolve() == subject.spec.resolve()
     if not is_same and file.exists():
         raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
     return file
+
+
+def _can_write(subject: Subject, out: Path | None) -> bool:
+    try:
+        _file(subject, out)
+    except SpecError:
+        return False
+    return True
 
 
 def _are(count: int) -> str:

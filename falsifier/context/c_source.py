@@ -11,6 +11,10 @@ from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
 _MAX_DEPTH = 200
+# A type and a name, with or without a value.
+_DECLARED = re.compile(
+    r"(?!return\b|goto\b)(?:(?:const|static|volatile|unsigned)\s+)*\w+\s+\**[A-Za-z_]\w*\s*[=;]"
+)
 _COMMENT = re.compile(r"//.*|/\*.*?\*/")
 _LISTED_KEYWORDS = """
     if else for while do switch case default break continue return goto sizeof struct union enum
@@ -63,6 +67,12 @@ class CSource:
     def names(self) -> frozenset[str]:
         """All names that something sets."""
         return frozenset(name for s in simple(self.statements) for name in s.sets)
+
+    @property
+    def own(self) -> frozenset[str]:
+        """Variables that functions declare for themselves, except copies of others of the same name."""
+        declared = (s for f in self.functions for s in simple(f.statements) if _DECLARED.match(s.text))
+        return frozenset(name for s in declared for name in s.sets if "=" not in s.text or name not in s.uses)
 
     @property
     def constants(self) -> Mapping[str, str]:

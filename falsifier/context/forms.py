@@ -3,12 +3,14 @@
 import json
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from pathlib import PurePosixPath
 
-from falsifier.context.c_source import c_conditions, c_slice, c_text, read_c
+from falsifier.context.c_source import CSource, c_conditions, c_slice, c_text, read_c
+from falsifier.context.levels import Definitions
 from falsifier.context.modelica import (
+    ModelicaClass,
     class_for,
     class_text,
     conditions,
@@ -19,9 +21,11 @@ from falsifier.context.modelica import (
     with_bases,
 )
 from falsifier.context.simulink import Diagram, names_text, structure_text
-from falsifier.context.simulink.conditions import comparisons, constants
+from falsifier.context.simulink.conditions import chart_names, comparisons, constants
+from falsifier.context.simulink.definitions import definitions
 from falsifier.context.simulink.upstream import upstream
-from falsifier.context.thresholds import Threshold, thresholds
+from falsifier.context.statements import Slice, Statement, assignments
+from falsifier.context.thresholds import Threshold, thresholds, within
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
@@ -32,6 +36,7 @@ _SKIPPED_TAGS = ("script", "style", "head")
 _BLOCK_TAGS = ("p", "br", "li", "tr", "div", "h1", "h2", "h3", "h4", "h5", "h6", "table", "pre")
 _HEADING = re.compile(r"(#{1,6}\s|=+\s|\d+(\.\d+)*\s+[A-Z])")
 _SHOWN_NAMES = 60
+_LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,18 +60,20 @@ class Readable:
         forms: ways to tell it, the fullest first; the last one is always short.
         found: thresholds in what the requirement depends on.
         modes: names of signals with what the file says of their values.
+        known: what it says of the values of variables.
     """
 
     forms: tuple[Form, ...]
     found: tuple[Threshold, ...] = ()
     modes: tuple[tuple[str, str], ...] = ()
+    known: Definitions = field(default_factory=Definitions)
 
 
 def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     """Return the forms of a Simulink file: its structure before a requirement's signals, or names."""
     only = upstream(diagram, seeds)
     found = [
-        threshold
+        within(threshold, chart_names(diagram, place))
         for text, place in comparisons(diagram, only)
         for threshold in thresholds([(text, 0)], constants(diagram, place), f"{diagram.name}/{place}")
     ]
@@ -74,13 +81,19 @@ def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     forms = (
         Form(whole, lambda: structure_text(diagram, only)),
         Form("names only", lambda: names_text(diagram)),
-        Form("name only", lambda: diagram.name),
+        Form("name only", lambda: _short(diagram.name)),
     )
-    return Readable(forms, tuple(found), tuple(_modes(diagram)))
+    return Readable(forms, tuple(found), tuple(_modes(diagram)), Definitions(definitions(diagram)))
 
 
 def of_source(
-    text: str, shown: str, seeds: Collection[str], signals: Collection[str], *, is_named: bool = True
+    text: str,
+    shown: str,
+    seeds: Collection[str],
+    signals: Collection[str],
+    *,
+    is_named: bool = True,
+    library: Sequence[ModelicaClass] = (),
 ) -> Readable:
     """Return the forms of a text file, by the ending of its name.
 
@@ -90,13 +103,14 @@ def of_source(
         seeds: the requirement's signals.
         signals: all signals of the model.
         is_named: whether the user named this file; others are told only as far as they concern the signals.
+        library: classes of all Modelica files that were named, which a class in this one may extend or use.
 
     A source that is not understood is told as text, and its form says so.
     """
     suffix = PurePosixPath(shown).suffix.lower()
     try:
         if suffix in MODELICA_SUFFIXES:
-            return _of_modelica(text, shown, seeds, signals)
+            return _of_modelica(text, shown, seeds, signals, library)
         if suffix in C_SUFFIXES:
             return _of_c(text, shown, seeds, is_named=is_named)
     except SpecError as error:
@@ -109,30 +123,43 @@ def of_source(
     return _of_document(text, signals)
 
 
-def _of_modelica(text: str, shown: str, seeds: Collection[str], signals: Collection[str]) -> Readable:
-    classes = read_modelica(text, shown)
-    chosen = class_for(classes, _roots((*seeds, *signals)))
-    if chosen is None:
+def _of_modelica(
+    text: str,
+    shown: str,
+    seeds: Collection[str],
+    signals: Collection[str],
+    library: Sequence[ModelicaClass],
+) -> Readable:
+    own = read_modelica(text, shown)
+    classes = (*library, *own)  # of the same name, those of the file itself count
+    found = class_for((with_bases(each, classes) for each in own), _roots((*seeds, *signals)))
+    if found is None:
         return _not_understood(text, "no class declares a signal of the model", signals)
-    found = with_bases(chosen, classes)
     roots = _roots(seeds) & found.names
     kept = slice_of(found, roots) if roots else None
     others = used_classes(found, kept, classes)
     changed = modified_values(text, shown)
     limits = list(thresholds(conditions(found, kept), _possible(found.constants, changed), shown))
-    for other in others:
-        limits += thresholds(conditions(other, None), _possible(other.constants, changed), shown)
+    for other in others:  # its variables are not the signals of the same name
+        inner = thresholds(conditions(other, None), _possible(other.constants, changed), shown)
+        limits += [within(threshold, dict.fromkeys(threshold.names, "")) for threshold in inner]
     of_main = class_text(found, kept)
     stated = {n: v for n, v in found.constants.items() if kept is None or n in kept.names}
-    form = "what the requirement depends on" if roots else f"class {chosen.name}"
+    form = "what the requirement depends on" if roots else f"class {found.name}"
     forms = (
         Form(form, lambda: "\n".join([of_main, *(class_text(other, None) for other in others)])),
         Form(f"{form}, without other classes", lambda: of_main),
         Form("parameters and comparisons", lambda: _parameters(stated, limits)),
         Form("comparisons", lambda: _parameters({}, limits)),
-        Form("name only", lambda: f"{found.kind} {found.name}"),
+        Form("name only", lambda: _short(f"{found.kind} {found.name}")),
     )
-    return Readable(forms, tuple(limits))
+    known = _known(found.statements)
+    declared = {d.name: d.value for d in found.declarations if d.value and d.name not in found.constants}
+    return Readable(forms, tuple(limits), known=replace(known, equal={**declared, **known.equal}))
+
+
+def _known(statements: Collection[Statement]) -> Definitions:
+    return Definitions(*assignments(statements))
 
 
 def _possible(constants: Mapping[str, str], changed: Mapping[str, Sequence[str]]) -> dict[str, str]:
@@ -150,15 +177,16 @@ def _of_c(text: str, shown: str, seeds: Collection[str], *, is_named: bool) -> R
     roots = {name.rpartition(".")[2] for name in seeds} & found.names
     if not roots:
         functions = [f.head for f in found.functions]
-        limits = list(thresholds(c_conditions(found, None), found.constants, shown))
+        limits = _c_limits(found, None, shown)
         whole = (
             Form("whole, since no function sets a signal of the requirement", lambda: c_text(found, None)),
             Form("functions", lambda: "\n".join(functions[:_SHOWN_NAMES])),
             Form("size only", lambda: counted(len(functions), "function")),
         )
-        return Readable(whole, tuple(limits)) if is_named else Readable(whole[2:])
+        known = _known(found.statements)
+        return Readable(whole, tuple(limits), known=known) if is_named else Readable(whole[2:])
     kept = c_slice(found, roots)
-    limits = list(thresholds(c_conditions(found, kept), found.constants, shown))
+    limits = _c_limits(found, kept, shown)
     used = {name: value for name, value in found.constants.items() if name in kept.names}
     forms = (
         Form("what the requirement depends on", lambda: c_text(found, kept)),
@@ -166,7 +194,16 @@ def _of_c(text: str, shown: str, seeds: Collection[str], *, is_named: bool) -> R
         Form("comparisons", lambda: _parameters({}, limits)),
         Form("size only", lambda: counted(len(found.functions), "function")),
     )
-    return Readable(forms, tuple(limits))
+    return Readable(forms, tuple(limits), known=_known(found.statements))
+
+
+def _c_limits(found: CSource, kept: Slice | None, shown: str) -> list[Threshold]:
+    own = found.own
+    limits = thresholds(c_conditions(found, kept), found.constants, shown)
+    return [
+        within(limit, {n: "" for n in limit.names & own if not re.search(rf"(->|\.)\s*{n}\b", limit.text)})
+        for limit in limits
+    ]
 
 
 def _of_document(text: str, signals: Collection[str]) -> Readable:
@@ -204,6 +241,10 @@ def _not_understood(text: str, why: str, signals: Collection[str]) -> Readable:
     return Readable(tuple(Form(f"{form.name}; {why}", form.text) for form in inner.forms))
 
 
+def _short(name: str) -> str:
+    return name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}... ({len(name):,} characters)"
+
+
 def _parameters(values: Mapping[str, str], limits: Sequence[Threshold]) -> str:
     stated = [f"{name} = {value}" for name, value in values.items()]
     return "\n".join([*stated, *(f"{t.text}  [{t.place}]" for t in limits)])
@@ -227,7 +268,7 @@ def _modes(diagram: Diagram) -> Iterator[tuple[str, str]]:
         for data in chart.data:
             if data.scope == "output" and states:
                 more = f", ... ({len(states)})" if len(states) > _SHOWN_NAMES else ""
-                listed = ", ".join(states[:_SHOWN_NAMES])
+                listed = ", ".join(map(_short, states[:_SHOWN_NAMES]))
                 yield data.name, f"set by the chart {chart.name} with the states {listed}{more}"
 
 

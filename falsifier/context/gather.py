@@ -1,19 +1,22 @@
 """Reads what a user named as context, refuses secrets, and tells as much of each file as fits."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 
 from falsifier.context.decoding import text_of
 from falsifier.context.fmu_files import NAME_THEM, inside
-from falsifier.context.forms import Form, Readable, of_diagram, of_source
+from falsifier.context.forms import MODELICA_SUFFIXES, Form, Readable, of_diagram, of_source
+from falsifier.context.levels import levels_of
+from falsifier.context.modelica import ModelicaClass, read_modelica
 from falsifier.context.sentry import Sentry
 from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.context.simulink import read_diagram
 from falsifier.context.simulink.parts import read_parts
 from falsifier.context.thresholds import Threshold
-from falsifier.context.values import Compared, Context, Excerpt
+from falsifier.context.values import Compared, Context, Excerpt, Level
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
@@ -21,7 +24,7 @@ from falsifier.errors import SpecError
 MAX_CHARACTERS = 12_000
 MAX_TOTAL = 20_000
 _MAX_BYTES = 32 << 20
-_MAX_COMPARISONS = 60
+_MAX_COMPARISONS, _MAX_COMPARED = 60, 6_000  # number, and characters of all
 _LEAVE_OUT = "remove it, or leave the file out"
 
 
@@ -42,7 +45,13 @@ class _Wanted:
 
     seeds: Collection[str]
     signals: Collection[str]
-    sentry: Sentry
+    sentry: Sentry | None
+    library: tuple[ModelicaClass, ...] = ()
+
+    def look(self, text: str, shown: str, file: str, otherwise: str) -> None:
+        """Refuse a text that looks like a secret, if it is to be told."""
+        if self.sentry is not None:
+            self.sentry.look(text, shown, file, otherwise)
 
 
 def gather(
@@ -52,6 +61,8 @@ def gather(
     seeds: Collection[str],
     signals: Collection[str],
     checked: Collection[str] = (),
+    ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    is_told: bool = True,
 ) -> Context:
     """Return what files and the inside of FMUs say of a model; nothing else is opened.
 
@@ -61,14 +72,18 @@ def gather(
         seeds: the requirement's signals: sources are cut to what they depend on.
         signals: all signals that the language model is told.
         checked: files with a line that looks like a secret and is none, by the names that messages give them.
+        ranges: bounds of the inputs and parameters whose levels are wanted.
+        is_told: whether anything is sent. If not, nothing is refused as a secret, and only levels are
+            returned.
 
     Raises:
         SpecError: naming the file that is missing, damaged or binary, the line that looks like a secret, or a
             checked file that is not told.
         ModelError: if an archive is damaged or dangerous.
     """
-    wanted = _Wanted(seeds, signals, Sentry(checked))
-    sources = [_read(Path(name), name, wanted) for name in dict.fromkeys(files)]
+    named = tuple(dict.fromkeys(files))
+    wanted = _Wanted(seeds, signals, Sentry(checked) if is_told else None, tuple(_library(named)))
+    sources = [_read(Path(name), name, wanted) for name in named]
     left_out = []
     for fmu in fmus:
         for name, content in inside(fmu):
@@ -77,7 +92,10 @@ def gather(
                 left_out.append(f"context {fmu.name}: {name} is left out, because it is not text")
             elif len(found.readable.forms) > 1:  # otherwise it says nothing about the signals
                 sources.append(found)
-    chosen, compared = _fitting(sources), tuple(_compared(sources, signals))
+    if wanted.sentry is None:
+        return Context(levels=_levels(sources, ranges))
+    compared = tuple(_limited(_compared(sources, signals)))
+    chosen = _fitting(sources, MAX_TOTAL - sum(_size(each) for each in compared))
     for source, (_, text) in zip(sources, chosen, strict=True):
         _look_again(source, text, wanted.sentry)
     wanted.sentry.refuse_unused()
@@ -87,8 +105,25 @@ def gather(
             for s, (i, text) in zip(sources, chosen, strict=True)
         ),
         compared,
+        _levels(sources, ranges),
         (*left_out, *wanted.sentry.notes),
     )
+
+
+def _levels(sources: Iterable[_Source], ranges: Mapping[str, tuple[float, float]]) -> tuple[Level, ...]:
+    found = (levels_of(s.readable.found, s.readable.known, ranges) for s in sources)
+    return tuple(dict.fromkeys(level for each in found for level in each))
+
+
+def _library(names: Sequence[str]) -> Iterator[ModelicaClass]:
+    """Return the classes of several Modelica files; what is wrong with one is said when it is read."""
+    paths = [Path(name) for name in names if Path(name).suffix.lower() in MODELICA_SUFFIXES]
+    for path in paths if len(paths) > 1 else ():
+        try:
+            if path.is_file() and path.stat().st_size <= _MAX_BYTES:
+                yield from read_modelica(text_of(path.read_bytes()) or "", path.name)
+        except (OSError, SpecError):
+            continue
 
 
 def _look_again(source: _Source, text: str, sentry: Sentry) -> None:
@@ -110,12 +145,11 @@ def _read(path: Path, name: str, wanted: _Wanted) -> _Source:
         content = path.read_bytes()
     except OSError as error:
         raise SpecError(f"context {name}: cannot be read ({error.strerror or error})") from None
-    sentry = wanted.sentry
     if path.suffix.lower() in SIMULINK:
         parts = read_parts(path) if path.suffix.lower() == ".slx" else {"": content}
         for part, packed in parts.items():
             shown = f"{name}: {part}" if part else name
-            sentry.look(packed.decode("utf-8", "replace"), shown, name, _LEAVE_OUT)
+            wanted.look(packed.decode("utf-8", "replace"), shown, name, _LEAVE_OUT)
         readable = of_diagram(read_diagram(path), wanted.seeds)
     else:
         text = text_of(content)
@@ -124,9 +158,9 @@ def _read(path: Path, name: str, wanted: _Wanted) -> _Source:
                 f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
                 "UTF-8, or leave it out"
             )
-        sentry.look(text, name, name, _LEAVE_OUT)
+        wanted.look(text, name, name, _LEAVE_OUT)
         # Only the name is told: folders often have names of people and customers.
-        readable = of_source(text, path.name, wanted.seeds, wanted.signals)
+        readable = of_source(text, path.name, wanted.seeds, wanted.signals, library=wanted.library)
     return _Source(name, path.name, sha256(content).hexdigest(), readable)
 
 
@@ -135,19 +169,37 @@ def _of_fmu(content: bytes, name: str, wanted: _Wanted) -> _Source | None:
     text = text_of(content)
     if text is None:
         return None
-    wanted.sentry.look(text, name, name, NAME_THEM)
+    wanted.look(text, name, name, NAME_THEM)
     readable = of_source(text, name, wanted.seeds, wanted.signals, is_named=False)
     return _Source(name, name, sha256(content).hexdigest(), readable, NAME_THEM)
 
 
-def _fitting(sources: list[_Source]) -> list[tuple[int, str]]:
-    """Return number and text of each file's fullest form so that each and all together fit."""
+def _size(compared: Compared) -> int:
+    return len(compared.text) + len(compared.place)
+
+
+def _limited(compared: Iterable[Compared]) -> Iterator[Compared]:
+    """Return as many comparisons as fit."""
+    left = _MAX_COMPARED
+    for each in compared:
+        left -= _size(each)
+        if left >= 0:
+            yield each
+
+
+def _fitting(sources: list[_Source], room: int) -> list[tuple[int, str]]:
+    """Return number and text of each file's fullest form so that each and all together fit.
+
+    The last form of each file is some words long, so that it fits in any case.
+    """
     chosen = []
     for source in sources:
         forms = source.readable.forms
         texts = ((i, form.text()) for i, form in enumerate(forms))
-        chosen.append(next((i, t) for i, t in texts if len(t) <= MAX_CHARACTERS or i == len(forms) - 1))
-    while sum(len(text) for _, text in chosen) > MAX_TOTAL:
+        last = len(forms) - 1
+        chosen.append(next((i, t) for i, t in texts if 0 < len(t) <= MAX_CHARACTERS or i == last))
+    around = sum(len(s.name) + max(len(f.name) for f in s.readable.forms) for s in sources)
+    while sum(len(text) for _, text in chosen) + around > room:
         shrinkable = [k for k, (i, _) in enumerate(chosen) if i + 1 < len(sources[k].readable.forms)]
         if not shrinkable:
             raise SpecError(

@@ -3,11 +3,14 @@
 The rule is written down in ``design/context.md``.
 """
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 _INDENT = "  "
 _LEFT_OUT = "..."
+# The name before the sign of an assignment.
+_TARGET = re.compile(r"(\w+|'[^']*')\s*:?\s*$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +112,26 @@ def sliced(
                 kept.add(statement)
                 queue += statement.names | conditions
     return Slice(frozenset(wanted), frozenset(kept))
+
+
+def assignments(
+    statements: Iterable[Statement],
+) -> tuple[dict[str, str], dict[str, frozenset[str]]]:
+    """Return what variables are equal to at all times, and what each depends on in one step.
+
+    A variable with several statements, or one under a condition, equals no single expression.
+    """
+    equal: dict[str, list[str]] = {}
+    used: dict[str, frozenset[str]] = {}
+    for outer in statements:
+        for statement, _ in _flat(outer, frozenset()):
+            left, _, right = statement.text.rstrip("; ").partition("=")
+            target = _TARGET.search(left)
+            for name in statement.sets:
+                used[name] = used.get(name, frozenset()) | statement.uses
+                is_plain = not outer.branches and target is not None and target[1] == name
+                equal.setdefault(name, []).append(right.strip() if is_plain else "")
+    return {name: texts[0] for name, texts in equal.items() if len(texts) == 1 and texts[0]}, used
 
 
 def rendered(statements: Sequence[Statement], kept: Collection[Statement], depth: int = 0) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from falsifier.context.tokens import Token, tokens_of, written
 
@@ -24,13 +24,18 @@ class Threshold:
     Attributes:
         names: variables in it that are not constants.
         text: the comparison as written, with the values of named constants: ``u > limit (limit = 9.5)``.
-        values: numbers in it and values of its constants.
+        left: what stands before the sign, as written.
+        right: what stands behind it.
+        constants: values of the named constants in it, as written; ``5 or 9`` if there are two. Also what
+            variables of a function or chart stand for, and empty texts for those that nothing outside knows.
         place: file and line, or block.
     """
 
     names: frozenset[str]
     text: str
-    values: tuple[float, ...]
+    left: str
+    right: str
+    constants: Mapping[str, str]
     place: str
 
 
@@ -56,6 +61,25 @@ def thresholds(
                 if found is not None and found.text not in seen:
                     seen.add(found.text)
                     yield found
+
+
+def within(found: Threshold, names: Mapping[str, str]) -> Threshold:
+    """Return a comparison as it is seen from outside its function, class or chart.
+
+    Args:
+        found: the comparison.
+        names: what variables in it stand for outside; empty text for those that are only known inside.
+    """
+    inner = {name: names[name] for name in found.names if name in names}
+    outer = {name for name in inner.values() if name.isidentifier()}
+    stands = {name: text for name, text in inner.items() if text}
+    said = ", ".join(f"{name} = {text}" for name, text in stands.items())
+    return replace(
+        found,
+        names=(found.names - inner.keys()) | outer,
+        text=f"{found.text} ({said})" if said else found.text,
+        constants={**found.constants, **inner},
+    )
 
 
 def number_in(text: str) -> float | None:
@@ -89,7 +113,8 @@ def _threshold(
     if len(shown) > _MAX_LENGTH:
         return None
     stated = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
-    return Threshold(frozenset(variables), f"{shown}{stated}", tuple(values), place)
+    sides = written(text, left), written(text, right)
+    return Threshold(frozenset(variables), f"{shown}{stated}", *sides, named, place)
 
 
 def _variables(tokens: list[Token]) -> Iterator[Token]:

@@ -43,17 +43,32 @@ class Compared:
 
 
 @dataclass(frozen=True, slots=True)
+class Level:
+    """A value of an input or parameter at which a comparison in a file changes.
+
+    Attributes:
+        signal: its name in the model.
+        value: the value, in its unit.
+    """
+
+    signal: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
 class Context:
     """What the named files say of a model.
 
     Attributes:
         excerpts: what is told of each file.
         comparisons: thresholds, signals of the model first.
+        levels: values of inputs and parameters at which a comparison changes; engines may try these.
         notes: what a user should know of the reading: files left out, lines allowed. Not told.
     """
 
     excerpts: tuple[Excerpt, ...] = ()
     comparisons: tuple[Compared, ...] = ()
+    levels: tuple[Level, ...] = ()
     notes: tuple[str, ...] = ()
 
     def of(self, signal: str) -> tuple[str, ...]:
@@ -76,7 +91,7 @@ class Named:
     checked: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.files) or self.fmu
+        return bool(self.files) or self.fmu or bool(self.checked)
 
     @classmethod
     def of(cls, names: Iterable[str]) -> Self:

@@ -23,6 +23,7 @@ class Registered:
         is_free: whether it chooses control points itself if the space allows it; the others search the fixed
             parameterization.
         uses_robustness: whether what it suggests depends on the robustness that it is told.
+        uses_context: whether it tries the levels that context files give.
     """
 
     target: str
@@ -30,6 +31,7 @@ class Registered:
     extra: str = ""
     is_free: bool = False
     uses_robustness: bool = True
+    uses_context: bool = False
 
     def load(self) -> Any:
         """Import the engine's class.
@@ -55,6 +57,7 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             "falsifier.engines.surrogate:Surrogate",
             "learns the dynamics and searches on its predictions",
             is_free=True,
+            uses_context=True,
         ),
         "coverage": Registered(
             "falsifier.engines.coverage:Coverage",

@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
+from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.replies import json_objects, without_thoughts
+from falsifier.problem.template_advice import WHAT_CANNOT_BE_SAID
 
 MOST_READINGS = 3
 # Characters of a meaning that are kept.
@@ -47,7 +50,8 @@ class ReadingReply(_Reply):
 class ReadingsReply(_Reply):
     """All readings of the sentence, the most probable first."""
 
-    readings: list[ReadingReply] = Field(min_length=1, max_length=MOST_READINGS)
+    readings: list[ReadingReply] = Field(max_length=MOST_READINGS)
+    cannot: str = Field(default="", description="Why no formula says it; only if there are no readings.")
 
 
 def readings_schema() -> dict[str, Any]:
@@ -61,7 +65,7 @@ def readings_schema() -> dict[str, Any]:
         satisfied=signals,
         violated=signals,
     )
-    return _object(readings=_list(reading))
+    return _object(readings=_list(reading), cannot=text)
 
 
 def read_readings(text: str) -> list[ReadingReply]:
@@ -69,17 +73,25 @@ def read_readings(text: str) -> list[ReadingReply]:
 
     Raises:
         RejectedReplyError: if it contains none, or they are not of the required form.
+        SpecError: if it says that no formula can say it.
     """
     found = [o for o in json_objects(without_thoughts(text)) if "readings" in o]
     if not found:
         raise RejectedReplyError('it contains no JSON object with "readings"')
     try:
-        readings = ReadingsReply.model_validate(found[-1]).readings
+        reply = ReadingsReply.model_validate(found[-1])
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise RejectedReplyError(f"{where}: {first['msg']}") from None
-    return [r.model_copy(update={"meaning": r.meaning[:_LONGEST_MEANING]}) for r in readings]
+    if not reply.readings and reply.cannot.strip():
+        said = one_line(reply.cannot.strip()[:_LONGEST_MEANING])
+        raise SpecError(
+            f"no formula was written, because the language model says: {said}\n{WHAT_CANNOT_BE_SAID}"
+        )
+    if not reply.readings:
+        raise RejectedReplyError('it has neither "readings" nor a reason in "cannot"')
+    return [r.model_copy(update={"meaning": r.meaning[:_LONGEST_MEANING]}) for r in reply.readings]
 
 
 def example_trajectory(

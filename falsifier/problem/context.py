@@ -2,11 +2,13 @@
 
 import logging
 from dataclasses import replace
+from functools import lru_cache
 from os.path import relpath
 from pathlib import Path
 
 from falsifier.context.gather import gather
 from falsifier.context.values import NOTHING, Context, Named
+from falsifier.core.space import InputRange, ParameterRange
 from falsifier.fmu import fmu_files
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -44,14 +46,45 @@ def with_context(problem: Problem) -> Problem:
     """
     if not problem.named_context or problem.context != Context():
         return problem
+    found = _gathered(problem, is_told=True)
+    for note in found.notes:
+        _say_once(note)
+    return replace(problem, context=found)
+
+
+def _gathered(problem: Problem, *, is_told: bool) -> Context:
+    searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
     seeds = problem.requirement.formula.signals
     signals = dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))
     named = problem.named_context
     fmus = fmu_files(problem.model) if named.fmu else {}
-    found = gather(named.files, fmus, seeds=tuple(seeds), signals=tuple(signals), checked=named.checked)
-    for note in found.notes:
-        _LOG.warning(note)
-    return replace(problem, context=found)
+    return gather(
+        named.files,
+        fmus,
+        seeds=tuple(seeds),
+        signals=tuple(signals),
+        checked=named.checked,
+        ranges={r.name: (r.low, r.high) for r in searched},
+        is_told=is_told,
+    )
+
+
+def with_levels(problem: Problem) -> Problem:
+    """Return the problem with only the levels that its context files give: for engines, which send nothing.
+
+    Raises:
+        SpecError: naming the file that cannot be read.
+        ModelError: if an archive is damaged or dangerous.
+    """
+    if not problem.named_context or problem.context != Context():
+        return problem
+    return replace(problem, context=Context(levels=_gathered(problem, is_told=False).levels))
+
+
+@lru_cache(maxsize=1000)
+def _say_once(note: str) -> None:
+    """Warn; a campaign reads the same files for each of its runs."""
+    _LOG.warning(note)
 
 
 def _shown(path: Path) -> str:

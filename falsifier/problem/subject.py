@@ -94,10 +94,6 @@ def _of_model(fmu: Path) -> Subject:
         raise SpecError(f"{fmu}: no such file; give the path of an .fmu file, or a spec")
     info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
     path = fmu.with_suffix(".toml")
-    if path.exists():
-        raise SpecError(
-            f"{path} belongs to this FMU: name it in place of {fmu.name}, so that the choice is added"
-        )
     text = starter_spec(Path(fmu.name), info)
     joined = join(parse_spec(tomllib.loads(text), file=str(path)), _PLACEHOLDER, path=path)
     return Subject(Problem.from_parts(joined), path, path.parent, text, is_new=True, free_grid=True)

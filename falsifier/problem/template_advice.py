@@ -42,6 +42,22 @@ _EXAMPLES = {
 }
 
 
+WHAT_CANNOT_BE_SAID = (
+    "Formulas compare values of the same sample. A rate needs a signal that is the rate, or the template "
+    'ramp_limit with over and range; "after each step" needs a level that the step crosses, such as '
+    'after = "target > 50"; averages and earlier values need a signal of the model.'
+)
+_BEYOND = re.compile(
+    r"\b(?:each|every|any|a) (?:step|jump|change)\b|\brates?\b|per (?:second|minute)|derivative|\bslope\b"
+    r"|\baverage|\bmean\b|previous|earlier value"
+)
+
+
+def hint(sentence: str) -> str:
+    """Return what formulas cannot say, if a sentence may need that; else an empty text."""
+    return WHAT_CANNOT_BE_SAID if _BEYOND.search(sentence.lower()) else ""
+
+
 @dataclass(frozen=True, slots=True)
 class Advice:
     """A template that may fit.

@@ -38,6 +38,7 @@ def formula_of_template(source: ProblemSource, text: str) -> str:
         else:
             path, requirement = find_spec(source.target)
             spec = read_spec(path)
+            _check_single(spec, requirement, source.target)
             name = requirement or next(iter(spec.requirements))
             spec = _with(spec, name, arguments)
             joined = join(spec, name, path=path, profile=source.profile, changes=source.changes)
@@ -48,6 +49,25 @@ def formula_of_template(source: ProblemSource, text: str) -> str:
         argument = error.key.removeprefix(f"requirements.{name}").removeprefix(".")
         raise SpecError(problem, file=_OPTION, key=argument or None) from None
     return str(joined.requirement.formula)
+
+
+def _check_single(spec: Spec, requirement: str | None, target: str) -> None:
+    """Refuse a spec whose requirements change the simulation differently: whose changes hold is not clear."""
+    first, *others = (_kept(section) for section in spec.requirements.values())
+    if requirement is None and any(changes != first for changes in others):
+        names = ", ".join(spec.requirements)
+        raise SpecError(
+            f"the requirements of {target} simulate in different ways; say whose inputs and times hold: "
+            f"{target}:NAME, with one of {names}",
+            file=_OPTION,
+        )
+
+
+def _kept(section: AnyRequirement) -> dict[str, object]:
+    """Return what a requirement changes of the simulation."""
+    return {
+        key: getattr(section, key) for key in ModelChanges.model_fields if key in section.model_fields_set
+    }
 
 
 def _check_keys(arguments: Mapping[str, object]) -> None:
@@ -67,8 +87,7 @@ def _with(spec: Spec, name: str, arguments: dict[str, object]) -> Spec:
     section = parse_spec(
         {"model": {"fmu": "-"}, "requirements": {name: arguments}}, file=_OPTION
     ).requirements[name]
-    old: AnyRequirement = spec.requirements[name]
-    kept = {key: getattr(old, key) for key in ModelChanges.model_fields if key in old.model_fields_set}
+    kept = _kept(spec.requirements[name])
     return spec.model_copy(
         update={"requirements": {**spec.requirements, name: section.model_copy(update=kept)}}
     )

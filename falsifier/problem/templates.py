@@ -140,7 +140,9 @@ class Rise(Template):
     template: Literal["rise"]
     signal: Term = _SIGNAL
     reference: Term = _REFERENCE
-    reaches: Margin = Field("90%", description="Share of the reference that is reached, as a percentage.")
+    reaches: Margin = Field(
+        "90%", description="Share of the reference that is reached, as a percentage; state it if down."
+    )
     time: Duration = Field(description="Time in s until then, at most.")
     direction: Literal["up", "down"] = Field("up", description="down: it falls to that share.")
     after: Moment = _AFTER
@@ -150,6 +152,11 @@ class Rise(Template):
     def _is_percentage(self) -> "Rise":
         if share_of(self.reaches) is None:
             raise ValueError(f"reaches is a percentage of the reference such as '90%', got {self.reaches!r}")
+        if self.direction == "down" and "reaches" not in self.model_fields_set:
+            raise ValueError(
+                "with direction = 'down', state reaches as well: of a reference of 20, '110%' is a fall to "
+                "22, '90%' one to 18"
+            )
         return self
 
     def _formula(self, grid: Grid) -> Formula:

@@ -11,6 +11,7 @@ from falsifier.engines.aiming import Aiming, can_aim
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError
 from falsifier.llm.messages import Chat
+from falsifier.problem.context import with_levels
 from falsifier.problem.problem import Problem
 from falsifier.search.request import LLMSettings, RunRequest
 
@@ -68,7 +69,7 @@ def make_scouts(request: RunRequest, problems: Sequence[Problem]) -> list[Engine
 def told_problems(
     request: RunRequest, problems: Sequence[Problem], recorded: Mapping[str, Context]
 ) -> list[Problem]:
-    """Return the problems with what their context files say, if a language model is asked.
+    """Return the problems with what their context files say to the language model or engine that leads.
 
     Args:
         request: what was requested.
@@ -79,11 +80,12 @@ def told_problems(
         SpecError: if a file cannot be read, looks like it holds a secret, or must not be told.
     """
     llm = request.llm
+    known = [replace(p, context=recorded[p.name]) if p.name in recorded else p for p in problems]
     if llm is None:
-        return list(problems)
+        engine = ENGINES.get(request.engine or DEFAULT_ENGINE)
+        return [with_levels(p) for p in known] if engine is not None and engine.uses_context else known
     from falsifier.engines.told import told_context
 
-    known = [replace(p, context=recorded[p.name]) if p.name in recorded else p for p in problems]
     return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]
 
 

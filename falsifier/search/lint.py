@@ -53,11 +53,13 @@ class LintFinding:
         return asdict(self)
 
 
-def lint(target: str, *, profile: str | None = None, simulations: int = SIMULATIONS) -> list[LintFinding]:
+def lint(
+    target: str | ProblemSource, *, profile: str | None = None, simulations: int = SIMULATIONS
+) -> list[LintFinding]:
     """Return what is wrong with the requirements of a spec; empty if nothing was found.
 
     Args:
-        target: a spec, one of its requirements or a bundled name.
+        target: a spec, one of its requirements or a bundled name; or a problem's source.
         profile: name of a profile of the spec.
         simulations: simulations of the measured check of whether inputs move the requirements' signals; 0:
             only what the FMU declares counts.
@@ -68,7 +70,8 @@ def lint(target: str, *, profile: str | None = None, simulations: int = SIMULATI
     """
     findings: list[LintFinding] = []
     problems: list[Problem] = []
-    for source in sources_of(ProblemSource(target=target, profile=profile)):
+    stated = target if isinstance(target, ProblemSource) else ProblemSource(target=target, profile=profile)
+    for source in [stated] if stated.stl is not None else sources_of(stated):
         try:
             problems.append(load_source(source))
         except SpecError as error:

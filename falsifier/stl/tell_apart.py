@@ -16,6 +16,9 @@ from falsifier.stl.monitor import Monitor
 Floats = NDArray[np.float64]
 # Random trajectories per round, and rounds with one more step each.
 _PER_ROUND, _ROUNDS = 300, 5
+# Samples of a signal at once, and per round: on very fine grids, fewer trajectories are tried.
+_AT_ONCE, _MOST = 4_000_000, 30_000_000
+_FEWEST = 20
 # Share of the spread of all levels by which a level is above or below a threshold.
 _BESIDE = 0.1
 
@@ -48,8 +51,8 @@ def tell_apart(
     levels = {name: _levels(formulas, ranges.get(name, Interval())) for name in names}
     moments = _moments(formulas, step, samples)
     rng = np.random.default_rng(seed)
-    for switches in range(_ROUNDS):
-        cuts = {n: rng.choice(moments, size=(_PER_ROUND, switches)) for n in names}
+    for switches, count in ((s, c) for s in range(_ROUNDS) for c in _batches(samples)):
+        cuts = {n: rng.choice(moments, size=(count, switches)) for n in names}
         columns = {n: _steps(rng, levels[n], cuts[n], samples) for n in names}
         kept, broken = _robustness(wanted, columns), -_robustness(unwanted, columns)
         valid = np.flatnonzero((kept >= 0) & (broken > 0))
@@ -63,13 +66,21 @@ def tell_apart(
     return None
 
 
+def _batches(samples: int) -> list[int]:
+    """Return how many trajectories to try at a time in one round."""
+    total = min(_PER_ROUND, max(_FEWEST, _MOST // samples))
+    size = min(total, max(1, _AT_ONCE // samples))
+    return [min(size, total - done) for done in range(0, total, size)]
+
+
 def _robustness(monitor: Monitor, columns: Mapping[str, Floats]) -> Floats:
     """Return the robustness of each trajectory; NaN for those outside the domain of a division or root."""
     try:
         return monitor.batch(columns)
     except MonitorError:
-        found = np.full(_PER_ROUND, np.nan)
-        for k in range(_PER_ROUND):
+        count = len(next(iter(columns.values())))
+        found = np.full(count, np.nan)
+        for k in range(count):
             with suppress(MonitorError):
                 found[k] = monitor.batch({name: column[k : k + 1] for name, column in columns.items()})[0]
         return found
@@ -101,7 +112,9 @@ def _moments(formulas: tuple[Formula, ...], step: float, samples: int) -> NDArra
 def _steps(rng: np.random.Generator, levels: Floats, cuts: NDArray[np.int64], samples: int) -> Floats:
     """Return random piecewise constant signals that change at given samples, shape (m, samples)."""
     values = rng.choice(levels, size=(cuts.shape[0], cuts.shape[1] + 1))
-    piece = (cuts[:, :, None] <= np.arange(samples)).sum(axis=1)
+    piece = np.zeros((len(cuts), samples), dtype=np.intp)
+    for column in cuts.T:
+        piece += column[:, None] <= np.arange(samples)
     return np.take_along_axis(values, piece, axis=1)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import margin_words
-from falsifier.problem.template_advice import Advice
+from falsifier.problem.template_advice import Advice, hint
 from falsifier.search.formalize import Difference, Formalized, Reading
 from falsifier.views.sparkline import trace_lines
 from falsifier.views.text import llm_use
@@ -55,25 +55,31 @@ def formalized_json(found: Formalized) -> dict[str, Any]:
     }
 
 
-def advice_text(advice: list[Advice]) -> str:
-    """Return which templates may fit a sentence, and how to write them."""
+def advice_text(sentence: str, advice: list[Advice]) -> str:
+    """Return which templates may fit a sentence, how to write them, and what formulas cannot say."""
+    hints = [f"note: {said}"] if (said := hint(sentence)) else []
     if not advice:
-        return (
+        none = (
             "no template has words of this sentence; docs/requirements.md lists all of them, and with "
             "--llm NAME a language model proposes formulas"
         )
+        return "\n".join([none, *hints])
     lines = []
     for one in advice:
         lines += [f"{one.template}: {one.summary}", *(f"  {line}" for line in one.section.splitlines())]
         if one.numbers:
             lines.append(f"  # numbers of the sentence: {', '.join(one.numbers)}")
     lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
-    return "\n".join(lines)
+    return "\n".join([*lines, *hints])
 
 
 def advice_json(sentence: str, advice: list[Advice]) -> dict[str, Any]:
     """Return the same as a JSON object."""
-    return {"sentence": sentence.strip(), "templates": [asdict(one) for one in advice]}
+    return {
+        "sentence": sentence.strip(),
+        "templates": [asdict(one) for one in advice],
+        "note": hint(sentence),
+    }
 
 
 def _reading_lines(number: int, reading: Reading) -> Iterator[str]:

@@ -103,5 +103,5 @@ def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> Non
     assert "context notes.md: line 2 looks like a key" in done.err
     assert "sk-abc" not in done.err
     assert "notes.md" not in falsifier("prompt", "AT1", cwd=tmp_path).out
-    useless = falsifier("run", "AT1", "--context", "notes.md", cwd=tmp_path)
-    assert (useless.code, "--context: applies to language models only" in useless.err) == (2, True)
+    useless = falsifier("run", "AT1", "--engine", "cma", "--context", "notes.md", cwd=tmp_path)
+    assert (useless.code, "--context: applies to language models and" in useless.err) == (2, True)

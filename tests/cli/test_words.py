@@ -34,6 +34,15 @@ def test_lint_finds_nothing_in_a_bundled_spec(tmp_path: Path) -> None:
     assert (done.code, done.out) == (0, "nothing found\n")
 
 
+def test_lint_and_check_take_templates(tmp_path: Path) -> None:
+    text = "stays_within signal=speed high=1e9"
+    done = falsifier("lint", "AT1", "--simulations", "0", "--template", text, cwd=tmp_path)
+    assert done.code == 1
+    assert "speed <= 1" in done.out
+    checked = falsifier("check", "AT1", "--template", text, cwd=tmp_path)
+    assert (checked.code, "G[0,50] (speed <= 1000000000)" in checked.out) == (0, True), checked.out
+
+
 GOOD = {
     "formula": "G[0,20] (speed <= 120)",
     "meaning": "never fast",
@@ -87,6 +96,14 @@ def test_an_fmu_gets_a_spec_and_json_says_where(tmp_path: Path) -> None:
         done = falsifier(*asked(server, "car.fmu"), "--choose", "1", "--json", cwd=tmp_path, env=ENV)
     assert done.code == 0, done.err
     assert done.json["written"] == ["car.toml", "R1"]
+    with serving(REPLY) as server:
+        again = falsifier(*asked(server, "car.fmu"), "--choose", "1", cwd=tmp_path, env=ENV)
+        assert not server.received, "said before anything is paid for"
+        other = falsifier(
+            *asked(server, "car.fmu"), "--choose", "1", "--out", "b.toml", cwd=tmp_path, env=ENV
+        )
+    assert (again.code, "car.toml belongs to this FMU" in again.err) == (2, True)
+    assert (other.code, (tmp_path / "b.toml").is_file()) == (0, True), other.err
     assert str(load_problem(str(tmp_path / "car.toml")).requirement.formula) == GOOD["formula"]
 
 

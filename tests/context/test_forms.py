@@ -85,3 +85,22 @@ def test_values_that_modifiers_change_are_not_told_as_certain() -> None:
     assert [t.text for t in of_source(derived, "a.mo", ["y"], ["y"]).found] == ["u > p (p = 3 or 8)"]
     part = f"{MODEL}\nmodel D\n M m(p(min = 0) = 4);\n M n(p = f(1, 2), u = 5);\n Real z;\nend D;"
     assert [t.text for t in of_source(part, "a.mo", ["y"], ["y"]).found] == ["u > p (p = 3 or 4 or f(1, 2))"]
+
+
+def test_a_local_variable_is_not_the_signal_of_its_name() -> None:
+    source = (
+        "void step(M *m) {\n double u = noise();\n double v = m->v;\n double w;\n"
+        " if (u > 3) m->y = 1;\n if (v > 4) m->y = 2;\n if (m->u > 5) m->y = 3;\n if (w > 6) m->y = 4;\n}\n"
+    )
+    found = {t.right: set(t.names) for t in of_source(source, "a.c", ["y"], ["y", "u", "v", "w"]).found}
+    assert found == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set()}
+
+
+def test_variables_of_other_classes_are_not_the_signals_of_their_names() -> None:
+    model = (
+        "model Sub\n input Real u;\n Boolean high = u > 3;\nend Sub;\n"
+        "model M\n input Real u;\n Real y;\n Sub sub(u = y);\nequation\n"
+        " y = if sub.high then u else 0;\nend M;\n"
+    )
+    (limit,) = of_source(model, "a.mo", ["y"], ["y", "u"]).found
+    assert (limit.text, limit.names) == ("u > 3", frozenset())

@@ -173,3 +173,37 @@ def test_folders_of_the_machine_are_recorded_and_not_told(tmp_path: Path) -> Non
     assert context.excerpts[0].path == str(source)
     assert not [e for e in context.excerpts if str(tmp_path) in e.text + e.form]
     assert not [c for c in context.comparisons if str(tmp_path) in c.text + c.place]
+
+
+def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
+    path, text = tmp_path / "a.c", "void step(M *m) {\n"
+    for i in range(80):
+        text += f"  if (m->power{'_long' * 20}{i} > {i}.25) m->trips = {i};\n"
+    path.write_text(f"{text}}}\n")
+    (tmp_path / "b.md").write_text("The power matters. " * 600)
+    context = read(path, tmp_path / "b.md")
+    size = sum(len(c.text) + len(c.place) for c in context.comparisons)
+    assert 5_000 < size <= 6_000
+    assert size + sum(len(e.text) + len(e.name) + len(e.form) for e in context.excerpts) <= MAX_TOTAL
+
+
+def test_long_names_are_shortened(tmp_path: Path) -> None:
+    name = "M" * 50_000
+    (tmp_path / "a.mo").write_text(f"model {name}\n  Real trips;\nequation\n  trips = 1;\nend {name};\n")
+    (excerpt,) = read(tmp_path / "a.mo").excerpts
+    assert excerpt.text == f"model {'M' * 194}... (50,006 characters)"
+
+
+def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:
+    base = "partial model Base\n  input Real power;\n  Real trips;\n  parameter Real limit = 3;\nend Base;\n"
+    (tmp_path / "base.mo").write_text(base)
+    (tmp_path / "plant.mo").write_text(
+        "model Plant\n  extends Lib.Base;\nequation\n  trips = if power > limit then 1 else 0;\nend Plant;\n"
+    )
+    alone = read(tmp_path / "plant.mo").excerpts[0]
+    assert "no class declares a signal" in alone.form
+    _, both = read(tmp_path / "base.mo", tmp_path / "plant.mo").excerpts
+    assert both.form == "what the requirement depends on"
+    assert "parameter Real limit = 3;" in both.text
+    context = read(tmp_path / "plant.mo", tmp_path / "base.mo")
+    assert "power > limit (limit = 3)" in context.of("power")

@@ -1,4 +1,4 @@
-from falsifier.context.statements import Branch, Statement, heads, rendered, simple, sliced
+from falsifier.context.statements import Branch, Statement, assignments, heads, rendered, simple, sliced
 
 
 def sets(name: str, *uses: str, equation: bool = False) -> Statement:
@@ -43,3 +43,23 @@ def test_marks_are_kept_with_their_surroundings() -> None:
     assert "    break;" in list(
         rendered([Statement("}", 1, branches=(Branch("if", frozenset(), (inner,)),))], {A})
     )
+
+
+def test_what_a_variable_equals_has_one_statement_under_no_condition() -> None:
+    def plain(text: str, sets: str, *uses: str) -> Statement:
+        return Statement(text, 1, frozenset({sets}), frozenset(uses))
+
+    branch = Branch("if c then", frozenset("c"), (plain("e = 3;", "e"),))
+    equal, used = assignments(
+        [
+            plain("a = 2 * b;", "a", "b"),
+            plain("double d = a - 1;", "d", "a"),
+            plain("m->f := d;", "f", "d"),
+            plain("g = 1;", "g"),
+            plain("g = b;", "g", "b"),
+            plain("der(x) = u;", "x", "u"),
+            Statement("end if;", 1, branches=(branch,)),
+        ]
+    )
+    assert equal == {"a": "2 * b", "d": "a - 1", "f": "d"}
+    assert (used["g"], used["x"]) == (frozenset("b"), frozenset("u"))

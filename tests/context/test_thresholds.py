@@ -1,4 +1,4 @@
-from falsifier.context.thresholds import number_in, thresholds
+from falsifier.context.thresholds import number_in, thresholds, within
 
 
 def found(text: str, **constants: str) -> list[str]:
@@ -24,7 +24,9 @@ def test_what_has_no_constant_or_no_variable_is_not_told() -> None:
 def test_names_values_and_place() -> None:
     (one,) = thresholds([("m->pause * period < valid", 40), ("m->pause * period < valid", 50)],
                         {"valid": "1.5", "period": "0.1"}, "a.c")  # fmt: skip
-    assert (one.names, one.values, one.place) == (frozenset({"pause"}), (0.1, 1.5), "a.c:40")
+    assert (one.names, one.place) == (frozenset({"pause"}), "a.c:40")
+    assert (one.left, one.right) == ("m->pause * period", "valid")
+    assert one.constants == {"valid": "1.5", "period": "0.1"}
 
 
 def test_numbers() -> None:
@@ -36,3 +38,10 @@ def test_numbers() -> None:
 def test_long_values_of_constants_are_not_told() -> None:
     assert found("a + 1 > b", b="c + " * 100) == ["a + 1 > b"]
     assert found("a > 3 " + "or b " * 3000) == []
+
+
+def test_names_within_stand_for_others_outside() -> None:
+    (one,) = thresholds([("d - t > 3", 1)], {}, "a.slx")
+    seen = within(one, {"d": "speed", "t": "", "other": "x"})
+    assert (seen.text, seen.names) == ("d - t > 3 (d = speed)", frozenset({"speed"}))
+    assert seen.constants == {"d": "speed", "t": ""}

@@ -11,3 +11,8 @@ def test_nothing_named_is_false() -> None:
     assert not Named()
     assert Named(("a.md",))
     assert Named(fmu=True)
+
+
+def test_a_checked_file_alone_is_not_overlooked() -> None:
+    assert Named.of(["checked:a.md"])
+    assert not Named.of(["none"])

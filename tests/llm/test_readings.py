@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.readings import ExampleSignal, example_trajectory, read_readings, readings_schema
 
@@ -50,3 +51,15 @@ def test_examples_are_straight_lines_between_points() -> None:
         example_trajectory(signals, ["x", "y"], TIMES)
     with pytest.raises(RejectedReplyError, match="as many times as values"):
         example_trajectory([ExampleSignal(name="x", times=[0], values=[0, 2])], ["x"], TIMES)
+
+
+def test_a_sentence_that_no_formula_says_is_told_so() -> None:
+    reply = '{"readings": [], "cannot": "The model has no signal that is the rate of speed."}'
+    with pytest.raises(
+        SpecError, match=r"no formula .*no signal that is the rate of speed\.\nFormulas compare"
+    ):
+        read_readings(reply)
+    with pytest.raises(RejectedReplyError, match='neither "readings" nor a reason'):
+        read_readings('{"readings": [], "cannot": " "}')
+    (reading,) = read_readings('{"readings": [{"formula": "x > 2"}], "cannot": "ignored"}')
+    assert reading.formula == "x > 2"

@@ -4,7 +4,7 @@ import pytest
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.problem.spec import parse_spec
-from falsifier.problem.template_advice import advised_templates, mentioned_signals
+from falsifier.problem.template_advice import advised_templates, hint, mentioned_signals
 from falsifier.problem.templates import TEMPLATES
 
 INFO = ModelInfo(
@@ -66,3 +66,17 @@ def test_signals_are_found_by_names_and_descriptions() -> None:
 def test_signals_are_found_by_their_whole_names() -> None:
     cars = ModelInfo("cars", variables=tuple(Variable(f"y{k}", causality="output") for k in range(1, 6)))
     assert mentioned_signals("y5 - y4 stays below 40.", cars) == ["y4", "y5"]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "beyond"),
+    [
+        ("the speed settles 3 s after each step", True),
+        ("the rate of speed is at most 3 per second", True),
+        ("the average power is below 3", True),
+        ("the speed reaches 80 in 10 s", False),
+        ("whenever the brake is on, the speed falls within 3 s", False),
+    ],
+)
+def test_what_formulas_cannot_say_is_hinted_at(sentence: str, *, beyond: bool) -> None:
+    assert bool(hint(sentence)) is beyond

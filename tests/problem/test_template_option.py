@@ -78,3 +78,15 @@ def test_a_spec_with_a_template_is_a_problem_with_its_formula(folder: Path) -> N
         load_problem(spec(folder, text.replace("time = 3", "time = 3.005").replace("[model]", GRID)))
     with pytest.raises(SpecError, match=r"my.toml: requirements\.R\.time: needs values up to 60 s"):
         load_problem(spec(folder, text.replace("time = 3", "time = 60")))
+
+
+def test_of_several_requirements_that_simulate_differently_one_has_to_be_named(tmp_path: Path) -> None:
+    text = GOOD.replace("[requirements.R]", "[requirements.R]\nstop_time = 30.0").replace(
+        "AT.fmu", AT.as_posix()
+    )
+    more = f"{text}\n[requirements.S]\nformula = 'G[0,20] (speed <= 1)'\n"
+    target = spec(tmp_path, more)
+    within = "stays_within signal=speed high=120"
+    with pytest.raises(SpecError, match=r"simulate in different ways.*:NAME, with one of R, S"):
+        formula_of_template(ProblemSource(target=target), within)
+    assert formula_of_template(ProblemSource(target=f"{target}:R"), within) == "G[0,30] (speed <= 120)"

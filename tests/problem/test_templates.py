@@ -182,6 +182,7 @@ def test_what_does_not_fit_the_simulation_names_the_argument(
         ("settles", {"reference": 1, "within": 1, "time": 1}, r"R\.signal: this key is missing \(Signal"),
         ("settls", {}, r"R\.template: no such template; did you mean 'settles'"),
         ("rise", {"signal": "x", "reference": 1, "reaches": 3, "time": 1}, "percentage of the reference"),
+        ("rise", {"signal": "x", "reference": 1, "direction": "down", "time": 1}, "state reaches as well"),
         (
             "rise",
             {"signal": "x", "reference": 1, "time": 1, "tim": 1},

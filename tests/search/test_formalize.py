@@ -230,7 +230,7 @@ def test_a_wrong_reading_goes_back_with_the_reason(server: Server, target: str, 
     ("content", "reason"),
     [
         ("I do not know.", 'no JSON object with "readings"'),
-        ('{"readings": []}', "readings: "),
+        ('{"readings": []}', "neither "),
         ('{"readings": [{"formula": 3}]}', "readings.0.formula"),
         (json.dumps({"readings": [{"formula": "x"}] * 4}), "readings: "),
     ],

@@ -1,15 +1,18 @@
 """Who leads a search, from the names that a user gives."""
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from falsifier.context.values import Context, Level, Named
 from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Budget
-from falsifier.search.leaders import check_names, make_engines, make_scouts
+from falsifier.search.leaders import check_names, make_engines, make_scouts, told_problems
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 
@@ -100,3 +103,19 @@ def test_several_requirements_of_one_language_model_fall_back_to_different_point
     surrogates = [hybrid.surrogate for hybrid in hybrids if isinstance(hybrid, Hybrid)]
     one, other = ([candidate.key for candidate in each.ask(12)] for each in surrogates)
     assert one != other
+
+
+def test_the_surrogate_alone_reads_levels_and_what_is_recorded_is_not_read_again(tmp_path: Path) -> None:
+    (source := tmp_path / "a.mo").write_text(
+        "model A\n input Real u;\n output Real x;\nequation\n x = if u > 0.25 then 1 else 0;\nend A;\n"
+        "// password: not so secret, and sent nowhere\n"
+    )
+    problem = replace(PROBLEM, named_context=Named((str(source),)))
+    (read,) = told_problems(request(), [problem], {})
+    assert read.context == Context(levels=(Level(PROBLEM.space.inputs[0].name, 0.25),))
+    source.unlink()
+    assert told_problems(request("cma"), [problem], {})[0].context == Context()
+    (recorded,) = told_problems(request(), [problem], {problem.name: read.context})
+    assert recorded.context == read.context
+    with pytest.raises(SpecError, match="cannot be read"):
+        told_problems(request(), [problem], {})

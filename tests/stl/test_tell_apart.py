@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.stl import Monitor, parse
 from falsifier.stl.intervals import Interval
-from falsifier.stl.tell_apart import tell_apart
+from falsifier.stl.tell_apart import _batches, tell_apart
 
 RANGES = {"b": Interval(0, 1), "x": Interval(-10, 10)}
 
@@ -45,3 +45,19 @@ def test_examples_are_repeatable_and_have_few_steps() -> None:
     assert first is not None and again is not None
     assert (first["x"] == again["x"]).all()
     assert (first["x"][1:] != first["x"][:-1]).sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("samples", "count", "largest"), [(1000, 300, 300), (100_000, 300, 40), (3_000_000, 20, 1)]
+)
+def test_fine_grids_are_tried_in_parts(samples: int, count: int, largest: int) -> None:
+    sizes = _batches(samples)
+    assert (sum(sizes), max(sizes)) == (count, largest)
+
+
+def test_an_example_on_a_fine_grid_is_found_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.stl.tell_apart._AT_ONCE", 5000)
+    one, other = parse("G[0,1] (x <= 1)"), parse("F[0,1] (x <= 1)")
+    found = tell_apart(other, one, step=0.001, samples=1001, ranges={"x": Interval(0.0, 2.0)})
+    assert found is not None
+    assert Monitor(one, 0.001, 1001).batch({"x": found["x"][None]})[0] < 0

@@ -82,7 +82,7 @@ def class_for(classes: Iterable[ModelicaClass], names: Collection[str]) -> Model
 
 
 def with_bases(found: ModelicaClass, classes: Iterable[ModelicaClass]) -> ModelicaClass:
-    """Return a class with the elements of those classes that it extends and that the file has."""
+    """Return a class with the elements of those classes that it extends and that were read."""
     known = {each.name.rpartition(".")[2]: each for each in classes}
     merged, missing, queue, seen = found, [], list(found.bases), {found.name}
     while queue:
@@ -148,7 +148,7 @@ def class_text(found: ModelicaClass, kept: Slice | None) -> str:
     left = len(found.declarations) - len(declared)
     if left:
         lines.append(f"// {counted(left, 'declaration')} left out: no influence on the requirement")
-    lines += [f"// extends {name}, which is not in this file" for name in found.bases]
+    lines += [f"// extends {name}, which was not read" for name in found.bases]
     return "\n".join(lines)
 
 

@@ -56,6 +56,11 @@ class Explorer:
     def __init__(self, problem: Problem, layout: Layout) -> None:
         self._marker = Marker.of(problem)
         self._programs = Programs(layout)
+        levels: dict[str, list[float]] = defaultdict(list)
+        searched = problem.space.names
+        for level in (found for found in problem.context.levels if found.signal in searched):
+            levels[level.signal].append(level.value)
+        self._aimed = Programs(layout, levels) if levels else None
         self._reached: dict[Mark, Reached] = {}
         self._by_source: dict[str, list[Mark]] = defaultdict(list)
         self._hits: Counter[Mark] = Counter()
@@ -68,11 +73,17 @@ class Explorer:
         kinds = self._marker.kinds
         return any(mark.what[0] == "changes" and mark.source in kinds for mark in self._reached)
 
-    def learn(self, point: Array, trajectory: Trajectory) -> None:
-        """Add a simulation to the archive."""
+    @property
+    def has_levels(self) -> bool:
+        """Whether levels are known at which something changes."""
+        return self._aimed is not None
+
+    def learn(self, point: Array, trajectory: Trajectory) -> bool:
+        """Add a simulation to the archive; return whether a discrete signal did something new."""
         self._seen += 1
         marks = self._marker.marks(trajectory)
-        self._new.update({mark.source for mark in marks if mark not in self._reached})
+        new = {mark.source for mark in marks if mark not in self._reached}
+        self._new.update(new)
         for mark, time in marks.items():
             self._hits[mark] += 1
             known = self._reached.get(mark)
@@ -80,30 +91,35 @@ class Explorer:
                 self._by_source[mark.source].append(mark)
             if known is None or time < 0.95 * known.time:
                 self._reached[mark] = Reached(point, time, known.tries if known else 0)
+        return any(source == MODES or source in self._marker.kinds for source in new)
 
-    def propose(self, rng: np.random.Generator) -> Idea:
-        """Return the next input: one that reached a rare mark, continued differently after it."""
-        if not self._programs.has_inputs:
-            return Idea(self._programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
+    def propose(self, rng: np.random.Generator, *, aimed: bool = False) -> Idea:
+        """Return the next input: one that reached a rare mark, continued differently after it.
+
+        Args:
+            rng: random generator.
+            aimed: whether new values are drawn between the levels at which something changes.
+        """
+        programs = (self._aimed if aimed else None) or self._programs
+        if not programs.has_inputs:
+            return Idea(programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
         mark = self._choose(rng)
         if mark is None:
-            return Idea(
-                self._programs.fresh(rng), "a random program of the inputs: nothing has been reached yet"
-            )
+            return Idea(programs.fresh(rng), "a random program of the inputs: nothing has been reached yet")
         reached = self._reached[mark]
         reached.tries += 1
         kind = rng.random()
         where = f"the input that made {describe(mark)} at {reached.time:.3g} s"
         if kind < _NEW_END:
-            point = self._programs.another_end(rng, reached.point, reached.time)
+            point = programs.another_end(rng, reached.point, reached.time)
             return Idea(point, f"{where}, continued differently")
         if kind < _NEW_END + _REPEATED:
             other = self._choose(rng) or mark
             source = self._reached[other]
             span = (float(rng.uniform(0.0, source.time)), source.time)
-            point = self._programs.repeated(rng, reached.point, reached.time, source.point, span)
+            point = programs.repeated(rng, reached.point, reached.time, source.point, span)
             return Idea(point, f"{where}, followed by what made {describe(other)}")
-        return Idea(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+        return Idea(programs.moved(rng, reached.point), f"{where}, slightly changed")
 
     def _choose(self, rng: np.random.Generator) -> Mark | None:
         """Draw a signal, then one of its marks; rare ones from which little was tried are more likely."""

@@ -1,6 +1,7 @@
 """Inputs as short programs: pieces that hold a value for some time, and changes of such programs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,10 @@ _MAX_LEVELS = 32
 _AT_BOUND = 0.6
 # Share of inputs that keep their value in a new tail, if there are several.
 _KEPT = 0.25
+# If levels are known at which something changes: share of values between or at these.
+_AIMED = 0.7
+# Of these, the share that is exactly at a level.
+_EXACT = 0.15
 # Probability that a parameter is drawn again: nothing of what followed is certain then.
 _PARAMETER_REDRAWN = 0.1
 
@@ -24,13 +29,16 @@ class Programs:
 
     Args:
         layout: the layout of the points.
+        levels: values at which something changes, by the names of inputs and parameters; between any two
+            neighbours a system may behave in its own way, however close they are.
     """
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: Layout, levels: Mapping[str, Sequence[float]] = MappingProxyType({})) -> None:
         space = layout.space
         self._layout = layout
         ranges: tuple[InputRange | ParameterRange, ...] = (*space.inputs, *space.parameters)
         self._levels = [_levels(r) for r in ranges]
+        self._cuts = [_cuts(r, levels.get(r.name, ())) for r in ranges]
         self._times = [np.asarray(coding.times) for coding in layout.codings]
         self._longest = max((len(times) for times in self._times), default=1)
 
@@ -142,7 +150,21 @@ class Programs:
         if levels is not None:
             others = levels if last is None or len(levels) < 2 else levels[np.abs(levels - last) > 1e-9]
             return float(rng.choice(others))
+        cuts = self._cuts[j]
+        if len(cuts) and rng.random() < _AIMED:
+            if rng.random() < _EXACT:
+                return float(rng.choice(cuts))
+            edges = np.concatenate([[0.0], cuts, [1.0]])
+            k = int(rng.integers(len(edges) - 1))
+            return float(rng.uniform(edges[k], edges[k + 1]))
         return float(rng.integers(2)) if rng.random() < _AT_BOUND else float(rng.random())
+
+
+def _cuts(ranged: InputRange | ParameterRange, values: Sequence[float]) -> NDArray[np.float64]:
+    """Return levels as shares of a range, those at its bounds left out."""
+    width = (ranged.high - ranged.low) or 1.0
+    shares = {(value - ranged.low) / width for value in values}
+    return np.array(sorted(share for share in shares if 0.0 < share < 1.0))
 
 
 def _levels(ranged: InputRange | ParameterRange) -> NDArray[np.float64] | None:

@@ -61,6 +61,10 @@ class Settings:
         flat: share of simulations with the same cost from which on coverage leads the search.
         flat_start: minimum number of simulations for that.
         coverage_share: probability of coverage where it leads.
+        aim_share: share of simulations that aim at levels which context files give, as long as these bring
+            something new as often as the others do.
+        most_aimed: maximum share of these.
+        aim_trial: number of these after which they are given up if none brought anything new.
         retries: number of further proposals if one will probably fail; the least risky one is simulated.
         risk_weight: scaled robustness that a certain failure costs in planning.
     """
@@ -110,5 +114,8 @@ class Settings:
     flat: float = 0.6
     flat_start: int = 4
     coverage_share: float = 0.8
+    aim_share: float = 0.3
+    most_aimed: float = 0.7
+    aim_trial: int = 16
     retries: int = 12
     risk_weight: float = 5.0

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from falsifier.engines.corner_walk import CornerWalk, Levels
 from falsifier.engines.coverage import Explorer
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout, planning_layout, region_layouts
+from falsifier.engines.surrogate.aims import Aims
 from falsifier.engines.surrogate.arms import choose_arm, flatness, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
 from falsifier.engines.surrogate.feasibility import Feasibility
@@ -71,6 +73,8 @@ class Surrogate:
         self.history = History(problem, self.grid, self.layout, self.settings)
         self.feasibility = Feasibility(self.grid)
         self._explorer = Explorer(problem, self.layout)
+        self._aims = Aims(self.settings)
+        self._lowest = inf
         self.dynamics = Ensemble(self.settings)
         windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
         self._windows = windows
@@ -101,8 +105,11 @@ class Surrogate:
             sample = self.history.add(evaluation, pending.arm if pending else "")
             point = self.layout.point(told)
             self.feasibility.add(self.layout, point, failed=sample is None)
+            is_new = sample is not None and sample.robustness < self._lowest
             if evaluation.trajectory is not None:
-                self._explorer.learn(point, evaluation.trajectory)
+                is_new |= self._explorer.learn(point, evaluation.trajectory)
+            self._aims.learn(aimed=pending is not None and pending.arm == "levels", is_new=is_new)
+            self._lowest = min(self._lowest, sample.robustness if sample is not None else inf)
             if sample is None:
                 self._failed.append(point)
             if pending is not None:
@@ -199,12 +206,17 @@ class Surrogate:
         if arm == "coverage":
             idea = self._explorer.propose(rng)
             return Pending("coverage", self.layout, idea.point, idea.why)
+        if arm == "levels":
+            idea = self._explorer.propose(rng, aimed=True)
+            return Pending("levels", self.layout, idea.point, f"levels of the context files: {idea.why}")
         if arm == "dynamics":
             return self._plan(rng)
         return self._switch(rng) if arm == "switching" else self._search(rng)
 
     def _choose_arm(self, rng: np.random.Generator) -> str:
         settings = self.settings
+        if self._explorer.has_levels and rng.random() < self._aims.share:
+            return "levels"
         costs = self.history.direct_costs()
         is_flat = len(costs) >= settings.flat_start and flatness(costs) >= settings.flat
         # Where all outputs are continuous, the dynamics know how they leave a plateau.

@@ -22,15 +22,19 @@ _LANGUAGE = """Formulas are Signal Temporal Logic over the signals below, judged
 - Do not use == or != on numbers that are not whole; write abs(x - 3) <= 0.5 for a whole number.
 - Names are written exactly as listed; names with unusual characters stand in double quotes."""
 
-_ANSWER = """Answer with one JSON object: {"readings": [...]}. Give one reading if the sentence is clear, and
-two or three, the most probable first, if engineers could understand it differently. Each reading has
+_ANSWER = """Answer with one JSON object: {"readings": [...], "cannot": ""}. Give one reading if the sentence
+is clear, and two or three, the most probable first, if engineers could understand it differently. Each
+reading has
 - formula: the formula.
 - meaning: one sentence that says what it requires, and how it differs from the other readings.
 - units: for each signal in the formula the unit in which you wrote its numbers, "" if it has none.
 - satisfied: a small example that meets the sentence as you understand it: each signal of the formula with
   times (s) and values, linear between them.
 - violated: the same for an example that does not meet it.
-The formula is checked on both examples, so choose values clearly on one side of every threshold."""
+The formula is checked on both examples, so choose values clearly on one side of every threshold.
+If no formula over these signals can say it (a rate without a signal that is the rate, "after each step" of
+any size, an average, earlier values), do not write one that says something else: leave readings empty, and
+say in "cannot" why, and which signal or level would be needed. Otherwise "cannot" is ""."""
 
 
 def formalizing_messages(sentence: str, info: ModelInfo, experiment: Experiment) -> tuple[Message, ...]:

@@ -60,7 +60,7 @@ def test_the_text_has_what_the_signal_depends_on() -> None:
         "    y = f(x);",
         "  end when;",
         "// 2 declarations left out: no influence on the requirement",
-        "// extends Elsewhere.Other, which is not in this file",
+        "// extends Elsewhere.Other, which was not read",
     ]
     assert [c.name for c in used_classes(found, part, CLASSES)] == ["f"]
     assert ("when x > limit then", 21) in list(conditions(found, part))

@@ -1,6 +1,8 @@
 from pathlib import Path
 
-from falsifier.context.simulink.conditions import comparisons, constants
+import pytest
+
+from falsifier.context.simulink.conditions import chart_names, comparisons, constants
 from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, ChartData, Diagram, End, Wire
 from falsifier.context.simulink.reader import read_diagram
 from falsifier.context.simulink.upstream import upstream
@@ -53,3 +55,38 @@ def test_ports_in_expressions_are_named_by_what_leads_to_them() -> None:
     texts = [text.strip() for text, _ in comparisons(Diagram("m", BlockSystem(blocks, wires)))]
     speed = "'Threshold speed'"
     assert texts == ["u2 > 3", f"{speed} != 4", "u2 < 1", "u2 > 5", f"{speed} > 7"]
+
+
+@pytest.mark.parametrize(
+    ("value", "told"), [("1E-3", "1E-3"), ("single(5)", "5"), ("-.5", "-.5"), ("-K", "'-K'")]
+)
+def test_numbers_and_types_of_constants_are_understood(value: str, told: str) -> None:
+    blocks = (
+        Block("Inport", "u"),
+        Block("Constant", "Limit", (("Value", value),)),
+        Block("RelationalOperator", "Above", (("Operator", ">"),)),
+    )
+    wires = tuple(
+        Wire(End(name, "1"), (End("Above", str(port)),)) for port, name in enumerate(("u", "Limit"), start=1)
+    )
+    assert list(comparisons(Diagram("m", BlockSystem(blocks, wires)))) == [(f"u > {told}", "Above")]
+
+
+def test_names_within_a_subsystem_or_chart_are_those_of_what_leads_there() -> None:
+    inner = BlockSystem(
+        (Block("Inport", "u", number=1), Block("Relay", "Trip", (("OnSwitchValue", "3"),))),
+        (Wire(End("u", "1"), (End("Trip", "1"),)),),
+    )
+    chart = Chart("Logic", data=(ChartData("d", "input"), ChartData("u", "local"), ChartData("y", "output")))
+    ports = BlockSystem((Block("Inport", "d", number=1),))
+    blocks = (
+        Block("Inport", "u", number=1),
+        Block("Inport", "speed", number=2),
+        Block("SubSystem", "Guard", system=inner),
+        Block("SubSystem", "Logic", system=ports, is_chart=True),
+    )
+    wires = (Wire(End("speed", "1"), (End("Guard", "1"), End("Logic", "1")), "v"),)
+    diagram = Diagram("m", BlockSystem(blocks, wires), charts=(chart,))
+    assert ("speed >= 3", "Guard/Trip") in list(comparisons(diagram))
+    assert chart_names(diagram, "Logic") == {"d": "speed", "u": ""}
+    assert chart_names(diagram, "Guard") == {}

@@ -82,3 +82,19 @@ def test_without_inputs_parameters_are_drawn() -> None:
     programs = Programs(layout)
     found = [programs.another_end(drawn(seed), np.zeros(1), 1.0).item() for seed in range(30)]
     assert {0.0, 1.0} < set(found)
+
+
+def test_values_are_drawn_between_levels_that_are_known() -> None:
+    layout = layout_of(inputs=1)
+    (ranged,) = layout.space.inputs
+    width = ranged.high - ranged.low
+    low, high = ranged.low + 0.700 * width, ranged.low + 0.701 * width
+    levels = {ranged.name: [low, high, ranged.low, ranged.high + 1.0], "another": [0.0]}
+    aimed, plain = (
+        np.concatenate([p.fresh(drawn(seed))[layout.groups[0]] for seed in range(40)])
+        for p in (Programs(layout, levels), Programs(layout))
+    )
+    inside = [np.mean((values >= 0.6999) & (values <= 0.7011)) for values in (aimed, plain)]
+    assert inside[0] > 0.15
+    assert inside[1] < 0.02
+    assert np.mean(aimed == 0.0) > 0.05, "bounds are still tried"

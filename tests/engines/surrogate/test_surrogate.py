@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from falsifier.context.values import Context, Level
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines import make_engine
@@ -167,3 +168,40 @@ def test_switching_inputs_with_different_control_points_say_so_for_each() -> Non
         r"v every (0\.5|1) s, a fraction of an inner window",
         why,
     )
+
+
+def narrow_problem(levels: tuple[Level, ...] = ()) -> Problem:
+    """A counter of how often an input entered a band of 0.2 % of its range; three times violate."""
+    info = ModelInfo(
+        "narrow",
+        variables=(
+            Variable("u", causality="input"),
+            Variable("n", kind="integer", causality="output", variability="discrete"),
+        ),
+    )
+    space = SearchSpace((InputRange("u", 0.0, 1.0, control_points=5, free=Freedom(50, 0.2)),), (), 10.0)
+    formula = parse("G[0,10] (n < 2.5)")
+    problem = Problem(
+        FunctionModel(_entered, info), Requirement("R", formula), space, Experiment(10.0, 0.1, ("n",))
+    )
+    return replace(problem, context=Context(levels=levels))
+
+
+def _entered(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
+    inside = np.abs(inputs["u"] - 0.618) < 0.001
+    return {"n": np.cumsum(inside & ~np.append(False, inside[:-1])).astype(float)}
+
+
+def test_levels_of_context_files_are_tried() -> None:
+    levels = (Level("u", 0.617), Level("u", 0.619))
+    told = [simulations_until_violation(narrow_problem(levels), seed=s, budget=60) for s in range(3)]
+    assert all(told)
+    assert simulations_until_violation(narrow_problem(), seed=0, budget=60) is None
+
+
+def test_without_levels_nothing_changes() -> None:
+    plain, misplaced = narrow_problem(), narrow_problem((Level("other", 1.0),))
+    engine = make_engine("surrogate", plain, seed=1)
+    assert [c.key for c in engine.ask(5)] == [
+        c.key for c in make_engine("surrogate", misplaced, seed=1).ask(5)
+    ]
