@@ -6,8 +6,7 @@
 
 Each run ends at the first violation or after --budget simulations; the cells are their mean number. The
 last column is the mean difference from the whole engine over all runs, with its standard error: it is
-positive if the part helps. Violations are the monitor's and are not confirmed a second time. Committed
-result: bench/ablation.md.
+positive if the part helps. Violations are the monitor's and are not confirmed a second time.
 """
 
 import argparse

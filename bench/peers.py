@@ -103,7 +103,7 @@ def peer_search(
             print(evaluation.robustness, file=peer.stdin, flush=True)
             line = peer.stdout.readline()
         peer.kill()
-    return Search(False, count, time.perf_counter() - started, simulating)
+    return Search(False, budget, time.perf_counter() - started, simulating)
 
 
 def _violates(evaluation: Evaluation) -> bool:

@@ -29,11 +29,12 @@ def main() -> None:
     parser.add_argument("--engine", choices=sorted(set(ENGINES) - {"hybrid"}), default=DEFAULT_ENGINE)
     parser.add_argument("--requirement", default="AT51")
     parser.add_argument("--seed", type=int, default=100)
+    parser.add_argument("--simulations", type=int, default=EDGES[-1])
     options = parser.parse_args()
     problem = load_problem(options.requirement)
     engine = make_engine(options.engine, problem, seed=options.seed)
     seconds = []
-    for _ in range(EDGES[-1]):
+    for _ in range(options.simulations):
         started = time.process_time()
         (candidate,) = engine.ask(1)
         asking = time.process_time() - started
@@ -43,7 +44,7 @@ def main() -> None:
         seconds.append(asking + time.process_time() - started)
     print(f"`{options.engine}` on {options.requirement}, seed {options.seed}.\n")
     print("| earlier simulations | mean s | max s |\n|---|---|---|")
-    for first, last in pairwise(EDGES):
+    for first, last in pairwise((*(e for e in EDGES if e < options.simulations), options.simulations)):
         part = seconds[first:last]
         print(f"| {first} to {last - 1} | {sum(part) / len(part):.3f} | {max(part):.3f} |")
 

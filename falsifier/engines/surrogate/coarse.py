@@ -293,11 +293,12 @@ def sliding(values: Array, first: int, last: int, extreme: Extreme) -> Array:
     from falsifier.engines.surrogate.kernels import slide
 
     count = values.shape[1]
+    first, last = min(first, count - 1), min(last, count - 1)
     if first == last:
-        return np.asarray(values[:, np.minimum(np.arange(count) + first, count - 1)])
+        return np.concatenate([values[:, first:], np.repeat(values[:, -1:], first, axis=1)], axis=1)
     result = np.empty_like(values, order="C")
     sign = 1 if extreme is np.minimum else -1
-    slide(np.ascontiguousarray(values), min(first, count - 1), min(last, count - 1), sign, result)
+    slide(np.ascontiguousarray(values), first, last, sign, result)
     return result
 
 
