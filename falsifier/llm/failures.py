@@ -42,6 +42,7 @@ _CONTEXT_WORDS = ("contextwindow", "context_length", "maximum context", "context
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
 _LONGEST_DETAIL = 600
 # What the client library puts before the server's own words, several times over.
+_FULL_STOP = re.compile(r"(?<!\.)\.$")
 _CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")
 _LONGER = (
     "start its server with a longer context (llama.cpp: --ctx-size 32768; vLLM: --max-model-len 32768), or "
@@ -179,7 +180,8 @@ def _own_words(text: str) -> str:
 def _first_lines(text: str) -> str:
     """Beginning of a message, without the stack trace that the client library may append."""
     text = text.split("Traceback (most recent call last)")[0].strip()
-    return text if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
+    # Without its full stop, because more follows in most messages.
+    return _FULL_STOP.sub("", text) if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
 
 
 def _status(error: Exception) -> int | None:

@@ -72,7 +72,11 @@ class ReplyForm:
         return self.free and any(r.free for r in self.space.inputs)
 
     def schema(self) -> dict[str, Any]:
-        """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps."""
+        """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps.
+
+        No choice between schemas either: OpenAI refuses objects under ``anyOf`` whose first keys are the
+        same. What an input cannot have is found when the reply is read.
+        """
         parts: dict[str, Any] = {"rationale": _TEXT} if self.reasoned else {}
         candidate = _object(**parts, **(self._named_parts() if self.named else {"point": _NUMBERS}))
         return candidate if self.count == 1 else _object(candidates={"type": "array", "items": candidate})
@@ -80,11 +84,8 @@ class ReplyForm:
     def _named_parts(self) -> dict[str, Any]:
         parts: dict[str, Any] = {}
         if self.space.inputs:
-            kinds: dict[tuple[str, ...], list[str]] = {}
-            for r in self.space.inputs:
-                kinds.setdefault(_interpolations(r) if self.is_free else (), []).append(r.name)
-            signals = [_signal_part(names, possible) for possible, names in kinds.items()]
-            items = signals[0] if len(signals) == 1 else {"anyOf": signals}
+            possible = (i for r in self.space.inputs for i in _interpolations(r)) if self.is_free else ()
+            items = _signal_part([r.name for r in self.space.inputs], tuple(dict.fromkeys(possible)))
             parts["signals"] = {"type": "array", "items": items}
         if self.space.parameters:
             name = {"type": "string", "enum": [p.name for p in self.space.parameters]}
@@ -213,7 +214,6 @@ def _clamped(value: float, ranged: InputRange | ParameterRange | Dimension) -> f
 
 _TEXT = {"type": "string"}
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
-_RUNS = {"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "string"}]}}
 
 
 def _object(**properties: Any) -> dict[str, Any]:
@@ -231,7 +231,7 @@ def _signal_part(names: list[str], interpolations: tuple[str, ...]) -> dict[str,
     if not interpolations:
         return _object(name=name, values=_NUMBERS)
     interpolation = {"type": "string", "enum": list(interpolations)}
-    return _object(name=name, interpolation=interpolation, times=_NUMBERS, values=_RUNS)
+    return _object(name=name, interpolation=interpolation, times=_NUMBERS, values=_NUMBERS)
 
 
 def _interpolations(r: InputRange) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ from falsifier.stl.formula import (
 )
 from falsifier.stl.program import Part
 from falsifier.stl.witness import path_to_decider
+
+# Digits of numbers; of values that are compared more if their difference is small.
+_DIGITS, _MOST_DIGITS = 6, 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +114,7 @@ class Diagnosis:
         return self._told([step.plain for step in self.path])
 
     def _told(self, steps: Sequence[str]) -> str:
-        *above, predicate = steps
+        *above, predicate = (step for step in steps if step)
         decided = f"{'; '.join(above)}: {predicate}" if above else predicate
         return " ".join((f"{decided}.", *(v.text for v in self.vacuities)))
 
@@ -126,11 +130,18 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
     times = trajectory.times
     path = path_to_decider(root, buffer)
     steps = []
+    chain: list[Formula] = []
     for here, following in zip(path, [*path[1:], path[-1]], strict=True):
         formula, time = here.part.formula, float(times[here.sample])
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
         if isinstance(formula, Predicate):
             text = plain = _comparison(formula, here.value, trajectory.at(time))
+        elif isinstance(formula, And | Or) and len(chain or _links(formula)) > 2:
+            chain = chain or _links(formula)
+            text = plain = ""
+            if type(following.part.formula) is not type(formula):
+                text = plain = _of_chain(formula, chain, following.part.formula)
+                chain = []
         else:
             decided_at = float(times[following.sample])
             text = _words(formula, following.part.formula, window, decided_at, here.value)
@@ -155,6 +166,18 @@ def _vacuity(part: Part, buffer: NDArray[np.float64], times: NDArray[np.float64]
     return Vacuity(
         part.formula, window, float(times[first + nearest]), float(lefts[nearest]), bool((rights < 0).any())
     )
+
+
+def _links(formula: Formula) -> list[Formula]:
+    """Parts of a chain of the same connective, from left to right."""
+    parts = (_links(child) if type(child) is type(formula) else [child] for child in formula.children)
+    return [part for found in parts for part in found]
+
+
+def _of_chain(formula: Formula, chain: list[Formula], decider: Formula) -> str:
+    name = "and" if isinstance(formula, And) else "or"
+    position = next(k for k, part in enumerate(chain, start=1) if part == decider)
+    return f"part {position} of {len(chain)} joined by '{name}' decided"
 
 
 def _words(
@@ -204,7 +227,7 @@ def _plain(
 
 def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:
     """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
-    left, right = (_valued(side, values) for side in (predicate.left, predicate.right))
+    left, right = (_valued(side, values, value) for side in (predicate.left, predicate.right))
     if value == 0:
         return f"{left} equals {right}"
     if predicate.operator in ("==", "!="):
@@ -215,8 +238,13 @@ def _comparison(predicate: Predicate, value: float, values: dict[str, float]) ->
     return f"{left} {relation} {right} by {_n(abs(value))}"
 
 
-def _valued(side: Expression, values: dict[str, float]) -> str:
-    return str(side) if isinstance(side, Number) else f"{side} = {_n(float(side.evaluate(values)))}"
+def _valued(side: Expression, values: dict[str, float], margin: float) -> str:
+    if isinstance(side, Number):
+        return str(side)
+    value = float(side.evaluate(values))
+    # So many digits that both sides read as different.
+    digits = log10(abs(value / margin)) + 2 if value and margin else 0.0
+    return f"{side} = {value:.{int(np.clip(digits, _DIGITS, _MOST_DIGITS))}g}"
 
 
 def _over(window: tuple[float, float] | None) -> str:
@@ -233,4 +261,4 @@ def _s(time: float) -> str:
 
 
 def _n(value: float) -> str:
-    return f"{value:.6g}"
+    return f"{value:.{_DIGITS}g}"

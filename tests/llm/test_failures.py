@@ -123,3 +123,11 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
     )
     assert isinstance(error, TransientChatError)
     assert error.patience is None
+
+
+def test_the_full_stop_of_a_server_is_left_out() -> None:
+    def told(text: str) -> str:
+        return str(classify(RuntimeError(text), llm="m", api_base=None, key_variables=(), secrets=()))
+
+    assert told("Connection error.").endswith("Connection error")
+    assert told("still loading ...").endswith("still loading ...")

@@ -44,6 +44,10 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
         ("not (x <= 3)", "'not' holds: x = 3 equals 3."),
         ("not (x <= 4)", "'not' fails: x = 3 is below 4 by 1."),
         ("x <= 5 and y <= 3", "the right side of 'and' decided: y = 2 is below 3 by 1."),
+        ("x <= 9 and (y <= 9 and x <= 9) and y <= 3",
+         "part 4 of 4 joined by 'and' decided: y = 2 is below 3 by 1."),
+        ("x <= 1 or y <= 3 or (x <= 1 and y <= 1)",
+         "part 2 of 3 joined by 'or' decided: y = 2 is below 3 by 1."),
         ("x <= 5 or y <= 3", "the left side of 'or' decided: x = 3 is below 5 by 2."),
         ("x <= 5 -> y <= 3", "the consequence of -> decided: y = 2 is below 3 by 1."),
         ("x <= 5 -> y >= 3", "the consequence of -> failed: y = 2 is below 3 by 1."),
@@ -121,3 +125,8 @@ def test_diagnoses_end_where_verdicts_do() -> None:
 )
 def test_plain_words_name_no_operator(formula: str, expected: str) -> None:
     assert diagnose(formula, x=[float(t) for t in range(11)]).plain == expected
+
+
+def test_numbers_that_differ_read_as_different() -> None:
+    assert diagnose("x <= 87.5", x=[87.5 + 1.08e-5]).text == "x = 87.500011 exceeds 87.5 by 1.08e-05."
+    assert diagnose("x <= 87.5", x=[87.4]).text == "x = 87.4 is below 87.5 by 0.1."

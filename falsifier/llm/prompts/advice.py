@@ -28,9 +28,18 @@ def advice(view: View, variant: Variant, *, is_flat: bool = False) -> AdviceBloc
         f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs.",
         *([] if is_flat else [deciding]),
         "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
-        "strategy.",
+        f"strategy{_such_as(view)}.",
     ]
     return AdviceBlock(lines=tuple(_at_any_time(view, variant)), on_samples=tuple(samples))
+
+
+def _such_as(view: View) -> str:
+    if all(_is_discrete(view, r) for r in view.space.inputs):
+        return ""
+    return (
+        ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits "
+        "of the ranges are not always the worst"
+    )
 
 
 def _at_any_time(view: View, variant: Variant) -> list[str]:

@@ -128,6 +128,7 @@ class InputsBlock(_Block):
     """Everything to choose."""
 
     stop_time: str = Field(default="", description="Empty: not told.")
+    horizon: str = Field(default="", description="Time up to which the requirement looks, if it is earlier.")
     dimensions: tuple[DimensionLine, ...] = ()
     courses: tuple[CourseLine, ...] = Field(default=(), description="Of the dimensions that are signals.")
     inputs: tuple[InputLine, ...] = ()

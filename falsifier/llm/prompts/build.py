@@ -34,6 +34,7 @@ from falsifier.llm.prompts.reply import reply_block
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl import in_words
+from falsifier.stl.formula import Always, Eventually, Until
 
 # Control-point times listed individually; of longer lists the first ones and the last.
 _MAX_TIMES = 25
@@ -184,9 +185,20 @@ def _named_inputs(view: View, variant: Variant) -> InputsBlock:
     known = partial(_known, view, variant)
     return InputsBlock(
         stop_time=number(view.space.stop_time),
+        horizon=_horizon(view),
         inputs=tuple(_input(view, r, known(r.name), free=free) for r in view.space.inputs),
         parameters=tuple(_parameter(view, p, known(p.name)) for p in view.space.parameters),
     )
+
+
+def _horizon(view: View) -> str:
+    """Time up to which the requirement looks; empty if that is the end of the simulation."""
+    formula = view.requirement.formula
+    timed = [f for f in formula.walk() if isinstance(f, Always | Eventually | Until)]
+    if any(f.window is None for f in timed):
+        return ""
+    horizon = formula.horizon(view.experiment.output_interval)
+    return number(horizon, 6) if horizon < view.space.stop_time - view.experiment.output_interval else ""
 
 
 def _input(view: View, r: InputRange, known: tuple[str, ...], *, free: bool) -> InputLine:

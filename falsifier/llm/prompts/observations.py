@@ -188,6 +188,8 @@ def _predicate(view: View, monitor: Monitor, predicate: Predicate, trajectory: T
             f"off by {_short(-margin[nearest])}"
         )
     step = trajectory.step
+    if int(wrong.sum()) == 1:
+        return f"{said}: false only at {plain(stretch[0], clock)} s"
     return (
         f"{said}: false for {number(round(float(wrong.sum()) * step, 6))} s in total, longest from "
         f"{plain(stretch[0], clock)} to {plain(stretch[1], clock)} s"

@@ -115,7 +115,8 @@ def _context(block: ContextBlock) -> str:
 
 
 def _inputs(block: InputsBlock) -> str:
-    length = f" The simulation runs from 0 to {block.stop_time} s." if block.stop_time else ""
+    looked = f"; the requirement looks only at 0 to {block.horizon} s" if block.horizon else ""
+    length = f" The simulation runs from 0 to {block.stop_time} s{looked}." if block.stop_time else ""
     if block.dimensions:
         lines = [f"You choose {counted(len(block.dimensions), 'number')}.{length}"]
         for d in block.dimensions:

@@ -17,7 +17,7 @@ _FREE_NOTES = (
     "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
     'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
     "stop time.",
-    'A long repetition may be written as a run: "0 x 187" among the values stands for 187 zeros.',
+    '"0 x 187" among the values of a sample stands for 187 zeros.',
 )
 # Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
 _PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)

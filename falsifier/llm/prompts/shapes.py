@@ -208,7 +208,11 @@ def _swing(times: Array, column: Array, turns: list[int], tolerance: float) -> S
 
 def _envelope(times: Array, column: Array, extrema: list[int], tolerance: float) -> Points:
     at, values = times[extrema], column[extrema]
-    chosen, _ = breakpoints(at, values, tolerance=tolerance, most=_MOST_ENVELOPE_POINTS)
+    # A peak between two samples is cut off; envelopes differ by what a signal changes there in one step.
+    inner = np.clip(extrema, 1, len(column) - 2)
+    sides = np.maximum(np.abs(column[inner] - column[inner - 1]), np.abs(column[inner] - column[inner + 1]))
+    chance = float(np.median(sides))
+    chosen, _ = breakpoints(at, values, tolerance=max(tolerance, chance), most=_MOST_ENVELOPE_POINTS)
     return _points(at, values, chosen)
 
 

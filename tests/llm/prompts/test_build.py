@@ -145,3 +145,16 @@ def test_the_published_variants_tell_neither_start_nor_budget_but_what_does_not_
         text = "\n".join(m.content for m in render(prompt))
         assert "30 simulations" not in text and "at t = 0:" not in text
         assert "does not count" in text
+
+
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        ("G[0,4] F[0,1.5] (x <= 1)", "from 0 to 10 s; the requirement looks only at 0 to 5.5 s."),
+        ("G[0,10] (x <= 1)", "from 0 to 10 s.\n"),
+        ("G (x <= 1)", "from 0 to 10 s.\n"),
+    ],
+)
+def test_the_part_of_the_simulation_that_matters_is_told(formula: str, told: str) -> None:
+    prompt = build_prompt(View.of(lag_problem(formula)), VARIANTS["MP5"], [])
+    assert f"The simulation runs {told}" in render(prompt)[0].content

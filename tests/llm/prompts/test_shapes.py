@@ -72,3 +72,11 @@ def test_lines_and_oscillations_take_turns() -> None:
     before, after = drawn.lines
     assert before[0][0] == 0.0 and before[-1][0] == pytest.approx(3.0, abs=0.2)
     assert after[0][0] == pytest.approx(6.0, abs=0.2) and after[-1][0] == 10.0
+
+
+def test_envelopes_ignore_where_samples_fall_between_peaks() -> None:
+    # Seven samples per period of a triangle: sampled peaks differ by the place of the samples alone.
+    times = np.arange(0, 100, 0.01)
+    column = 10 + 5 * np.abs((times / 0.0733) % 1.0 - 0.5) * 2
+    (swing,) = oscillations(times, column, slower_than=5.0)
+    assert len(swing.lower) == len(swing.upper) == 2

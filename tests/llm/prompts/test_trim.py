@@ -45,7 +45,7 @@ def test_the_best_sample_stays_longest() -> None:
     prompt = long_prompt()
     assert prompt.history is not None
     bare = size(prompt.model_copy(update={"history": None}))
-    smaller = trimmed(prompt, bare + 150)
+    smaller = trimmed(prompt, bare + 190)
     assert smaller.history is not None
     assert all(s.mark for s in smaller.history.samples)
     assert smaller.history.samples
