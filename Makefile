@@ -4,23 +4,37 @@
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
+PIP_INSTALL := install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: demo test lint types pytest test-spawn docs notebooks fmus windows-worker clean
+.PHONY: demo test lint types types-linux types-win32 types-darwin compiled pytest test-spawn docs notebooks fmus windows-worker clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
 	@$(BIN)/falsifier run AT1 --out runs/demo-$$(date +%Y%m%d-%H%M%S); test $$? -eq 1
 
-test: lint types pytest
+# Two cores share what comes before the tests, as the tests then do.
+test:
+	+$(MAKE) --no-print-directory --jobs=2 --output-sync=target .venv/test .venv-export/installed compiled types lint
+	+$(MAKE) --no-print-directory pytest
 
 lint: .venv/test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: .venv/test
+types: types-linux types-win32 types-darwin
+
+types-linux: .venv/test
 	$(BIN)/mypy
-	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 falsifier
-	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin falsifier
+
+# Only these modules can differ between systems: tests/core/test_operating_system.py checks that no other one uses
+# what not all systems have.
+types-win32 types-darwin: types-%: .venv/test
+	$(BIN)/mypy --platform $* --cache-dir .mypy_cache/$* --follow-imports silent \
+		$$(grep -rlE 'sys\.platform|operating_system' --include='*.py' falsifier)
+
+# Compiles the loops once, where tests side by side would each do it.
+compiled: .venv/test
+	$(BIN)/python -m tests.compiling
 
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest -n 2 --dist worksteal
@@ -46,21 +60,24 @@ fmus: .venv-export/installed
 windows-worker: .venv-export/installed
 	$(MAKE) -C falsifier/fmu/windows_worker ZIG="$(CURDIR)/.venv-export/bin/python -m ziglang"
 
-.venv/installed: pyproject.toml constraints.txt
+# Either of these two is enough. pip compiles no modules: most are never imported, and the others then compile.
+.venv/installed: pyproject.toml constraints.txt | .venv/bin/pip
+	$(BIN)/pip $(PIP_INSTALL) -c constraints.txt -e .
+	@touch $@
+
+.venv/test: pyproject.toml constraints.txt | .venv/bin/pip
+	$(BIN)/pip $(PIP_INSTALL) -c constraints.txt -e '.[test]'
+	@touch .venv/installed $@
+
+# Without a pip of its own, which takes seconds to set up.
+.venv-export/installed: modelica/export/requirements.txt | .venv/bin/pip
+	$(PYTHON) -m venv --without-pip .venv-export
+	$(BIN)/pip --python .venv-export/bin/python $(PIP_INSTALL) -r modelica/export/requirements.txt
+	@touch $@
+
+.venv/bin/pip:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is required; install it, or run make PYTHON=/path/to/python3"; exit 2; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
-	@touch $@
-
-.venv/test: .venv/installed
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
-	@touch $@
-
-.venv-export/installed: modelica/export/requirements.txt
-	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is required; install it, or run make PYTHON=/path/to/python3"; exit 2; }
-	$(PYTHON) -m venv .venv-export
-	.venv-export/bin/pip install --quiet --disable-pip-version-check -r modelica/export/requirements.txt
-	@touch $@
 
 clean:
 	rm -rf .venv .venv-export build .mypy_cache .ruff_cache .pytest_cache .hypothesis runs

@@ -4,7 +4,9 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import machine_code, master, readiness, system_solver
+from falsifier.search.run import falsify
 from falsifier.stl import Monitor, parse
+from falsifier.testing import lag_problem
 
 
 def load_common() -> None:
@@ -15,8 +17,9 @@ def load_common() -> None:
 
 
 def load_all() -> None:
-    """Load everything that is compiled."""
+    """Load everything that is compiled: monitors, what the surrogate predicts with, and the steppers."""
     load_common()
+    falsify(lag_problem("G[0,10] (x <= 2)"), "surrogate", budget=12)
     machine_code.load("model_exchange")
     master.warm_up()
     system_solver.warm_up()

@@ -29,30 +29,32 @@ from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.plan import as_searched
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.suites import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
-from falsifier.cli.options import (
-    DEFAULT_PARAMETERIZATION,
+from falsifier.cli.llm_options import (
     asking,
     asking_options,
-    budget_option,
     check_context,
     context_option,
-    directory_argument,
     effort_option,
+    llm_option,
+    refuse_limits_without_llm,
+    variant_option,
+)
+from falsifier.cli.options import (
+    DEFAULT_PARAMETERIZATION,
+    budget_option,
+    directory_argument,
     engine_option,
     executor_option,
     jobs_option,
     json_option,
     limit_options,
-    llm_option,
     objective_option,
     out_option,
     parameterization_option,
     profile_option,
     quiet_option,
-    refuse_limits_without_llm,
     seed_option,
     total_options,
-    variant_option,
 )
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole

@@ -12,6 +12,11 @@ from typing import Any
 
 import click
 
+from falsifier.cli.llm_options import (
+    api_base_option,
+    effort_option,
+    llm_option,
+)
 from falsifier.cli.nearest_miss import (
     draw_nearest_miss,
     nearest_miss_line,
@@ -20,11 +25,8 @@ from falsifier.cli.nearest_miss import (
     shrunk_line,
 )
 from falsifier.cli.options import (
-    api_base_option,
     budget_option,
-    effort_option,
     json_option,
-    llm_option,
     out_option,
     run_argument,
     seed_option,

@@ -7,16 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import (
+from falsifier.cli.llm_options import (
     anonymous_option,
     api_base_option,
     context_option,
     effort_option,
+    reply_option,
+    variant_option,
+)
+from falsifier.cli.options import (
     json_option,
     problem_options,
     problem_source,
-    reply_option,
-    variant_option,
 )
 from falsifier.cli.output import say
 from falsifier.core.words import counted

@@ -11,24 +11,26 @@ import click
 from falsifier.campaigns.directory import is_campaign, run_directories
 from falsifier.cli.campaign import resume_campaign
 from falsifier.cli.files import write_counterexample
-from falsifier.cli.options import (
-    budget_option,
+from falsifier.cli.llm_options import (
     check_context,
     context_option,
+    llm_options,
+    llm_settings,
+    refuse_limits_without_llm,
+)
+from falsifier.cli.options import (
+    budget_option,
     directory_argument,
     engine_option,
     executor_option,
     jobs_option,
     json_option,
     limit_options,
-    llm_options,
-    llm_settings,
     objective_option,
     out_option,
     problem_options,
     problem_source,
     quiet_option,
-    refuse_limits_without_llm,
     seed_option,
     start_from_option,
     total_options,

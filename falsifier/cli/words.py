@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import (
+from falsifier.cli.llm_options import (
     connection_options,
     connection_settings,
     effort_option,
-    json_option,
     llm_option,
+)
+from falsifier.cli.options import (
+    json_option,
     out_option,
     profile_option,
     template_option,

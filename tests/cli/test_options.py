@@ -32,17 +32,6 @@ def test_quiet_silences_what_simulates_until_the_command_ends() -> None:
     [
         (["--seed", "-1"], "-1 is not in the range x>=0"),
         (["--jobs", "0"], "0 is not in the range x>=1"),
-        (["--max-cost", "1"], "--max-cost: applies to language models only; add --llm NAME"),
-        (
-            ["--max-tokens", "10", "--max-cost", "1"],
-            "--max-tokens, --max-cost: applies to language models only",
-        ),
-        (["--llm", "nobody/x", "--timeout", "nan"], "--timeout nan: expected a number of seconds"),
-        (
-            ["--llm", "nobody/x", "--price", "2"],
-            "--price 2: expected SENT:RECEIVED in US dollars per million tokens sent and received, for "
-            "example 0.25:2",
-        ),
     ],
 )
 def test_options_that_cannot_be_used_are_wrong_usage(
