@@ -117,11 +117,11 @@ class SystemInstance:
 def _maker(network: Network) -> Callable[..., FmuInstance]:
     if network.coupling.isolation == "together":
         return FmuInstance
-    if sys.platform != "linux":
-        raise ModelError(
-            f'{network.name}: components run in processes of their own (isolation = "each") on Linux only; '
-            'use isolation = "together"'
-        )
-    from falsifier.fmu.remote_component import RemoteComponent
+    if sys.platform == "linux":
+        from falsifier.fmu.remote_component import RemoteComponent
 
-    return cast(Callable[..., FmuInstance], RemoteComponent)
+        return cast(Callable[..., FmuInstance], RemoteComponent)
+    raise ModelError(
+        f'{network.name}: components run in processes of their own (isolation = "each") on Linux only; '
+        'use isolation = "together"'
+    )

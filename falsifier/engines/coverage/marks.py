@@ -175,7 +175,8 @@ def _levels(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
         levels = np.arange(top - _LEVELS + 1, top + 1)
         samples = np.searchsorted(np.maximum.accumulate(deviation), 2.0 ** (levels / 2))
         for level, sample in zip(levels.tolist(), samples.tolist(), strict=True):
-            yield Mark(name, (direction, level)), sample
+            if sample < len(deviation):  # the logarithm may be rounded up to a level that is not reached
+                yield Mark(name, (direction, level)), sample
 
 
 def _nearness(name: str, margin: Floats) -> Iterator[tuple[Mark, int]]:

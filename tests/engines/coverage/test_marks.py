@@ -1,5 +1,5 @@
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from falsifier.core.trajectory import Trajectory
@@ -61,6 +61,7 @@ def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
         st.sampled_from([0.0, 1e-300, -1.0, 2.0, 1e300, np.inf, np.nan, -np.inf]), min_size=2, max_size=9
     )
 )
+@example([0.0, float(np.nextafter(2.0**-10, 0.0))])  # its logarithm is rounded up to that of 2 ** -10
 def test_any_numbers_have_marks(values: list[float]) -> None:
     marker = Marker.of(lag_problem("G[0,10] (x <= 0.9)"))
     times = np.linspace(0.0, 1.0, len(values))
