@@ -115,6 +115,11 @@ class Master:
             status = loops.read_signals(address, 0.0)
             if status > 1:
                 self._fail(position, f"reading the outputs returned {status_name(status)}", 0.0)
+            # Otherwise the component that receives it would be blamed.
+            if outputs := self._not_numbers(position):
+                name = self._network.stepped(position)
+                text = f"{name}: {outputs} is nan at t = 0 s, after the initialisation"
+                raise SimulationError(text, time=0.0)
         self._report[:] = 0
         if not loops.record(*self._rows, *self._copies, 0, self._report):
             self._check(0.0)

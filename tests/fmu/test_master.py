@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import Component, Connection, Coupling
+from falsifier.fmu.master import _Starter
+from falsifier.fmu.network import Method
+from falsifier.fmu.system_tables import SystemTables
 from tests.fmu.fixtures import path
 from tests.fmu.systems import LOOP, STEP, component, loop, run, sampled_loop, solved, system
 
@@ -188,6 +191,24 @@ def test_an_output_that_is_nan_at_time_0_is_named_and_not_the_loop_that_it_sprea
         run(model, "plant.x", parameters={"pi.k": 0.5, parameter: float("nan")})
     assert failed.value.time == 0.0
     assert np.isfinite(run(model, "plant.x", parameters={"pi.k": 0.5})["plant.x"]).all()
+
+
+@pytest.mark.parametrize("method", ["gauss-seidel", "jacobi"])
+def test_an_output_that_is_nan_after_the_initialisation_is_named_and_not_the_component_that_receives_it(
+    method: Method, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave = _Starter.leave
+
+    def leave_with_nan(self: _Starter, tables: SystemTables) -> None:
+        leave(self, tables)
+        if self._rows:
+            self._room.parameters[self._rows] = np.nan
+            self._set_parameters()
+
+    monkeypatch.setattr(_Starter, "leave", leave_with_nan)
+    model = system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP, Coupling(method))
+    with pytest.raises(SimulationError, match=r"^pi: pi\.y is nan at t = 0 s, after the initialisation$"):
+        run(model, "plant.y", parameters={"pi.k": 0.5})
 
 
 def test_discrete_inputs_of_fmi_3_change_at_events() -> None:

@@ -37,6 +37,8 @@ The FMUs are those in components/, the inputs in input.csv. The tables of the sy
 _SCRIPT = """\
 {about}
 
+from math import inf, nan  # start values in the table may be these
+
 SYSTEM = {system}
 
 {loop}

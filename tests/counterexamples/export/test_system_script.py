@@ -1,6 +1,6 @@
 """FMPy alone, stepping as the exported script says, gives the trajectories of the compiled master."""
 
-import ast
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
@@ -54,11 +54,7 @@ def same(problem: Problem, candidate: Candidate, folder: Path) -> Evaluation:
 
 
 def tables(script: Path) -> dict[str, Any]:
-    statements = ast.parse(script.read_text(encoding="utf-8")).body
-    (found,) = (
-        s.value for s in statements if isinstance(s, ast.Assign) and "SYSTEM" in ast.unparse(s.targets[0])
-    )
-    read: dict[str, Any] = ast.literal_eval(found)
+    read: dict[str, Any] = runpy.run_path(str(script))["SYSTEM"]
     return read
 
 
@@ -117,6 +113,13 @@ def test_inputs_of_the_whole_that_are_driven_and_constant(tmp_path: Path) -> Non
         output_interval=0.1,
     )
     same(problem, Candidate({"r": Signal((0.0, 1.0), (0.0, 1.0), "linear")}), tmp_path)
+
+
+def test_infinite_start_values(tmp_path: Path) -> None:
+    problem = problem_of(system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP))
+    endless = Candidate(DRIVE.signals, {**DRIVE.parameters, "plant.T": float("inf")})
+    same(problem, endless, tmp_path)
+    assert tables(tmp_path / "replay.py")["components"]["plant"]["start"]["T"] == float("inf")
 
 
 @pytest.mark.parametrize("name", ["SharedFeeder", "F16split", "CCcars1"])
