@@ -89,10 +89,11 @@ def _crossings(
     constants = sorted(threshold.constants)
     choices = [[v.strip() for v in threshold.constants[c].split(" or ")] for c in constants]
     for values in islice(product(*choices), _MAX_COMBINATIONS):
-        scope = _Scope(name, known, dict(zip(constants, values, strict=True)))
+        stated = dict(zip(constants, values, strict=True))
 
-        def margin(at: Array, scope: _Scope = scope) -> Array:
-            left, right = (scope.value(side, at) for side in (threshold.left, threshold.right))
+        def margin(at: Array, stated: Mapping[str, str] = stated) -> Array:
+            scope = _Scope(name, known, stated, at)
+            left, right = (scope.value(side) for side in (threshold.left, threshold.right))
             return np.broadcast_to(left - right, at.shape)
 
         try:
@@ -120,13 +121,25 @@ def _roots(margin: Callable[[Array], Array], at: Array) -> Iterator[float]:
 
 @dataclass(frozen=True, slots=True)
 class _Scope:
-    """Evaluates expressions of Modelica, C and Simulink in which one signal varies."""
+    """Evaluates expressions of Modelica, C and Simulink in which one signal varies.
+
+    States that feed each other are followed for some steps. Values of names are kept per step: without that,
+    time would grow with a power of the number of states.
+
+    Attributes:
+        signal: the signal.
+        known: values of other variables.
+        constants: values of the constants.
+        at: values of the signal.
+    """
 
     signal: str
     known: Definitions
     constants: Mapping[str, str]
+    at: Array
+    _kept: dict[tuple[str, int], Array | None] = field(default_factory=dict)
 
-    def value(self, text: str, at: Array, depth: int = 0) -> Array:
+    def value(self, text: str, depth: int = 0) -> Array:
         """Return the value of an expression for each value of the signal.
 
         Raises:
@@ -137,44 +150,55 @@ class _Scope:
         names: list[str] = []
         try:
             tree = ast.parse(_as_python(text, names), mode="eval").body
-            return self._of(tree, names, at, depth)
+            return self._of(tree, names, depth)
         except (SyntaxError, MemoryError, RecursionError, ArithmeticError):
             raise _UnknownError(text) from None
 
-    def _of(self, node: ast.expr, names: list[str], at: Array, depth: int) -> Array:
+    def _of(self, node: ast.expr, names: list[str], depth: int) -> Array:
         match node:
             case ast.Constant(value=int() | float() as number):
                 return np.asarray(float(number))
             case ast.Name(id=placeholder):
-                return self._named(names[int(placeholder[1:])], at, depth)
+                return self._kept_value(names[int(placeholder[1:])], depth)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return -self._of(operand, names, at, depth)
+                return -self._of(operand, names, depth)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-                return self._of(operand, names, at, depth)
+                return self._of(operand, names, depth)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-                sides = (self._of(side, names, at, depth) for side in (left, right))
+                sides = (self._of(side, names, depth) for side in (left, right))
                 return _BINARY[type(op)](*sides)
             case ast.Call(func=ast.Name(id=placeholder), args=[_, *_] as args, keywords=[]):
                 function = names[int(placeholder[1:])]
-                values = [self._of(a, names, at, depth) for a in args]
+                values = [self._of(a, names, depth) for a in args]
                 if function in _UNCHANGED:
                     return values[-1]
                 if function in _FUNCTIONS and len(values) == 1 + (function in ("min", "max")):
                     return _FUNCTIONS[function](*values)
         raise _UnknownError(ast.dump(node))
 
-    def _named(self, name: str, at: Array, depth: int) -> Array:
+    def _kept_value(self, name: str, depth: int) -> Array:
+        if (name, depth) not in self._kept:
+            try:
+                self._kept[name, depth] = self._named(name, depth)
+            except _UnknownError:
+                self._kept[name, depth] = None
+        value = self._kept[name, depth]
+        if value is None:
+            raise _UnknownError(name)
+        return value
+
+    def _named(self, name: str, depth: int) -> Array:
         if name in self.constants and (self.constants[name] or name not in self.known.equal):
-            return self.value(self.constants[name], at, depth + 1)
+            return self.value(self.constants[name], depth + 1)
         if name == self.signal and name not in self.constants:
-            return at
+            return self.at
         if name in self.known.equal:
             try:
-                return self.value(self.known.equal[name], at, depth + 1)
+                return self.value(self.known.equal[name], depth + 1)
             except _UnknownError:
                 pass  # it may follow the signal all the same
         if self.signal in self.known.fed.get(name, ()):
-            return at
+            return self.at
         raise _UnknownError(name)
 
 

@@ -208,7 +208,8 @@ def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[Lin
         group: problems that differ only in their requirement.
         simulations: number of random simulations; 0: only what the FMU declares.
     """
-    suspects = [p for p in group if not set(p.requirement.formula.signals) & set(p.space.names)]
+    named = {p.name: set(p.requirement.formula.signals) for p in group}  # none: it is always decided
+    suspects = [p for p in group if named[p.name] and not named[p.name] & set(p.space.names)]
     declared = {p.name: _is_declared_independent(p) for p in suspects}
     asked = [p for p in suspects if declared[p.name] or _is_continuous(p)]
     simulated = _simulated(group[0], simulations) if asked and simulations else []

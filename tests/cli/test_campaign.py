@@ -6,7 +6,9 @@ import pytest
 
 from falsifier.campaigns import Follower
 from falsifier.campaigns.directory import locked
+from falsifier.context.values import Level
 from falsifier.errors import JournalError, SpecError
+from falsifier.search import manifest
 from falsifier.search.run import falsify
 from falsifier.testing import lag_problem
 from tests.cli.support import HARD, NEVER, bench
@@ -30,6 +32,20 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
 def test_json_is_alone_on_stdout(command: Any) -> None:
     result = bench(command, "--json", "--quiet")
     assert [row["label"] for row in json.loads(result.stdout)] == ["uniform", "uniform"]
+
+
+def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.c").write_text("void f(double throttle) { if (throttle > 37.5) speed = 1; }\n")
+    asked = ("bench", "AT1", "--runs", "1", "--budget", "1", "--quiet")
+    result = command(*asked, "--context", "a.c", "--out", "c")
+    assert result.exit_code == 0, result.output
+    (place,) = (tmp_path / "c").rglob("manifest.json")
+    assert manifest.read(place.parent).contexts["AT1"].levels == (Level("throttle", 37.5),)
+    missing = command(*asked, "--context", "b.c", "--out", "d").exception
+    assert isinstance(missing, SpecError)
+    assert "context b.c: cannot be read" in str(missing)
+    useless = command(*asked, "--context", "a.c", "--engine", "uniform", "--out", "e")
+    assert "--context: applies to language models and" in f"{useless.stderr} {useless.exception}"
 
 
 def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> None:

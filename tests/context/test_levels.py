@@ -45,5 +45,12 @@ def test_variables_are_followed_to_the_signal() -> None:
     assert found("loop > 4", known) == []
 
 
+def test_states_that_feed_each_other_take_no_time_that_grows_with_a_power_of_their_number() -> None:
+    states = [f"x{i}" for i in range(4)]
+    equal = {state: f"({' + '.join(states)}) / 8 + u / 2" for state in states}
+    fed = dict.fromkeys(states, frozenset((*states, "u")))
+    assert found("x0 > 4", Definitions(equal, fed)) == [4.0]  # once per path of 12 steps is 4 ** 12 times
+
+
 def test_the_number_of_levels_is_limited() -> None:
     assert len(found(" and ".join(f"u > {i / 10}" for i in range(1, 90)))) == 24

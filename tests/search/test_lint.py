@@ -9,6 +9,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
+from falsifier.problem.source import ProblemSource
 from falsifier.search.lint import lint, static_findings, unmoved_findings
 from falsifier.testing import Array, lag_problem
 from tests.problem.support import AT, spec
@@ -133,3 +134,9 @@ def test_a_spec_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
                 tmp_path, SPEC.replace("[0, 100]", "[100, 0]") + "[requirements.R]\nformula = 'speed <= 1'\n"
             )
         )
+
+
+@pytest.mark.parametrize(("formula", "kind"), [("G[0,10] (5 < 3)", "never"), ("5 > 3", "always")])
+def test_a_formula_without_signals_is_decided(formula: str, kind: str) -> None:
+    (found,) = lint(ProblemSource(target="AT1", stl=formula), simulations=0)
+    assert (found.kind, found.text.endswith(", whatever happens")) == (kind, True)
