@@ -17,6 +17,8 @@ from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, stora
 
 # In s; reasoning models may think for minutes.
 DEFAULT_TIMEOUT = 600.0
+# In s; the longest that a socket can wait is 2**31 ms.
+_LONGEST_TIMEOUT = 2e6
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ class LiteLLMChat:
         litellm = load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left
-        seconds = self.timeout if left is None else min(self.timeout, left)
+        timeout = min(self.timeout, _LONGEST_TIMEOUT)
+        seconds = timeout if left is None else min(timeout, left)
         started = perf_counter()
 
         def ask() -> ChatReply:
@@ -73,7 +76,7 @@ class LiteLLMChat:
                 model=self.llm,
                 messages=[sent_message(m) for m in request.messages],
                 api_base=self.api_base,
-                timeout=self.timeout,
+                timeout=timeout,
                 drop_params=True,  # what the LLM does not accept is omitted; _effective() reports it
                 **{"api_key": key, **arguments},
             )

@@ -156,10 +156,11 @@ class ReplyForm:
                 raise RejectedReplyError(f"input {_shown(signal.name)} is given twice")
             signals[signal.name] = self._signal(signal)
         ranges = {p.name: p for p in self.space.parameters}
-        parameters = {
-            p.name: _clamped(p.value, ranges[p.name]) if p.name in ranges else p.value
-            for p in reply.parameters
-        }
+        parameters: dict[str, float] = {}
+        for p in reply.parameters:
+            if p.name in parameters:
+                raise RejectedReplyError(f"parameter {_shown(p.name)} is given twice")
+            parameters[p.name] = _clamped(p.value, ranges[p.name]) if p.name in ranges else p.value
         return self._admitted(Candidate(signals, parameters, origin, reply.rationale))
 
     def _allowed(self) -> SearchSpace:

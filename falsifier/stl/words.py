@@ -73,7 +73,7 @@ def _read(formula: Formula, *, later: bool) -> str:
             end = _sometime(window, later=later).replace("at some time ", "")
             return f"{_part(left, later=True)} until, {end}, {_part(right, later=True)}"
         case Next(operand):
-            return f"at the next sample, {_read(operand, later=True)}"
+            return f"at the next recorded time, {_read(operand, later=True)}"
     raise TypeError(f"not a formula: {formula!r}")
 
 

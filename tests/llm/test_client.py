@@ -365,3 +365,9 @@ def test_the_smallest_efforts_are_sent_or_reported_as_dropped(effort: str) -> No
         reply = LiteLLMChat("openai/gpt-5-mini", effort=effort, api_base=server.url).complete(REQUEST)
         (asked,) = server.received
     assert (asked.body.get("reasoning_effort") == effort) != ("effort" in reply.parameters.get("dropped", []))
+
+
+def test_a_timeout_longer_than_a_socket_can_wait() -> None:
+    with serving(Step("ok")) as server:
+        chat = LiteLLMChat("openai/some-model", api_base=server.url, timeout=1e12)
+        assert chat.complete(REQUEST).text == "ok"

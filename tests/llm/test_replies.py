@@ -106,6 +106,7 @@ def changed(**changes: Any) -> dict[str, Any]:
         (changed(signals=[{"name": "throttle", "values": ["lots"]}]), "'lots' is neither a number nor a run"),
         (changed(parameters=[{"name": "mass", "value": float("nan")}]), "finite"),
         (changed(parameters=[]), "'mass' is missing"),
+        (changed(parameters=[{"name": "mass", "value": v} for v in (950, 1050)]), "'mass' is given twice"),
     ],
 )
 def test_what_is_wrong_is_told(reply: Any, problem: str) -> None:

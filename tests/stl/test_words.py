@@ -37,7 +37,7 @@ from tests.stl.randoms import random_formula
         ),
         (
             "G[0,9] (a and X not a -> F[1,2] b)",
-            "At all times from 0 to 9 s, if a is true and (at the next sample, a is false), "
+            "At all times from 0 to 9 s, if a is true and (at the next recorded time, a is false), "
             "then at some time from 1 to 2 s later, b is true.",
         ),
         ("(a or b) and c <-> d", "((a is true or b is true) and c is true) exactly when d is true."),
