@@ -24,6 +24,8 @@ _BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.MULTILINE 
 _CLOCK = re.compile(r"\(\d[\d.]* s; simulator \d[\d.]* s, engine \d[\d.]* s\)")
 _NUMBER = re.compile(r"([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)")
 _TOLERANCE = 1e-3
+# A command that has not ended by then hangs, however busy the machine is.
+_HANG_SECONDS = 1800
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def _execute(command: str, folder: Path, environment: dict[str, str]) -> tuple[i
         env=environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=_HANG_SECONDS,
         check=False,
     )
     if done.returncode not in (0, 1):  # 1: falsified

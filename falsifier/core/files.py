@@ -60,9 +60,9 @@ def write_whole(path: Path, content: str | bytes) -> Path:
 
 
 def own_temporary_folder(name: str) -> Path | None:
-    """Return a folder for machine code in the system's temporary folder; None if others can write to it."""
-    folder = Path(tempfile.gettempdir()) / f"{name}-{operating_system.user()}"
+    """Return a folder for machine code in the system's temporary folder; None if it cannot be private."""
     try:
+        folder = Path(tempfile.gettempdir()) / f"{name}-{operating_system.user()}"
         folder.mkdir(mode=0o700, exist_ok=True)
         is_private = operating_system.is_private(folder)
     except OSError:

@@ -130,11 +130,16 @@ def keep(name: str, code: Code) -> None:
     for folder in _folders():
         with suppress(OSError):
             write_whole(folder / file, sha256(body).digest() + body)
-            outdated = f"{file.rpartition('-')[0]}-*"
-            for old in folder.glob(outdated):
-                if old.name != file:
-                    old.unlink(missing_ok=True)
+            _remove_outdated(folder, file)
             return
+
+
+def _remove_outdated(folder: Path, file: str) -> None:
+    """Remove older machine code; not what another process is writing, and Windows keeps what is in use."""
+    for old in folder.glob(f"{file.rpartition('-')[0]}-*.o"):
+        if old.name != file:
+            with suppress(OSError):
+                old.unlink()
 
 
 def compile_entry(name: str) -> Code:

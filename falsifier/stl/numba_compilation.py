@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from falsifier.core.files import own_temporary_folder
+from falsifier.errors import SpecError
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -19,11 +20,16 @@ def compiled(function: _Function, *, forceinline: bool = False, fastmath: bool =
         function: the function to compile.
         forceinline: whether to inline its machine code at every call.
         fastmath: whether sums may be reordered and non-finite numbers ignored.
+
+    Raises:
+        SpecError: if numba must not compile.
     """
     import numba
 
     from falsifier.stl.checked_cache import check_cache
 
+    if numba.config.DISABLE_JIT:
+        raise SpecError("NUMBA_DISABLE_JIT is set, but falsifier must compile; unset it")
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
     options |= {"forceinline": forceinline, "fastmath": fastmath}
 

@@ -58,3 +58,11 @@ def test_a_temporary_folder_that_others_can_write_to_is_not_used(
     assert own is not None and own.stat().st_mode & 0o777 == 0o700
     own.chmod(0o777)
     assert own_temporary_folder("falsifier-test") is None
+
+
+def test_without_a_temporary_folder_there_is_no_private_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> str:
+        raise FileNotFoundError("No usable temporary directory found")
+
+    monkeypatch.setattr("tempfile.gettempdir", refuse)
+    assert own_temporary_folder("falsifier-numba") is None

@@ -20,6 +20,8 @@ UNIX_ONLY = {
     "children",
     "end_descendants_of",
     "end_by",
+    "end_like",
+    "await_end",
     "open_pipe",
     "start_holding",
     "wait_for_any",

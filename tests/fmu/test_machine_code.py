@@ -43,11 +43,24 @@ def test_what_was_kept_is_found_and_replaces_what_is_outdated(folder: Path) -> N
     assert kept("model_exchange") is None
     (file,) = folder.iterdir()
     start, _, sources = file.name.rpartition("-")
-    outdated, elsewhere = folder / f"{start}-{sources[::-1]}", folder / file.name.replace("-", "-other")
+    outdated, elsewhere = folder / f"{start}-0{sources}", folder / file.name.replace("-", "-other")
     outdated.touch()
     elsewhere.touch()
     keep(NAME, CODE)
     assert set(folder.iterdir()) == {file, elsewhere}, "that of another machine stays"
+
+
+def test_what_others_write_or_use_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folders = [tmp_path / "first", tmp_path / "second"]
+    monkeypatch.setattr(machine_code, "_folders", lambda: iter(folders))
+    keep(NAME, CODE)
+    (file,) = folders[0].iterdir()
+    partial, used = file.with_name(f"{file.name}.1.partial"), file.with_name(file.name.replace(".o", "0.o"))
+    partial.touch()
+    used.mkdir()  # cannot be removed, as on Windows a file that is in use
+    keep(NAME, CODE)
+    assert {*folders[0].iterdir()} == {file, partial, used}
+    assert not folders[1].exists()
 
 
 @pytest.mark.parametrize("damage", [b"", b"short", b"x" * 100])

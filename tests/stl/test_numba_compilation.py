@@ -3,6 +3,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import pytest
+
+from falsifier.errors import SpecError
+from falsifier.stl.numba_compilation import compiled
+
 CODE = """
 import numba.core.caching as caching
 cache = getattr(caching, "CacheImpl", None) or caching._CacheImpl
@@ -28,3 +34,9 @@ def test_the_cache_goes_to_a_temporary_folder_where_no_other_can_be_written(tmp_
     )
     assert done.stdout.strip() == "3.0", done.stderr
     assert list(tmp_path.glob("falsifier-numba-*/**/*.nbi"))
+
+
+def test_a_setting_that_forbids_to_compile_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 1)
+    with pytest.raises(SpecError, match="NUMBA_DISABLE_JIT is set"):
+        compiled(lambda x: x)
