@@ -1,4 +1,4 @@
-"""What a problem names as context, and reading it: only when a language model is to be asked."""
+"""What a problem names as context, and reading it: only for a language model or an engine that uses it."""
 
 import logging
 from dataclasses import replace

@@ -34,7 +34,7 @@ class Problem:
         parameters: fixed values of parameters, start values and constant inputs, by name.
         source: how it was loaded; None if it was made in Python, or changed after it was loaded.
         notes: what was chosen or ignored when it was loaded and the user should know, in words.
-        named_context: what the user named for a language model to read; it is read by ``with_context``.
+        named_context: what the user named for a language model or an engine to read; see ``problem.context``.
         context: what was read of it.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log10
+from math import inf, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -243,7 +243,8 @@ def _valued(side: Expression, values: dict[str, float], margin: float) -> str:
         return str(side)
     value = float(side.evaluate(values))
     # So many digits that both sides read as different.
-    digits = log10(abs(value / margin)) + 2 if value and margin else 0.0
+    ratio = abs(value / margin) if margin else 0.0
+    digits = log10(ratio) + 2 if 0.0 < ratio < inf else 0.0
     return f"{side} = {value:.{int(np.clip(digits, _DIGITS, _MOST_DIGITS))}g}"
 
 

@@ -1,8 +1,12 @@
+from math import inf, nan
+
 import numpy as np
 import pytest
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Diagnosis, Monitor, parse
+from falsifier.stl.diagnosis import _valued
+from falsifier.stl.expression import Name
 from tests.stl.randoms import STEP, random_case
 
 
@@ -130,3 +134,8 @@ def test_plain_words_name_no_operator(formula: str, expected: str) -> None:
 def test_numbers_that_differ_read_as_different() -> None:
     assert diagnose("x <= 87.5", x=[87.5 + 1.08e-5]).text == "x = 87.500011 exceeds 87.5 by 1.08e-05."
     assert diagnose("x <= 87.5", x=[87.4]).text == "x = 87.4 is below 87.5 by 0.1."
+
+
+@pytest.mark.parametrize(("value", "margin"), [(3.0, inf), (inf, inf), (inf, 1.0), (3.0, nan), (0.0, 1.0)])
+def test_values_that_are_not_finite_are_told_too(value: float, margin: float) -> None:
+    assert _valued(Name("x"), {"x": value}, margin) == f"x = {value:g}"
