@@ -34,6 +34,7 @@ script_: list[int] = []
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Six samples of a model, the second after a rejected reply."""
     directory = tmp_path_factory.mktemp("asked") / "run"
+    script_.clear()  # a worker that comes back to this module makes the run again
     falsify(impossible(), llm=ScriptedChat(script), budget=6, directory=directory)
     return directory
 
