@@ -9,7 +9,10 @@ of one second. Where its discrete-time semantics differ from ours, the formula i
 - its ``until`` ignores the last sample of the left operand: ``l U r`` becomes ``l U (l and r)``;
 - its ``l U[a,b] r`` takes cubic time and becomes the equivalent
   ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``;
-- its ``iff`` and ``xor`` are unsigned: ``<->`` becomes two implications.
+- its ``iff`` and ``xor`` are unsigned: ``<->`` becomes two implications;
+- its ``G[a,b]`` looks through the whole window at every sample, and only time 0 is asked for: a ``G[a,b] f``
+  that is not inside another temporal operator becomes ``G (not inside or f)`` and ``F[a,b] f`` becomes
+  ``F (inside and f)``, with a column ``inside`` that is infinite in the window and minus infinite outside.
 """
 
 import sys
@@ -17,6 +20,7 @@ import types
 import typing
 import warnings
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -54,7 +58,7 @@ def robustness(formula: Formula, trajectory: Trajectory) -> float:
     if needed > end + 1e-6 * trajectory.step:
         raise MonitorError(f"the formula needs {needed:g} s, but the trajectory ends at {end:g} s")
     translation = _Translation(trajectory)
-    text = translation.formula(formula)
+    text = translation.at_start(formula)
     columns = translation.columns
     if len(trajectory) == 1:  # rtamt fails on one sample; repeating it does not change the value at time 0
         columns = {name: values * 2 for name, values in columns.items()}
@@ -68,6 +72,25 @@ class _Translation:
     trajectory: Trajectory
     columns: dict[str, list[float]] = field(default_factory=dict)
     aliases: dict[Expression, str] = field(default_factory=dict)
+
+    def at_start(self, f: Formula) -> str:
+        """Return the text of a formula of which only the value at time 0 counts, in parentheses."""
+        match f:
+            case Not(operand):
+                return f"(not {self.at_start(operand)})"
+            case And(left, right):
+                return f"({self.at_start(left)} and {self.at_start(right)})"
+            case Or(left, right):
+                return f"({self.at_start(left)} or {self.at_start(right)})"
+            case Implies(left, right):
+                return f"({self.at_start(left)} -> {self.at_start(right)})"
+            case Iff(left, right):
+                return self.at_start(And(Implies(left, right), Implies(right, left)))
+            case Always(operand, window) if window is not None:
+                return f"(always ((0 >= {self.inside(window)}) or {self.formula(operand)}))"
+            case Eventually(operand, window) if window is not None:
+                return f"(eventually (({self.inside(window)} >= 0) and {self.formula(operand)}))"
+        return self.formula(f)
 
     def formula(self, f: Formula) -> str:
         """Return the text of a formula, in parentheses."""
@@ -112,6 +135,13 @@ class _Translation:
             return ""
         start, end = window_samples(window, self.trajectory.step or 1.0)
         return f"[{start},{end}]"
+
+    def inside(self, window: Window) -> str:
+        """Return the alias of a column that is infinite in a window and minus infinite outside."""
+        start, end = window_samples(window, self.trajectory.step or 1.0)
+        alias = f"v{len(self.columns)}"
+        self.columns[alias] = [inf if start <= k <= end else -inf for k in range(len(self.trajectory))]
+        return alias
 
     def side(self, expression: Expression) -> str:
         """Return the text of a compared expression: a number, or the alias of its column."""
