@@ -14,7 +14,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -37,8 +37,42 @@ class Difference:
     printed: str
 
 
-def run(page: str) -> tuple[str, list[Difference]]:
-    """Return the page with today's output, and where that differs."""
+@dataclass(frozen=True)
+class Done:
+    """A finished command."""
+
+    code: int
+    out: str
+    err: str
+
+
+Execute = Callable[[str, Path, Mapping[str, str]], Done]
+
+
+def in_shell(command: str, folder: Path, environment: Mapping[str, str]) -> Done:
+    """Execute a command as a user does."""
+    done = subprocess.run(
+        ["sh", "-c", command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=_HANG_SECONDS,
+        check=False,
+    )
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def run(page: str, execute: Execute = in_shell) -> tuple[str, list[Difference]]:
+    """Return the page with today's output, and where that differs.
+
+    Args:
+        page: the text.
+        execute: executes a command in a folder with these variables.
+
+    Raises:
+        RuntimeError: if a command ends with a code other than 0 and 1 (falsified).
+    """
     differences: list[Difference] = []
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder) / "work"
@@ -57,7 +91,11 @@ def run(page: str) -> tuple[str, list[Difference]]:
                 if command == "echo $?":
                     printed = f"{code}\n"
                 else:
-                    code, printed = _execute(command, work, environment)
+                    done = execute(command, work, environment)
+                    if done.code not in (0, 1):
+                        raise RuntimeError(f"{command}: exit code {done.code}\n{done.out}{done.err}")
+                    code = done.code
+                    printed = "".join(f"{line.rstrip()}\n" for line in done.out.splitlines())
                 differences.extend(_compare(command, shown, printed))
                 today.append(f"$ {command}\n{printed}")
             return f"```console\n{''.join(today)}```"
@@ -87,22 +125,6 @@ def _commands(text: str) -> Iterator[tuple[str, str]]:
             more, _, shown = shown.partition("\n")
             command += f"\n{more}"
         yield command, shown
-
-
-def _execute(command: str, folder: Path, environment: dict[str, str]) -> tuple[int, str]:
-    done = subprocess.run(
-        ["sh", "-c", command],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=_HANG_SECONDS,
-        check=False,
-    )
-    if done.returncode not in (0, 1):  # 1: falsified
-        raise RuntimeError(f"{command}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    lines = [line.rstrip() for line in done.stdout.splitlines()]
-    return done.returncode, "".join(f"{line}\n" for line in lines)
 
 
 def _compare(command: str, shown: str, printed: str) -> Iterator[Difference]:
