@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.modelica.exporter import FEATURES, exporter
 from tests.patience import HANG
 
 ROOT = Path(__file__).parents[2]
-FEATURES = Path(__file__).parent / "Features"
 Build = Callable[..., Path]
 
 
@@ -28,8 +28,10 @@ def exporter_python() -> str:
     return python
 
 
-def run_exporter(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the exporter's command line."""
+def run_exporter(*arguments: str, fresh: bool = False) -> subprocess.CompletedProcess[str]:
+    """Run the exporter's command line, in a new interpreter or in a copy of one that has run before."""
+    if not fresh:
+        return exporter(exporter_python()).run(*arguments)
     command = [exporter_python(), str(ROOT / "modelica" / "export_fmu.py"), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG)
 
