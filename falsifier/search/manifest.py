@@ -4,6 +4,7 @@ import platform
 import sys
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -238,6 +239,7 @@ def _modes(problem: Problem) -> Iterator[ModeRecord]:
             yield ModeRecord(name=name, kind=variable.kind, items=tuple(variable.literals.items()))
 
 
+@cache
 def _version(package: str) -> str | None:
     try:
         return version(package)
