@@ -17,6 +17,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("patient")
 
+# Their tests take longest. Started last, one of them would run while the other processes have nothing to do.
+_FIRST = ("test_notebooks.py", "test_docs.py", "test_packaging.py", "test_kill.py")
+
 _real_connect = socket.socket.connect
 
 
@@ -28,6 +31,11 @@ def _guarded_connect(self: socket.socket, address: Any) -> None:
     ):
         raise AssertionError(f"a test tried to reach {address[0]}")
     _real_connect(self, address)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let long tests start first; the others keep their order."""
+    items.sort(key=lambda item: item.path.name not in _FIRST)
 
 
 @pytest.fixture(autouse=True, scope="session")
