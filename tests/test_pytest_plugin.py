@@ -57,6 +57,7 @@ def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_replayed(
     repository: Path,
 ) -> None:
+    shutil.rmtree(repository / "counterexamples", ignore_errors=True)  # of another test
     first = run_pytest(repository, "--falsifier", "specs", "-rA")
     assert first.code == 1, first.out + first.err
     assert "1 failed, 1 passed" in first.out
