@@ -13,7 +13,7 @@ import sys
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import NamedTemporaryFile
 from typing import NoReturn
 
 ROOT = Path(__file__).parents[2]
@@ -34,13 +34,11 @@ class Exporter:
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run the exporter's command line."""
         assert self._process.stdin is not None and self._process.stdout is not None
-        with TemporaryFile("w+") as out, TemporaryFile("w+") as err:
-            streams = [f"/proc/{os.getpid()}/fd/{stream.fileno()}" for stream in (out, err)]
-            self._process.stdin.write(f"{json.dumps([arguments, streams, str(Path.cwd())])}\n")
+        with NamedTemporaryFile("r") as out, NamedTemporaryFile("r") as err:
+            request = [arguments, [out.name, err.name], str(Path.cwd())]
+            self._process.stdin.write(f"{json.dumps(request)}\n")
             self._process.stdin.flush()
             code = int(self._process.stdout.readline())
-            out.seek(0)
-            err.seek(0)
             return subprocess.CompletedProcess(arguments, code, out.read(), err.read())
 
 
