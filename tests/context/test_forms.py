@@ -1,4 +1,7 @@
+import pytest
+
 from falsifier.context.forms import Readable, of_source
+from falsifier.context.levels import levels_of
 
 PAGE = """<html><head><title>no</title><style>p {}</style></head><body><h1>1 Limits</h1>
 <p>The value of <b>speed</b> stays &lt; 3.</p><script>x()</script><p>Other.</p></body></html>"""
@@ -94,6 +97,18 @@ def test_a_local_variable_is_not_the_signal_of_its_name() -> None:
     )
     found = {t.right: set(t.names) for t in of_source(source, "a.c", ["y"], ["y", "u", "v", "w"]).found}
     assert found == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set()}
+
+
+@pytest.mark.parametrize(
+    ("declared", "levels"),
+    [("double y;", [2.5]), ("double x, y, z[3];", [2.5]), ("real_T *y;", [2.5]), ("double y = 0;", [])],
+)
+def test_a_variable_that_is_declared_before_it_is_set_gives_a_level(
+    declared: str, levels: list[float]
+) -> None:
+    source = f"double f(double u) {{\n {declared}\n y = 2 * u;\n if (y > 0x5) out = 1;\n}}\n"
+    read = of_source(source, "a.c", ["out"], ["out", "u"])
+    assert [level.value for level in levels_of(read.found, read.known, {"u": (0.0, 10.0)})] == levels
 
 
 def test_variables_of_other_classes_are_not_the_signals_of_their_names() -> None:
