@@ -71,7 +71,8 @@ class CSource:
     @property
     def own(self) -> frozenset[str]:
         """Variables that functions declare for themselves, except copies of others of the same name."""
-        inner = (s for f in self.functions for s in simple(f.statements))
+        inside = (s for f in self.functions for s in simple(f.statements))
+        inner = (s for s in inside if not s.text.startswith("extern "))
         declared = (s for s in inner if s.is_declaration or _DECLARED.match(s.text))
         return frozenset(name for s in declared for name in s.sets if "=" not in s.text or name not in s.uses)
 

@@ -95,7 +95,9 @@ def number_in(text: str) -> float | None:
         number = float(decimal) if decimal else float.fromhex(hexadecimal)
     except OverflowError:
         return None
-    return None if isinf(number) else float(f"{sign}{number!r}")
+    if isinf(number):
+        return None
+    return -number if sign == "-" else number
 
 
 def _threshold(

@@ -93,10 +93,11 @@ def test_values_that_modifiers_change_are_not_told_as_certain() -> None:
 def test_a_local_variable_is_not_the_signal_of_its_name() -> None:
     source = (
         "void step(M *m) {\n double u = noise();\n double v = m->v;\n double w;\n"
-        " if (u > 3) m->y = 1;\n if (v > 4) m->y = 2;\n if (m->u > 5) m->y = 3;\n if (w > 6) m->y = 4;\n}\n"
+        " if (u > 3) m->y = 1;\n if (v > 4) m->y = 2;\n if (m->u > 5) m->y = 3;\n if (w > 6) m->y = 4;\n"
+        " extern double out; unsigned int a, b[2];\n if (out > 7 || a > 8 || b[0] > 9) m->y = 5;\n}\n"
     )
     found = {t.right: set(t.names) for t in of_source(source, "a.c", ["y"], ["y", "u", "v", "w"]).found}
-    assert found == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set()}
+    assert found == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set(), "7": {"out"}, "8": set(), "9": set()}
 
 
 @pytest.mark.parametrize(
