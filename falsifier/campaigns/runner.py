@@ -76,14 +76,13 @@ def run_campaign(
         ChatError: for an unknown provider or a missing key.
         ModelError: if an FMU cannot be used, or the cluster cannot be reached.
     """
-    check_request(request, executor=executor)
+    problems = check_request(request, executor=executor)
     with locked(directory):
         if is_campaign(directory):
             raise JournalError(
                 f"{directory} already contains a campaign: choose another --out, or to continue it: "
                 f"falsifier resume {directory}"
             )
-        problems = _load(request.named().values())
         record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
         with open_workers(jobs, executor) as workers:
@@ -209,14 +208,18 @@ class _Watch:
         self._stop.write_text(f"{reason}\n", encoding="utf-8")
 
 
-def check_request(request: CampaignRequest, *, executor: str | None) -> None:
-    """Check names and keys before anything is loaded or written.
+def check_request(request: CampaignRequest, *, executor: str | None) -> dict[ProblemSource, Problem]:
+    """Check names and keys, load all problems and read their context files before anything is written.
 
     Keys are checked only for runs on this machine: the workers of a cluster have their own environment.
 
+    Returns:
+        The problems, without what context files say.
+
     Raises:
-        SpecError: for an unknown engine or prompt variant.
+        SpecError: for an unknown engine or prompt variant, or a problem or context file that is not valid.
         ChatError: for an unknown provider, an option that it does not have, or a missing key.
+        ModelError: if an FMU cannot be used.
     """
     runs = tuple(request.named().values())
     for run in runs:
@@ -226,6 +229,10 @@ def check_request(request: CampaignRequest, *, executor: str | None) -> None:
 
         for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
             preflight(llm.name, api_base=llm.api_base, options=llm.options)
+    problems = _load(runs)
+    for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
+        told_problems(run, [problems[run.problems[0]]], {})
+    return problems
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:

@@ -213,6 +213,8 @@ def _llm_option(text: str) -> tuple[str, str | float]:
             f"--llm-option {name}: keys are read from the environment only; set the provider's variable"
         )
     try:
-        return name, int(value) if value.isdigit() else float(value)
+        number = int(value) if value.isdigit() else float(value)
     except ValueError:
         return name, value
+    is_text = isinstance(number, float) and not isfinite(number)  # a JSON file has no such numbers
+    return name, value if is_text else number

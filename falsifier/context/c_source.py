@@ -71,7 +71,9 @@ class CSource:
     @property
     def own(self) -> frozenset[str]:
         """Variables that functions declare for themselves, except copies of others of the same name."""
-        declared = (s for f in self.functions for s in simple(f.statements) if _DECLARED.match(s.text))
+        inside = (s for f in self.functions for s in simple(f.statements))
+        inner = (s for s in inside if not s.text.startswith("extern "))
+        declared = (s for s in inner if s.is_declaration or _DECLARED.match(s.text))
         return frozenset(name for s in declared for name in s.sets if "=" not in s.text or name not in s.uses)
 
     @property
@@ -309,18 +311,23 @@ def _simple_statement(source: str, tokens: list[Token], function: str) -> Statem
             return Statement(text, line, _target(target), _names(right) | own | _indices(target))
         if token.text in ("++", "--"):
             return Statement(text, line, _names(tokens), _names(tokens))
+    if len(tokens) > 1 and tokens[0].kind == "name" and (tokens[-1].kind == "name" or tokens[-1].text == "]"):
+        return Statement(text, line, frozenset(_declared(tokens)), _names(tokens), is_declaration=True)
     addressed = {b.text for a, b in pairwise(tokens) if a.text == "&" and b.kind == "name"}
-    is_declaration = len(tokens) > 1 and tokens[0].kind == tokens[-1].kind == "name"
-    return Statement(
-        text,
-        line,
-        frozenset(addressed) | (_target(tokens) if is_declaration else frozenset()),
-        _names(tokens),
-    )
+    return Statement(text, line, frozenset(addressed), _names(tokens))
 
 
 def _is_prototype(tokens: list[Token]) -> bool:
     return tokens[-1].text == ")" or tokens[0].text in ("extern", "typedef")
+
+
+def _declared(tokens: list[Token]) -> Iterator[str]:
+    """Return the variables and arrays of a declaration without a value."""
+    depth = 0
+    for token, after in zip(tokens, [*(t.text for t in tokens[1:]), ","], strict=True):
+        depth += (token.text in "([{") - (token.text in ")]}")
+        if depth == 0 and token.kind == "name" and after in (",", "["):
+            yield token.text
 
 
 def _target(tokens: list[Token]) -> frozenset[str]:

@@ -9,7 +9,7 @@ from itertools import islice, product
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.context.thresholds import Threshold
+from falsifier.context.thresholds import Threshold, number_in
 from falsifier.context.tokens import tokens_of
 from falsifier.context.values import Level
 
@@ -212,7 +212,8 @@ def _as_python(text: str, names: list[str]) -> str:
             words.append(f"_{len(names)}")
             names.append(token.text.strip("'"))
         elif token.kind == "number":
-            words.append(token.text.rstrip("fFlLuU"))
+            number = number_in(token.text)
+            words.append(token.text if number is None else f"{number:.17g}")
         else:
             words.append(token.text)
     return " ".join(words)

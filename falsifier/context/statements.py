@@ -39,6 +39,7 @@ class Statement:
         uses: names on which that value depends.
         is_equation: whether any of its names may be what it determines.
         is_mark: whether it only directs what is around it, such as a label or break.
+        is_declaration: whether it declares names without giving them a value.
         branches: the statements under conditions.
     """
 
@@ -48,6 +49,7 @@ class Statement:
     uses: frozenset[str] = frozenset()
     is_equation: bool = False
     is_mark: bool = False
+    is_declaration: bool = False
     branches: tuple[Branch, ...] = ()
 
     @property
@@ -125,6 +127,8 @@ def assignments(
     used: dict[str, frozenset[str]] = {}
     for outer in statements:
         for statement, _ in _flat(outer, frozenset()):
+            if statement.is_declaration:
+                continue
             left, _, right = statement.text.rstrip("; ").partition("=")
             target = _TARGET.search(left)
             for name in statement.sets:

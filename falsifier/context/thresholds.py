@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import isinf
 
 from falsifier.context.tokens import Token, tokens_of, written
 
@@ -12,7 +13,9 @@ _SIGNS = ("<", ">", "==", "!=")
 _BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop , ; ? : = := { } return"
 _BOUNDARIES = frozenset(_BOUNDING.split())
 _OPENING, _CLOSING = "([{", ")]}"
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?[fFlLuU]*$")
+_DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_HEXADECIMAL = r"0[xX][0-9a-fA-F]+(?:\.?[0-9a-fA-F]*[pP][-+]?\d+)?"
+_NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
 _MAX_LENGTH = 160
 _MAX_CONDITION = 10_000
 
@@ -83,9 +86,18 @@ def within(found: Threshold, names: Mapping[str, str]) -> Threshold:
 
 
 def number_in(text: str) -> float | None:
-    """Return the number that a text is; None if it is not just a number."""
-    stripped = text.strip().strip("()")
-    return float(stripped.rstrip("fFlLuU")) if _NUMBER.match(stripped) else None
+    """Return the number that a text is; None if it is not just a number, or too large for one."""
+    found = _NUMBER.match(text.strip().strip("()"))
+    if found is None:
+        return None
+    sign, hexadecimal, decimal = found.groups()
+    try:
+        number = float(decimal) if decimal else float.fromhex(hexadecimal)
+    except OverflowError:
+        return None
+    if isinf(number):
+        return None
+    return -number if sign == "-" else number
 
 
 def _threshold(

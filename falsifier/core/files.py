@@ -3,6 +3,7 @@
 import os
 import re
 import tempfile
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from unicodedata import normalize
@@ -46,16 +47,21 @@ def _cut(text: str) -> str:
 def write_whole(path: Path, content: str | bytes) -> Path:
     """Write a file atomically and return its path.
 
-    A crash leaves either the old file or the complete new one. Missing folders are created; the content is on
-    disk when the function returns.
+    A crash or a full disk leaves either the old file or the complete new one. Missing folders are created;
+    the content is on disk when the function returns.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    with partial.open("wb") as file:
-        file.write(content.encode() if isinstance(content, str) else content)
-        file.flush()
-        os.fsync(file.fileno())
-    operating_system.replace(partial, path)
+    try:
+        with partial.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        operating_system.replace(partial, path)
+    except BaseException:
+        with suppress(OSError):  # the first error says what is wrong
+            partial.unlink(missing_ok=True)
+        raise
     return path
 
 

@@ -152,6 +152,12 @@ def wait_for_any(descriptors: Iterable[int], seconds: float | None = None) -> No
     waiting.poll(None if seconds is None else seconds * 1e3)
 
 
+def close_others(kept: int) -> None:
+    """Close all descriptors of this process except the standard ones and one more."""
+    os.closerange(3, kept)
+    os.closerange(kept + 1, os.sysconf("SC_OPEN_MAX"))
+
+
 def end_by(number: int) -> None:
     """Send this process a signal."""
     os.kill(os.getpid(), number)

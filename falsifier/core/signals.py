@@ -164,8 +164,8 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
     if len(steps) == 1:
         slopes = [secants[0], secants[0]]
     else:
-        first = _end_slope(steps[0], steps[1], secants[0], secants[1])
-        slopes = [first, *slopes, _end_slope(steps[-1], steps[-2], secants[-1], secants[-2])]
+        first = end_slope(steps[0], steps[1], secants[0], secants[1])
+        slopes = [first, *slopes, end_slope(steps[-1], steps[-2], secants[-1], secants[-2])]
     rows = [
         (t, y, d, (3.0 * m - 2.0 * d - e) / h, (d + e - 2.0 * m) / (h * h))
         for t, y, (d, e), m, h in zip(times, values, pairwise(slopes), secants, steps, strict=False)
@@ -176,19 +176,30 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
 
 
 def _inner_slopes(steps: list[float], secants: list[float]) -> list[float]:
-    """Return weighted harmonic means of the adjacent secants; 0 at a peak, in a valley or on a flat piece."""
-    slopes = []
-    for (h, next_h), (left, right) in zip(pairwise(steps), pairwise(secants), strict=True):
-        if left * right <= 0.0:
-            slopes.append(0.0)
-        else:
-            w_left, w_right = h + 2.0 * next_h, 2.0 * h + next_h
-            slopes.append((w_left + w_right) / (w_left / left + w_right / right))
-    return slopes
+    """Return the slopes between the pieces; 0 at a peak, in a valley or on a flat piece."""
+    return [
+        inner_slope(h, next_h, left, right)
+        for (h, next_h), (left, right) in zip(pairwise(steps), pairwise(secants), strict=True)
+    ]
 
 
-def _end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
-    """Return the three-point slope at an end, limited to preserve the shape of the data."""
+def inner_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
+    """Return the slope of a pchip curve between two pieces: the weighted harmonic mean of their secants."""
+    if secant * next_secant <= 0.0:
+        return 0.0
+    weight, next_weight = step + 2.0 * next_step, 2.0 * step + next_step
+    return (weight + next_weight) / (weight / secant + next_weight / next_secant)
+
+
+def end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
+    """Return the slope of a pchip curve at an end: by three points, limited to preserve the data's shape.
+
+    Args:
+        step: length of the piece at the end.
+        next_step: length of the one beside it.
+        secant: slope of the straight line between the ends of the first piece.
+        next_secant: the same of the one beside it.
+    """
     slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
     if slope * secant <= 0.0:
         return 0.0

@@ -1,13 +1,16 @@
 """Monotone cubic curves through many rows of values at once: a plan reads thousands of candidates' inputs.
 
-``core.signals`` has the same curve for one signal. Importing this module imports numba.
+``core.signals`` has the same curve for one signal, and its slopes. Importing this module imports numba.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.signals import end_slope, inner_slope
 from falsifier.engines.box import Array
 from falsifier.stl.numba_compilation import compiled
+
+_inner_slope, _end_slope = compiled(inner_slope), compiled(end_slope)
 
 
 def read_curves(knots: Array, values: Array, at: Array) -> Array:
@@ -35,7 +38,7 @@ def _read(steps: Array, values: Array, piece: NDArray[np.intp], since: Array, re
 
 @compiled
 def _find_slopes(steps: Array, secants: Array, slopes: Array) -> None:
-    """Find the slopes at the knots; sources in ``core.signals``."""
+    """Find the slopes at the knots."""
     last = len(steps)
     if last == 1:
         slopes[0] = slopes[1] = secants[0]
@@ -43,18 +46,4 @@ def _find_slopes(steps: Array, secants: Array, slopes: Array) -> None:
     slopes[0] = _end_slope(steps[0], steps[1], secants[0], secants[1])
     slopes[last] = _end_slope(steps[last - 1], steps[last - 2], secants[last - 1], secants[last - 2])
     for k in range(1, last):
-        left, right = secants[k - 1], secants[k]
-        slopes[k] = 0.0
-        if left * right > 0.0:
-            w_left, w_right = steps[k - 1] + 2.0 * steps[k], 2.0 * steps[k - 1] + steps[k]
-            slopes[k] = (w_left + w_right) / (w_left / left + w_right / right)
-
-
-@compiled
-def _end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
-    slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
-    if slope * secant <= 0.0:
-        return 0.0
-    if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant):
-        return 3.0 * secant
-    return slope
+        slopes[k] = _inner_slope(steps[k - 1], steps[k], secants[k - 1], secants[k])

@@ -6,6 +6,7 @@ They take what to do and the address of what it needs, so that they can be calle
 import numpy as np
 from numba import carray
 
+from falsifier.fmu import loop_numbers as at
 from falsifier.fmu.c_functions import load_f8, load_i8, pointer, store_f8
 from falsifier.fmu.continuous import refresh, settle
 from falsifier.fmu.loop_numbers import (
@@ -21,12 +22,31 @@ from falsifier.fmu.loop_numbers import (
 from falsifier.fmu.solver import advance
 from falsifier.fmu.solver_row import OUTPUTS, SAMPLES, STEPS
 from falsifier.fmu.solver_views import memory_of, model_of
-from falsifier.fmu.stepping import co_simulate, compiled, enter_step_mode, fetch, put, read_row, write_row
+from falsifier.fmu.stepping import (
+    co_simulate,
+    compiled,
+    enter_step_mode,
+    fetch,
+    four_numbers,
+    put,
+    read_row,
+    write_row,
+)
 
 
 @compiled
-def _four(a):  # type: ignore[no-untyped-def]
-    return load_i8(a), load_i8(a + 8), load_i8(a + 16), load_i8(a + 24)
+def _word(a, number):  # type: ignore[no-untyped-def]
+    return load_i8(a + 8 * number)
+
+
+@compiled
+def _table(a, number):  # type: ignore[no-untyped-def]
+    return four_numbers(a + 8 * number)
+
+
+@compiled
+def _pieces(a, number):  # type: ignore[no-untyped-def]
+    return _word(a, number), _word(a, number + 1)
 
 
 @compiled
@@ -44,22 +64,24 @@ def co_simulation(what, a):  # type: ignore[no-untyped-def]
         The FMI status, and in the upper 32 bits where it stopped.
     """
     if what == CO_SIMULATE:
-        report = carray(pointer(load_i8(a + 248)), (3,), np.int64)
+        report = carray(pointer(_word(a, at.REPORT)), (3,), np.int64)
         co_simulate(
-            _seven(a), _four(a + 56), (load_i8(a + 88), load_i8(a + 96)), _four(a + 104),
-            (load_i8(a + 136), load_i8(a + 144)), load_i8(a + 152), load_i8(a + 160), _four(a + 168),
-            load_i8(a + 200), load_i8(a + 208), load_f8(a + 256), load_i8(a + 216), load_i8(a + 224),
-            load_i8(a + 232), load_i8(a + 240), report,
+            _seven(a + 8 * at.FUNCTIONS), _table(a, at.PORTS), _pieces(a, at.PIECES),
+            _table(a, at.HELD_PORTS), _pieces(a, at.HELD_PIECES), _word(a, at.CURRENT), _word(a, at.VALUES),
+            _table(a, at.GETTERS), _word(a, at.OUTPUTS), _word(a, at.WIDTH), load_f8(a + 8 * at.STOP_TIME),
+            _word(a, at.STEPS), _word(a, at.FIRST), _word(a, at.LAST), _word(a, at.EVERY), report,
         )  # fmt: skip
         return 0
     if what == ENTER_STEP_MODE_FIRST:
         status, where = enter_step_mode(_seven(a))
         return np.int64(status) + (np.int64(where) << 32)
-    if what == WRITE_ROW:
-        return np.int64(write_row(load_i8(a), load_i8(a + 8), _four(a + 16), load_i8(a + 48)))
-    if what == READ_ROW:
-        row = load_i8(a + 48), load_i8(a + 56), load_i8(a + 64)
-        return np.int64(read_row(load_i8(a), load_i8(a + 8), _four(a + 16), *row))
+    if what in (WRITE_ROW, READ_ROW):
+        instance, version = _word(a, at.ROW_INSTANCE), _word(a, at.ROW_VERSION)
+        ports, numbers = _table(a, at.ROW_PORTS), _word(a, at.ROW_NUMBERS)
+        if what == WRITE_ROW:
+            return np.int64(write_row(instance, version, ports, numbers))
+        width, column = _word(a, at.ROW_LENGTH), _word(a, at.ROW_COLUMN)
+        return np.int64(read_row(instance, version, ports, numbers, width, column))
     if what == PUT:
         put(load_i8(a), load_f8(a + 8))
     elif what == FETCH:

@@ -8,7 +8,7 @@ import threading
 from falsifier.core import posix
 from falsifier.errors import ModelError
 from falsifier.fmu import nursery, sharing
-from falsifier.fmu.channel import Closed, Reply, open_channel, receive_reply, send_request
+from falsifier.fmu.channel import Closed, open_channel, receive_reply, send_request
 from falsifier.fmu.output import Output
 from falsifier.fmu.sharing import Shared
 from falsifier.fmu.starting import STARTING_SECONDS, Started, open_folder, start_program
@@ -81,19 +81,18 @@ class Nursery:
                     self._process.settle()
                     self._ready = True
                 send_request(self._sock, kind, payload, descriptors)
-                reply = self._receive()
+                return self._receive()
             except (Closed, TimeoutError) as error:
                 raise ModelError(
                     "the process that starts the FMU workers has ended or hangs; see the messages above"
                 ) from error
-        if reply.status != "ok":
-            raise ModelError(reply.text)
-        return reply.text
 
-    def _receive(self) -> Reply:
+    def _receive(self) -> str:
         """Wait for the reply to a request; what is said before is told to the user."""
         reply = receive_reply(self._sock, STARTING_SECONDS)
         while reply.more:
             _LOG.warning(reply.text)
             reply = receive_reply(self._sock, STARTING_SECONDS)
-        return reply
+        if reply.status != "ok":
+            raise ModelError(reply.text)
+        return reply.text

@@ -20,3 +20,11 @@ MOST_ROUNDS = 1000
 # What to ask of the entry to the loops of co-simulation, and of that to the solver.
 WRITE_ROW, READ_ROW, PUT, FETCH, ENTER_STEP_MODE_FIRST, CO_SIMULATE = range(6)
 SETTLE, REFRESH, ADVANCE = range(3)
+
+# Where the arguments of co_simulate are in what is passed to its entry, in words of 8 bytes.
+FUNCTIONS, PORTS, PIECES, HELD_PORTS, HELD_PIECES = 0, 7, 11, 13, 17
+CURRENT, VALUES, GETTERS, OUTPUTS, WIDTH, STEPS, FIRST, LAST, EVERY = 19, 20, 21, *range(25, 31)
+REPORT, STOP_TIME = 31, 32
+# The same of a table of ports: WRITE_ROW has the address of the numbers behind it, READ_ROW that of the rows,
+# their length and the column.
+ROW_INSTANCE, ROW_VERSION, ROW_PORTS, ROW_NUMBERS, ROW_LENGTH, ROW_COLUMN = 0, 1, 2, 6, 7, 8

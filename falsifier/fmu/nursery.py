@@ -22,7 +22,7 @@ from falsifier.fmu import worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
 from falsifier.fmu.folders import remove_work_folder
 from falsifier.fmu.opening import extracted
-from falsifier.fmu.readiness import Loops, load_first, settle_in
+from falsifier.fmu.readiness import Loops, get_ready, settle_in
 from falsifier.fmu.worker_order import Order
 
 assert sys.platform != "win32"
@@ -38,9 +38,8 @@ def main(root: Path) -> None:
     sock, _ = posix.receive_connection()
     nursery = _Nursery(sock, root)
     try:
-        load_first(lambda text: send_reply(sock, Reply(text=text, more=True)))
-        send_reply(sock, Reply())
-        nursery.serve()
+        if get_ready(sock):
+            nursery.serve()
     finally:
         nursery.close()
 

@@ -1,12 +1,15 @@
 """What a worker does before it simulates, however it was started."""
 
 import os
+import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from falsifier.core import operating_system
+from falsifier.errors import FalsifierError
 from falsifier.fmu import machine_code
+from falsifier.fmu.channel import Reply, send_reply
 from falsifier.fmu.library import load_binding
 from falsifier.fmu.worker_order import Order
 
@@ -55,6 +58,17 @@ def load_first(tell: Callable[[str], None]) -> None:
     """Load what every simulation needs; ``tell`` hears of a compilation before it starts."""
     load_binding()
     machine_code.load("co_simulation", lambda: tell(_COMPILING_STEPS))
+
+
+def get_ready(sock: socket.socket) -> bool:
+    """Load what every simulation needs; send the parent what happens and the outcome, and return it."""
+    try:
+        load_first(lambda text: send_reply(sock, Reply(text=text, more=True)))
+    except FalsifierError as error:
+        send_reply(sock, Reply("unusable", str(error)))
+        return False
+    send_reply(sock, Reply())
+    return True
 
 
 def _load(warm_up: Callable[[], None], tell: Callable[[], None]) -> None:

@@ -216,6 +216,8 @@ def _become_component(
     code = 1
     try:
         linux.end_with_parent(parent)
+        # The FMU could otherwise write to the connection of the master, or to those of other components.
+        linux.close_others(pipe.fileno())
         try:
             instance = load()
         except FalsifierError as error:

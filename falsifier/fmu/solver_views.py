@@ -21,7 +21,7 @@ from falsifier.fmu.solver_row import (
     TOLERANCE,
     WEIGHTS,
 )
-from falsifier.fmu.stepping import compiled
+from falsifier.fmu.stepping import compiled, four_numbers
 
 
 @compiled
@@ -40,12 +40,6 @@ def _whole(row, column, size):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _four(row, column):  # type: ignore[no-untyped-def]
-    a = row + 8 * column
-    return load_i8(a), load_i8(a + 8), load_i8(a + 16), load_i8(a + 24)
-
-
-@compiled
 def model_of(row):  # type: ignore[no-untyped-def]
     """Return the model of a row."""
     f, count = row + 8 * FUNCTIONS, load_i8(row + 8 * COUNT)
@@ -54,9 +48,9 @@ def model_of(row):  # type: ignore[no-untyped-def]
             load_i8(f), load_i8(f + 8), load_i8(f + 16), load_i8(f + 24), load_i8(f + 32), load_i8(f + 40),
             load_i8(f + 48), load_i8(f + 56), load_i8(f + 64), load_i8(f + 72), load_i8(f + 80),
         ),
-        _four(row, PORTS),
-        _four(row, HELD_PORTS),
-        _four(row, GETTERS),
+        four_numbers(row + 8 * PORTS),
+        four_numbers(row + 8 * HELD_PORTS),
+        four_numbers(row + 8 * GETTERS),
         (load_i8(row + 8 * PIECES), count),
         (load_i8(row + 8 * HELD_PIECES), count),
         _floats(row, WEIGHTS, load_i8(row + 8 * STATES)),

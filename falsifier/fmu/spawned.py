@@ -18,7 +18,7 @@ from falsifier.errors import FalsifierError
 from falsifier.fmu import worker
 from falsifier.fmu.channel import Closed, Reply, receive_request, send_reply
 from falsifier.fmu.folders import REMOVING, remove_work_folder
-from falsifier.fmu.readiness import Loops, load_first, settle_in
+from falsifier.fmu.readiness import Loops, get_ready, settle_in
 from falsifier.fmu.worker_order import Order
 
 START = 1
@@ -33,17 +33,8 @@ def main(root: Path) -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     code = 1
     try:
-        load_first(lambda text: send_reply(sock, Reply(text=text, more=True)))
-        send_reply(sock, Reply())
-        _, payload, _ = receive_request(sock)
-        order, folder, scratch = pickle.loads(payload)
-        if _is_ready(sock, order, scratch):
-            # Not before: a thread is confined only with the one that starts it.
-            follower = Thread(target=_follow, args=(line, root), daemon=True)
-            follower.start()
-            worker.serve(sock, order, folder)
-            code = 0
-            follower.join(_ENDING_SECONDS)
+        if get_ready(sock):
+            code = _work(sock, line, root)
     except Closed:
         _follow(line, root)
     except BaseException:
@@ -51,6 +42,20 @@ def main(root: Path) -> NoReturn:
     finally:
         # Nothing is tidied up, because FMUs may crash when they are unloaded.
         os._exit(code)
+
+
+def _work(sock: socket.socket, line: int, root: Path) -> int:
+    """Wait for the order and carry it out; return this process's exit code."""
+    _, payload, _ = receive_request(sock)
+    order, folder, scratch = pickle.loads(payload)
+    if not _is_ready(sock, order, scratch):
+        return 1
+    # Not before: a thread is confined only with the one that starts it.
+    follower = Thread(target=_follow, args=(line, root), daemon=True)
+    follower.start()
+    worker.serve(sock, order, folder)
+    follower.join(_ENDING_SECONDS)
+    return 0
 
 
 def _is_ready(sock: socket.socket, order: Order, scratch: Path) -> bool:

@@ -15,7 +15,7 @@ from pathlib import Path
 from falsifier.core import operating_system
 from falsifier.errors import ModelError
 from falsifier.fmu import sharing, spawned
-from falsifier.fmu.channel import Closed, Reply, open_channel, receive_reply, send_request
+from falsifier.fmu.channel import Closed, open_channel, receive_reply, send_request
 from falsifier.fmu.failure_text import last_lines
 from falsifier.fmu.opening import extracted
 from falsifier.fmu.output import Output
@@ -126,15 +126,13 @@ class _Program:
             self._receive()
             self._child.settle()
             send_request(self.sock, spawned.START, pickle.dumps((order, folder, self._scratch)))
-            reply = self._receive()
+            self._receive()
         except (Closed, TimeoutError) as error:
             how = "hangs" if isinstance(error, TimeoutError) else "has ended"
             log = self.output.take()
             raise ModelError(
                 f"the worker process {how} before it could load the FMU{last_lines(log)}"
             ) from error
-        if reply.status != "ok":
-            raise ModelError(reply.text)
 
     def end(self) -> int:
         """Kill the process, and remove its folder; return its exit code."""
@@ -152,10 +150,11 @@ class _Program:
         self.sock.close()
         self._child.forget()
 
-    def _receive(self) -> Reply:
+    def _receive(self) -> None:
         """Wait for the reply to a request; what is said before is told to the user."""
         reply = receive_reply(self.sock, STARTING_SECONDS, self._life)
         while reply.more:
             _LOG.warning(reply.text)
             reply = receive_reply(self.sock, STARTING_SECONDS, self._life)
-        return reply
+        if reply.status != "ok":
+            raise ModelError(reply.text)

@@ -170,6 +170,12 @@ def write_row(instance, version, ports, numbers):  # type: ignore[no-untyped-def
     return exchange_values(instance, version, ports)
 
 
+@compiled
+def four_numbers(a):  # type: ignore[no-untyped-def]
+    """Return four integers from an address on, such as a table of ports."""
+    return load_i8(a), load_i8(a + 8), load_i8(a + 16), load_i8(a + 24)
+
+
 @inlined
 def rounding(time):  # type: ignore[no-untyped-def]
     """Return the difference in s below which two times are considered equal."""

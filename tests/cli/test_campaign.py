@@ -41,9 +41,10 @@ def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> 
     assert result.exit_code == 0, result.output
     (place,) = (tmp_path / "c").rglob("manifest.json")
     assert manifest.read(place.parent).contexts["AT1"].levels == (Level("throttle", 37.5),)
-    missing = command(*asked, "--context", "b.c", "--out", "d").exception
-    assert isinstance(missing, SpecError)
-    assert "context b.c: cannot be read" in str(missing)
+    missing = command(*asked, "--context", "b.c", "--out", "d")
+    assert isinstance(missing.exception, SpecError)
+    assert "context b.c: cannot be read" in str(missing.exception)
+    assert missing.stderr == "" and not (tmp_path / "d").exists(), "nothing was announced or written"
     useless = command(*asked, "--context", "a.c", "--engine", "uniform", "--out", "e")
     assert "--context: applies to language models and" in f"{useless.stderr} {useless.exception}"
 

@@ -1,11 +1,13 @@
 """Options about language models."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
 from falsifier.cli import cli
+from falsifier.cli.llm_options import asking
 
 
 @pytest.mark.parametrize("command", [["run"], ["bench"]])
@@ -32,3 +34,12 @@ def test_options_of_language_models_that_cannot_be_used_are_wrong_usage(
     done = CliRunner().invoke(cli, arguments)
     assert (done.exit_code, message in done.output) == (2, True), done.output
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("value", "passed"), [("4000", 4000), ("0.5", 0.5), ("low", "low"), ("nan", "nan"), ("-inf", "-inf")]
+)
+def test_options_are_passed_as_finite_numbers_or_as_text(value: str, passed: str | float) -> None:
+    options: dict[str, Any] = dict.fromkeys(("api_base", "timeout", "fallback", "reply", "price"))
+    options |= {"anonymous": False, "no_cache": False, "llm_options": (f"name={value}",)}
+    assert asking(options, named=True)["options"] == {"name": passed}

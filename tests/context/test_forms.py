@@ -1,4 +1,7 @@
+import pytest
+
 from falsifier.context.forms import Readable, of_source
+from falsifier.context.levels import levels_of
 
 PAGE = """<html><head><title>no</title><style>p {}</style></head><body><h1>1 Limits</h1>
 <p>The value of <b>speed</b> stays &lt; 3.</p><script>x()</script><p>Other.</p></body></html>"""
@@ -90,10 +93,23 @@ def test_values_that_modifiers_change_are_not_told_as_certain() -> None:
 def test_a_local_variable_is_not_the_signal_of_its_name() -> None:
     source = (
         "void step(M *m) {\n double u = noise();\n double v = m->v;\n double w;\n"
-        " if (u > 3) m->y = 1;\n if (v > 4) m->y = 2;\n if (m->u > 5) m->y = 3;\n if (w > 6) m->y = 4;\n}\n"
+        " if (u > 3) m->y = 1;\n if (v > 4) m->y = 2;\n if (m->u > 5) m->y = 3;\n if (w > 6) m->y = 4;\n"
+        " extern double out; unsigned int a, b[2];\n if (out > 7 || a > 8 || b[0] > 9) m->y = 5;\n}\n"
     )
     found = {t.right: set(t.names) for t in of_source(source, "a.c", ["y"], ["y", "u", "v", "w"]).found}
-    assert found == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set()}
+    assert found == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set(), "7": {"out"}, "8": set(), "9": set()}
+
+
+@pytest.mark.parametrize(
+    ("declared", "levels"),
+    [("double y;", [2.5]), ("double x, y, z[3];", [2.5]), ("real_T *y;", [2.5]), ("double y = 0;", [])],
+)
+def test_a_variable_that_is_declared_before_it_is_set_gives_a_level(
+    declared: str, levels: list[float]
+) -> None:
+    source = f"double f(double u) {{\n {declared}\n y = 2 * u;\n if (y > 0x5) out = 1;\n}}\n"
+    read = of_source(source, "a.c", ["out"], ["out", "u"])
+    assert [level.value for level in levels_of(read.found, read.known, {"u": (0.0, 10.0)})] == levels
 
 
 def test_variables_of_other_classes_are_not_the_signals_of_their_names() -> None:

@@ -29,6 +29,17 @@ def test_a_crash_while_writing_leaves_the_old_content(
     with pytest.raises(OSError, match="no space"):
         write_whole(path, "new")
     assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path], "nothing partial is left"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_leaves_nothing_partial(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    partial = path.with_name(f"a.txt.{os.getpid()}.partial")
+    partial.symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left on device"):
+        write_whole(path, "new")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_specs_and_fmus_come_with_the_package() -> None:

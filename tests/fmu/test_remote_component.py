@@ -67,6 +67,8 @@ def test_a_component_that_crashes_is_named_and_the_next_simulation_works() -> No
     assert worker is not None
     others = Path(f"/proc/{worker.pid}/task/{worker.pid}/children").read_text().split()
     assert len(others) == 3
+    for pid in others:  # the standard ones, and one to the master
+        assert len(list(Path(f"/proc/{pid}/fd").iterdir())) == 4
     with pytest.raises(SimulationError, match=r"crashed in component bad: .*SIGSEGV") as failed:
         run(model, "plant.y", parameters={"bad.misdeed": CRASH})
     assert failed.value.status == "crashed"

@@ -14,8 +14,8 @@ PROGRAM = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
 from pathlib import Path
-from falsifier.fmu import spawned
-spawned.load_first = lambda tell: None
+from falsifier.fmu import readiness, spawned
+readiness.load_first = lambda tell: None
 spawned.main(Path(sys.argv[2]))
 """
 

@@ -33,6 +33,10 @@ Recorded robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {
 
 The FMUs are those in components/, the inputs in input.csv. The tables of the system come first, see ``main``.
 """
+_TOGETHER = """
+In the recorded run, each component had a process of its own. Here all are in one: if their libraries
+clash there, use `falsifier replay counterexample.json`, or the folders in components/.
+"""
 
 _SCRIPT = """\
 {about}
@@ -78,6 +82,7 @@ def system_script(problem: Problem, evaluation: Evaluation, columns: Iterable[st
         critical_time=verdict.critical_time,
         predicate=one_line(verdict.predicate),
     )
+    about += _TOGETHER if model.network.coupling.isolation == "each" else ""
     system = {
         **_experiment(problem, model.network),
         "components": _components(problem, model, evaluation.candidate),

@@ -16,6 +16,7 @@ from falsifier.core.signals import Signal
 from falsifier.counterexamples.export.system_script import system_script, why_no_script
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import Component, Connection, Coupling, Frame, System, fmpy_master
+from falsifier.fmu.network import Isolation
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.testing import lag_problem
@@ -156,6 +157,16 @@ def test_the_script_needs_fmpy_only_and_compares_the_critical_time(tmp_path: Pat
     assert float(critical[0]) == pytest.approx(evaluation.verdict.critical_time)
     assert float(difference.split()[-1]) <= 1e-12
     assert where.startswith("all 13 rows") and (moved / "outputs.csv").read_text().startswith("time,")
+
+
+@pytest.mark.parametrize(("isolation", "said"), [("together", 0), ("each", 1)])
+def test_the_script_says_that_it_does_not_separate_components(isolation: Isolation, said: int) -> None:
+    here = problem_of(system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP))
+    evaluation = evaluate(here, DRIVE)
+    fmus = {"plant": path("Plant_2"), "pi": path("Gain_2")}
+    model = System(fmus, LOOP, coupling=Coupling(isolation=isolation))
+    script = system_script(replace(here, model=model), evaluation, ["pi.r"])
+    assert script is not None and script.count("each component had a process of its own") == said
 
 
 def test_systems_with_model_exchange_have_none_and_it_is_said(tmp_path: Path) -> None:
