@@ -6,11 +6,10 @@ shows how the system responds, with an input that steps or switches. From then o
 and a question cost. The times are those of the run's record, so a resumed run decides in the same way.
 
 A later answer has several candidates. The surrogate predicts them before any is simulated, and uses them as
-starts of its own search. One that is predicted to improve on the best sample, or to be better than what the
-surrogate would do next, is simulated at once. Any other waits for a few turns of the surrogate; if the LLM
-has failed its trial and predictions are trusted, it is not simulated. Before it answers, the LLM is told why
-the surrogate chose its samples and what it would do next, and may request predictions; if it does not, it is
-told them afterwards and may revise its candidates once.
+starts of its own search; the best predicted one is simulated at once, later or never, see ``turns.due``. One
+that is the same experiment as an earlier sample is not simulated on untested predictions, and the LLM is told
+so. Before it answers, the LLM is told why the surrogate chose its samples and what it would do next, and may
+request predictions; if it does not, it is told them afterwards and may revise its candidates once.
 """
 
 import logging
@@ -23,10 +22,11 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.engines.adviser import Adviser
+from falsifier.engines.box import Array
 from falsifier.engines.protocol import FollowsRun
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
-from falsifier.engines.turns import TRIAL, Half, Ledger, Who, helps, next_turn
+from falsifier.engines.turns import TRIAL, Half, Ledger, Who, due, helps, next_turn
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -42,9 +42,9 @@ _LONGEST_REASON = 240
 # What the surrogate says in its reasons.
 _SCALED = "scaled robustness"
 
-# The LLM's candidates replace half of the inputs that only show how the system responds, but not the constant
-# extremes if a single one can violate the requirement: they would be missed if the LLM does not help.
-ADVISED = SurrogateSettings(pauses=0, bangs=1, probes=1)
+# The LLM's candidates replace half of the stepping inputs and the constants between switching ones, which
+# show how the system responds, but no input that may violate: it would be missed if the LLM does not help.
+ADVISED = SurrogateSettings(pauses=0, probes=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,9 @@ class Settings:
         tries: maximum number of candidates of a later answer that are simulated, best predicted first.
         promising: share of the best robustness by which an answer must be predicted to lower it to be
             simulated at once, unless it is predicted to be better than what the surrogate would do next.
-        hold: number of the surrogate's turns for which any other answer on trial waits.
+        same: share of each range within which a candidate is the same experiment as a sample, if it is that
+            near to it in every input at all times and in every parameter.
+        hold: number of the surrogate's turns for which any other answer waits.
         misses: number of successive predicted violations that did not occur after which predictions are no
             longer trusted and the LLM is told so.
         reasons: maximum number of the surrogate's latest samples of which the LLM is told the reason.
@@ -71,6 +73,7 @@ class Settings:
     count: int = 5
     tries: int = 1
     promising: float = 0.1
+    same: float = 0.1
     hold: int = 4
     misses: int = 3
     reasons: int = 4
@@ -116,6 +119,8 @@ class Hybrid:
         self._reasons: list[str] = []
         self._numeric: Candidate | None = None
         self._unanswered: list[str] = []
+        self._points: list[Array] = []
+        self._repeats: list[str] = []
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the adviser, which has the chat, to a run; note what its exchanges cost."""
@@ -173,6 +178,7 @@ class Hybrid:
 
     def _note(self, evaluation: Evaluation) -> None:
         self._told += 1
+        self._points.append(self.surrogate.layout.point(evaluation.candidate))
         self._since_best += 1
         self._ledger.simulated(evaluation.seconds)
         key, robustness = evaluation.candidate.key, evaluation.robustness
@@ -240,7 +246,8 @@ class Hybrid:
     def _advised(self) -> list[Candidate]:
         """Ask for several candidates; return those to simulate, the most promising one first."""
         settings = self.settings
-        notes = [*self._standing(), *self._reasons_told()]
+        notes = [*self._standing(), *self._repeats, *self._reasons_told()]
+        self._repeats.clear()
         advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
         candidates = advice.candidates
         predictions = self._trusted_predictions(candidates)
@@ -254,27 +261,53 @@ class Hybrid:
             candidates = list({c.key: c for c in (*candidates, *revised.candidates)}.values())
             predictions = self._trusted_predictions(candidates)
         self.surrogate.suggest(candidates)
-        if predictions is not None:
+        if predictions is None:
+            candidates = sorted(candidates, key=lambda c: self._repeated(c) is not None)
+        else:
             order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
             candidates = [_ranked(candidates[i], predictions[i].robustness) for i in order]
         return candidates[: settings.tries]
 
     def _is_due(self, answer: _Answer) -> bool:
         """Whether the next candidate of an answer is simulated now; drop it if that is not worth it."""
-        if self._llm.turns == 0 or len(self.surrogate.history.samples) < 2:
+        if self._llm.turns == 0:
             return True
-        if self._is_promising(answer.queue[0]):
-            return True
-        if self._llm.turns < TRIAL or not self._is_trusted:
-            return answer.held >= self.settings.hold
+        candidate = answer.queue[0]
+        repeated = self._repeated(candidate)
+        when = due(
+            repeats=repeated is not None,
+            promising=self._is_promising(candidate),
+            trusted=self._is_trusted,
+            on_trial=self._llm.turns < TRIAL,
+        )
+        if when != "never":
+            return when == "now" or answer.held >= self.settings.hold
+        if repeated is not None:
+            self._repeats.append(self._repeat_told(candidate, repeated))
         answer.queue.clear()
         if not answer.asked:
             self._close(helped=False)
         return False
 
+    def _repeated(self, candidate: Candidate) -> int | None:
+        """Return the number of a sample that is the same experiment as a candidate; None if there is none."""
+        if not self._points:
+            return None
+        point = self.surrogate.layout.point(candidate)
+        distances = np.abs(np.array(self._points) - point).max(axis=1, initial=0.0)
+        nearest = int(np.argmin(distances))
+        return nearest + 1 if distances[nearest] <= self.settings.same else None
+
+    def _repeat_told(self, candidate: Candidate, sample: int) -> str:
+        return (
+            f"Your candidate ({self.adviser.describe(candidate)}) was not simulated: sample {sample} differs "
+            f"from it by at most {100 * self.settings.same:.2g} % of each range at any time. Suggest another "
+            "structure; the optimiser tunes numbers."
+        )
+
     def _is_promising(self, candidate: Candidate) -> bool:
         """Whether a candidate is predicted to improve on the best sample, or to be better than the rival."""
-        if self._best_candidate is None:
+        if self._best_candidate is None or len(self.surrogate.history.samples) < 2:
             return True
         rivals = [] if self._numeric is None else [self._numeric]
         # Against the prediction of the best sample, not its robustness: early predictions are off as a whole.

@@ -1,10 +1,10 @@
-"""The rule by which the hybrid engine decides which half has the next turn.
+"""The rules by which the hybrid engine decides which half has the next turn, and when an answer is simulated.
 
-It depends on three things: how many turns each half has had, how many of them brought a new best, and what a
-turn of each half costs. The language model (LLM) has the next turn once the surrogate has had so many turns
-that they cost as much as the LLM's would. Two turns of the LLM are on trial. Each turn after that which does
-not help multiplies the number of turns that the surrogate gets before the LLM is asked again, and then these
-must have brought nothing new either. After an answer that helped, it is asked again sooner.
+The turn depends on three things: how many turns each half has had, how many of them brought a new best, and
+what a turn of each half costs. The language model (LLM) has the next turn once the surrogate has had so many
+turns that they cost as much as the LLM's would. Two turns of the LLM are on trial. Each turn after that which
+does not help multiplies the number of turns that the surrogate gets before the LLM is asked again, and then
+these must have brought nothing new either. After an answer that helped, it is asked again sooner.
 
 If a question costs little compared with a simulation, the LLM therefore answers the first and the third time,
 or at once as long as its answers help. If a question costs as much as a hundred simulations, the surrogate
@@ -19,6 +19,7 @@ from typing import Literal
 from falsifier.llm.messages import Exchange
 
 Who = Literal["llm", "surrogate"]
+Due = Literal["now", "later", "never"]
 
 # Answers of the LLM, the first of which knows nothing of the system, before it must have helped.
 TRIAL = 2
@@ -109,6 +110,27 @@ def _patience(llm: Half, costs: Costs, simulations: int | None) -> int:
     if llm.dry == 0:
         return int(fair * ENCOURAGED)
     return int(fair * GROWTH ** (llm.dry - 1))
+
+
+def due(*, repeats: bool, promising: bool, trusted: bool, on_trial: bool) -> Due:
+    """Return when a candidate of a later answer is simulated.
+
+    Predictions that have not been tested do not tell a right answer from a useless one. On trial, what is new
+    is therefore simulated unless predictions are trusted.
+
+    Args:
+        repeats: whether it is the same experiment as an earlier sample.
+        promising: whether it is predicted to be worth a simulation.
+        trusted: whether recent predictions were good.
+        on_trial: whether the LLM has had fewer answers than its trial.
+    """
+    if promising and (trusted or not repeats):
+        return "now"
+    if repeats:
+        return "never"
+    if on_trial:
+        return "later" if trusted else "now"
+    return "never" if trusted else "later"
 
 
 def helps(robustness: float | None, best: float, *, share: float = NOTABLE) -> bool:

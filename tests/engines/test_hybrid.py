@@ -134,17 +134,50 @@ def test_a_later_answer_is_ranked_before_one_is_simulated() -> None:
     assert later[0].signals["u"].values[0] == pytest.approx(1.5, abs=0.01)
 
 
-def test_an_answer_that_is_not_promising_waits_and_is_dropped_after_the_trial() -> None:
+def course(asked: Sequence[Candidate]) -> str:
+    return "".join("L" if c.origin == "scripted" else "S" for c in asked)
+
+
+def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_dropped() -> None:
+    problem = wide_problem()
+    engine, script = hybrid(problem, [[-1.0], [0.0], [-0.5]])
+    judge = simulated(problem, lambda x: float(9 - x.max()))
+    asked = drive(engine, judge, rounds=40)
+    assert course(asked) == "LSL" + 37 * "S"
+    assert len(script.notes) > 2, "it was asked again"
+
+
+def test_after_the_trial_an_answer_waits_while_predictions_are_not_trusted() -> None:
+    problem = wide_problem()
+    script = Script([[-1.0], [0.0], [-0.5]], problem)
+    settings = Settings(misses=0)
+    engine = Hybrid(problem, seed=0, adviser=script, settings=settings, surrogate_settings=SETTINGS)
+    judge = simulated(problem, lambda x: float(9 - x.max()))
+    asked = drive(engine, judge, rounds=12)
+    assert course(asked) == "LSL" + (4 + settings.hold) * "S" + "L"
+    assert engine.next == "surrogate", "what the surrogate found while the answer waited is not the model's"
+
+
+def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[-1.0], [-1.1], [-1.2]])
     judge = simulated(problem, lambda x: float(9 - x.max()))
-    asked = drive(engine, judge, rounds=engine.settings.hold + 3)
-    assert engine.next == "surrogate", "what the surrogate found while the answer waited is not the model's"
-    asked += drive(engine, judge, rounds=40 - len(asked))
-    course = "".join("L" if c.origin == "scripted" else "S" for c in asked)
-    hold = engine.settings.hold
-    assert course == "LS" + hold * "S" + "L" + (40 - hold - 3) * "S"
-    assert len(script.notes) > 2, "it was asked again"
+    asked = drive(engine, judge, rounds=3)
+    assert engine.next == "surrogate", "an answer that was not simulated has not helped"
+    asked += drive(engine, judge, rounds=37)
+    assert course(asked) == "L" + 39 * "S"
+    told = [
+        note for note in script.notes[2] if "was not simulated: sample 1 differs from it by at most" in note
+    ]
+    assert len(told) == 1 and "10 % of each range" in told[0]
+
+
+def test_of_one_answer_what_is_new_comes_before_what_repeats_a_sample() -> None:
+    problem = wide_problem()
+    engine, _ = hybrid(problem, [[-1.0], [-1.1, 1.5]])
+    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=3)
+    assert course(asked) == "LSL"
+    assert asked[2].signals["u"].values == pytest.approx((1.5,), abs=0.01)
 
 
 def test_the_model_is_told_of_a_stall_and_is_asked_ever_more_rarely() -> None:
@@ -310,8 +343,7 @@ class TestTurnsByCost:
         def timed(candidate: Candidate) -> Evaluation:
             return replace(judge(candidate), seconds=simulation)
 
-        origins = [c.origin for c in drive(engine, timed, rounds=12)]
-        return "".join("L" if origin == "scripted" else "S" for origin in origins)
+        return course(drive(engine, timed, rounds=12))
 
     def test_cheap_simulations(self) -> None:
         assert self.course(0.005, 10.0) == "L" + 11 * "S"

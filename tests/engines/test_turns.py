@@ -6,9 +6,11 @@ from falsifier.engines.turns import (
     ASSUMED_QUESTION,
     SECONDS_PER_DOLLAR,
     Costs,
+    Due,
     Half,
     Ledger,
     Who,
+    due,
     helps,
     next_turn,
 )
@@ -99,3 +101,25 @@ def test_the_ledger_takes_times_from_what_it_is_told() -> None:
         ledger.simulated(seconds)
     assert (ledger.costs.simulation, ledger.costs.proposal) == (2.0, 0.5)
     assert ledger.costs.question == pytest.approx(4.0 + 0.06 * SECONDS_PER_DOLLAR)
+
+
+@pytest.mark.parametrize(
+    ("repeats", "promising", "trusted", "on_trial", "expected"),
+    [
+        # Before predictions have been tested, only the same experiment is not worth a simulation.
+        (False, False, False, True, "now"),
+        (True, True, False, True, "never"),
+        # Once they have been good, they decide.
+        (True, True, True, True, "now"),
+        (True, False, True, True, "never"),
+        (False, False, True, True, "later"),
+        (False, False, True, False, "never"),
+        # After the trial, an LLM that may be right waits while nothing is known.
+        (False, True, False, False, "now"),
+        (False, False, False, False, "later"),
+    ],
+)
+def test_when_a_later_answer_is_simulated(
+    repeats: bool, promising: bool, trusted: bool, on_trial: bool, expected: Due
+) -> None:
+    assert due(repeats=repeats, promising=promising, trusted=trusted, on_trial=on_trial) == expected

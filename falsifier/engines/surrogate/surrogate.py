@@ -92,6 +92,7 @@ class Surrogate:
         self._pending: dict[object, Pending] = {}
         self._suggested: list[Array] = []
         self._failed: list[Array] = []
+        self._stood_for: list[tuple[Array, float]] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates, each from the arm that is chosen for it."""
@@ -167,6 +168,7 @@ class Surrogate:
         levels = self.layout.nearest_extreme(point, within=self.settings.near_extreme)
         if levels is not None:
             self._walk.heard(levels, sample.robustness)
+            self._stood_for.append((self.layout.constant(levels), sample.robustness))
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
@@ -247,6 +249,8 @@ class Surrogate:
         suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
         self._suggested = []
         asked = [p.point for p in self._pending.values() if p.layout is self.layout] + self._failed
+        # The exact extreme may violate if what stands for it is the best sample so far.
+        asked += [extreme for extreme, robustness in self._stood_for if robustness > self._lowest]
         result = plan(
             self._with_risk(self.dynamics.predictor(self.layout, objective)),
             self.layout,

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from falsifier.context.values import Context, Level
+from falsifier.core.candidate import Candidate
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
@@ -15,9 +17,9 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.search.run import falsify
 from falsifier.stl import parse
-from falsifier.testing import BIAS, FREE, START, Array, EngineContract, lag, lag_problem
+from falsifier.testing import BIAS, FREE, START, Array, EngineContract, drive, lag, lag_problem
 from tests.engines.coverage.support import lock_problem
-from tests.engines.support import HASTY
+from tests.engines.support import HASTY, wide_problem
 
 
 class TestContract(EngineContract):
@@ -205,3 +207,15 @@ def test_without_levels_nothing_changes() -> None:
     assert [c.key for c in engine.ask(5)] == [
         c.key for c in make_engine("surrogate", misplaced, seed=1).ask(5)
     ]
+
+
+@pytest.mark.parametrize(("limit", "is_best"), [(9.0, False), (9.5, True)])
+def test_an_extreme_for_which_another_sample_stands_is_planned_only_if_that_is_the_best(
+    limit: float, is_best: bool
+) -> None:
+    problem = wide_problem(f"G[5,10] (x <= {limit} and x >= -9)")
+    engine = Surrogate(problem, seed=0, settings=HASTY)
+    near = problem.space.admit(Candidate({"u": Signal((0.0,), (-1.9,), "constant")}, {}))
+    engine.tell([evaluate(problem, near)])
+    asked = drive(engine, lambda candidate: evaluate(problem, candidate), rounds=4)
+    assert any(set(c.signals["u"].values) == {-2.0} for c in asked) == is_best
