@@ -54,6 +54,19 @@ def test_of_a_predicate_it_is_told_when_it_was_false(limit: float, parts: list[s
     assert all(part in told for part in parts), told
 
 
+@pytest.mark.parametrize(
+    ("pulse", "told"),
+    [
+        (4.0, "x <= 2, from 0 to 10 s: false only at 4 s"),
+        (0.0, "x <= 2, from 0 to 10 s: false only at 0 s"),
+        (10.0, "x <= 2, from 0 to 10 s: false only at 10 s"),
+    ],
+)
+def test_a_predicate_that_was_false_at_one_time_is_told_with_that_time(pulse: float, told: str) -> None:
+    x = np.where(np.abs(TIMES - pulse) < 0.01, 2.5, 1.5)
+    assert line(list(facts(*seen("G[0,10] (x <= 2)", x))), "x <= 2, ") == told
+
+
 def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     lines = list(facts(*seen("G[0,10] (x <= 11) and (F[0,10] (x >= 3) or G[0,10] (u >= 1))", TIMES.copy())))
     conjuncts = line(lines, "conjuncts at t = 0 s: ")
