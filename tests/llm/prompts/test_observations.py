@@ -108,6 +108,17 @@ def test_a_predicate_is_judged_only_when_the_requirement_asks_for_it() -> None:
     assert told == "x <= 6, from 2 to 5 s: always true, smallest margin 1 at 5 s"
 
 
+def test_courses_and_changes_end_where_the_requirement_stops_looking() -> None:
+    for x, course in ((np.where(TIMES < 4.05, 1.0, 2.0) + (TIMES > 7), "x: 1, then 2 from 4.1 s"),):
+        lines = list(facts(*seen("G[0,3] F[0,3] (x <= 9)", x)))
+        assert line(lines, "x: ") == course
+        assert line(lines, "x stays: ").endswith("2: entered at 4.1 s and still held at 6 s")
+    over_time, around = details(*seen("G[2,6] (x <= 9)", TIMES.copy()))
+    assert (over_time, around.split()[-1]) == ("x: 0:0 6:6", "6:6")
+    (only,) = details(*seen("x <= 9", TIMES.copy()))
+    assert only == "x: constant 0"
+
+
 def test_outputs_have_a_breakpoint_where_an_input_steps() -> None:
     view, evaluation = seen("G[0,10] (x <= 20)", TIMES.copy())
     stepping = Candidate({"u": Signal((0.0, 4.2, 7.0), (0.0, 1.0, 1.0), "constant")})
