@@ -380,10 +380,13 @@ def _signal_outside(r: InputRange, times: Sequence[float], values: Sequence[floa
     found = [(t, v) for t, v in zip(times, values, strict=True) if _is_outside(r, v)]
     if not found:
         return ""
+    bounds = f"[{r.low:g}, {r.high:g}]"
+    if len(set(values)) == 1 < len(values):
+        return f"input {r.name!r}: {values[0]:g} is outside its range {bounds}"
     shown = found[:_SHOWN_VALUES]
     more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
     at, what = (", ".join(f"{pair[k]:g}" for pair in shown) for k in (0, 1))
-    verb, bounds = "is" if len(found) == 1 else "are", f"[{r.low:g}, {r.high:g}]"
+    verb = "is" if len(found) == 1 else "are"
     return f"input {r.name!r} at t = {at} s{more}: {what}{more} {verb} outside its range {bounds}"
 
 

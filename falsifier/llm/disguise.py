@@ -17,7 +17,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import Kind, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.observations import monitor_for
@@ -62,12 +62,16 @@ class Disguise:
         names: neutral names by real name.
         derived: predicates that are told as derived signals, with what stands for the real names of these.
         scales: how signals are scaled, by real name.
+        whole: names of real signals that had few whole values in a trajectory.
+        fractional: names of real signals that had other values in a trajectory.
     """
 
     real: View
     names: Mapping[str, str]
     derived: Mapping[Predicate, str]
     scales: Scales
+    whole: frozenset[str] = frozenset()
+    fractional: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, view: View, start: Mapping[str, tuple[float, float]] | None = None) -> "Disguise":
@@ -110,11 +114,11 @@ class Disguise:
         """The view that prompts are built from."""
         real, names = self.real, self.names
         hidden = {*self._searched, *self.derived.values()}
-        kinds = {name: real.kind(name) for name in names if name not in hidden}
+        kinds = {name: self._kind(name) for name in names if name not in hidden}
         variables = [
             *(Variable(names[name], kind=kind) for name, kind in kinds.items() if kind != "string"),  # type: ignore[arg-type]
             *(
-                Variable(names[name], kind=self._kind(predicate), description=self._derivation(predicate))
+                Variable(names[name], kind=self._kind_of(predicate), description=self._derivation(predicate))
                 for predicate, name in self.derived.items()
             ),
         ]
@@ -133,10 +137,18 @@ class Disguise:
         )
 
     def fitted(self, evaluations: Sequence[Evaluation]) -> "Disguise":
-        """The disguise with the scales that trajectories determine; those known already stay."""
+        """The disguise with the scales and levels that trajectories determine; known scales stay."""
         found = self
         for trajectory in (e.trajectory for e in evaluations if e.trajectory is not None):
-            found = replace(found, scales=found.scales.fitted(self._scaled_columns(trajectory)))
+            columns = {n: c for n, c in trajectory.columns.items() if n in self.names}
+            whole = {n for n, column in columns.items() if is_discrete(column, kind="real")}
+            steady = {n for n, c in columns.items() if np.ptp(c) == 0 and c[0] == np.round(c[0])}
+            found = replace(
+                found,
+                scales=found.scales.fitted(self._scaled_columns(trajectory)),
+                whole=found.whole | whole,
+                fractional=found.fractional | (columns.keys() - whole - steady),
+            )
         return found
 
     def hidden(self, evaluation: Evaluation) -> Evaluation:
@@ -275,9 +287,14 @@ class Disguise:
             return self.scales[name].number(value)
         return (value - ranged.low) / (ranged.high - ranged.low or 1.0)
 
-    def _kind(self, predicate: Predicate) -> Kind:
+    def _kind(self, name: str) -> str:
+        """Type of a signal; integer if its values are whole, which scaled ones do not show."""
+        kind = self.real.kind(name)
+        return "integer" if kind == "real" and name in self.whole - self.fractional else kind
+
+    def _kind_of(self, predicate: Predicate) -> Kind:
         """Integer if all signals of a derived one are discrete, so that it is told as changes, too."""
-        kinds = {self.real.kind(n) for n in (*predicate.left.signals, *predicate.right.signals)}
+        kinds = {self._kind(n) for n in (*predicate.left.signals, *predicate.right.signals)}
         return "real" if "real" in kinds else "integer"
 
     def _derivation(self, predicate: Predicate) -> str:

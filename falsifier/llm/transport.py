@@ -8,8 +8,10 @@ litellm makes its HTTP clients in many places. What they share is httpx's transp
 therefore replaced; requests that are not made within ``within`` pass through it unchanged.
 """
 
+import atexit
 import os
 import socket
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from contextvars import ContextVar, copy_context
@@ -17,6 +19,7 @@ from functools import cache
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakSet
 
 if TYPE_CHECKING:
     import httpx
@@ -25,6 +28,9 @@ T = TypeVar("T")
 
 # A reply of a million characters (incoming.LONGEST_REPLY), each escaped, twice over.
 _MOST_BYTES = 16 << 20
+# Time for a call that was given up, and whose connections are cut, to end, in s.
+_GRACE = 0.5
+_GIVEN_UP: WeakSet[Thread] = WeakSet()
 _REDIRECTS = frozenset({301, 302, 303, 307, 308})
 
 
@@ -50,19 +56,45 @@ def within(seconds: float, action: Callable[[], T]) -> T:
         except BaseException as error:
             outcome.put((None, error))
 
-    Thread(target=copy_context().run, args=(work,), daemon=True, name="request").start()
+    thread = Thread(target=copy_context().run, args=(work,), daemon=True, name="request")
+    thread.start()
+    is_over = False
     try:
         result, error = outcome.get(timeout=seconds)
+        is_over = True
     except Empty:
         raise TimeoutError(f"no complete reply within {seconds:.3g} s") from None
     finally:
         # Also after Ctrl-C: otherwise the thread would wait for the server as long as that likes.
         call.end()
+        if not is_over:
+            _GIVEN_UP.add(thread)
     if call.refusal:
         raise RefusedReplyError(call.refusal)
     if error is not None:
         raise error
     return result  # type: ignore[return-value]
+
+
+@atexit.register
+def _wait_for_imports() -> None:
+    """Let calls that were given up end what they import, before the process ends.
+
+    Client libraries import at their first call. A thread that is stopped within an import keeps its lock, and
+    what is destroyed at the end of the process then waits for that lock for ever.
+    """
+    with suppress(KeyboardInterrupt):
+        for thread in list(_GIVEN_UP):
+            thread.join(_GRACE)
+            while _is_importing(thread):
+                thread.join(_GRACE)
+
+
+def _is_importing(thread: Thread) -> bool:
+    frame = sys._current_frames().get(thread.ident or 0)
+    while frame is not None and "importlib._bootstrap" not in frame.f_code.co_filename:
+        frame = frame.f_back
+    return frame is not None
 
 
 class _Call:

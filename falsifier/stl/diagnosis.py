@@ -192,7 +192,7 @@ def _words(
             side = "left" if decider is left else "right"
             return f"U {_over(window)} was decided by its {side} side at {_s(time)}"
         case Next():
-            return f"the next sample is at {_s(time)}"
+            return f"the next recorded time is {_s(time)}"
         case Not():
             return f"'not' {'holds' if value >= 0 else 'fails'}"
         case Implies(left, _):

@@ -28,7 +28,7 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
     n, times = program.samples, trajectory.times
     if len(times) != n:
         raise MonitorError(
-            f"the trajectory has {len(times)} samples, expected {n} from 0 s to "
+            f"the trajectory has {len(times)} recorded times, expected {n} from 0 s to "
             f"{(n - 1) * program.step:g} s every {program.step:g} s"
         )
     start = 0
@@ -41,7 +41,7 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
         return buffer
     if status == kernels.BAD_TIME:
         raise MonitorError(
-            f"the time grid is not uniform: sample {position} is at {times[position]:g} s, expected "
+            f"the time grid is not uniform: recorded time {position} is {times[position]:g} s, expected "
             f"{position * program.step:g} s"
         )
     raise MonitorError(_problem(program, buffer, status, position))

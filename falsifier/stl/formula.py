@@ -241,7 +241,7 @@ class Until(Formula):
 
 @dataclass(frozen=True, slots=True)
 class Next(Formula):
-    """The operand holds at the next sample."""
+    """The operand holds at the next recorded time."""
 
     operand: Formula
 

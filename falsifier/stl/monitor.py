@@ -47,7 +47,8 @@ class Monitor:
             raise FormulaError(f"a monitor needs a formula; use parse({self.formula!r})")
         if not (self.step > 0 and np.isfinite(self.step) and self.samples >= 1):
             raise FormulaError(
-                f"a time grid needs a positive step and at least one sample, got {self.step}, {self.samples}"
+                "a time grid needs a positive step and at least one recorded time, "
+                f"got {self.step}, {self.samples}"
             )
         program = compile_formula(self.formula, step=self.step, samples=self.samples)
         object.__setattr__(self, "_program", program)

@@ -124,7 +124,7 @@ def test_wrong_arguments_are_told_and_can_be_corrected() -> None:
     chat, exchanges = ScriptedChat(script), list[Exchange]()
     run(hybrid(chat, on_exchange=exchanges.append))
     told = answers(chat.requests[first_offer(chat.requests) + 2])
-    assert "7, 7, 7, 7 are outside its range [-2, 2]" in told[0]
+    assert "input 'u': 7 is outside its range [-2, 2]" in told[0]
     assert "unknown input 'u9'" in told[1]
     assert [bool(e.problem) for e in exchanges if e.reply and e.reply.tool_calls][:2] == [True, True]
     # It heard no prediction by itself, so it is told some.

@@ -101,6 +101,10 @@ def changed(**changes: Any) -> dict[str, Any]:
             changed(signals=[{"name": "throttle", "values": [1, 2, 101]}, GOOD["signals"][1]]),
             r"'throttle' at t = 10 s: 101 is outside",
         ),
+        (
+            changed(signals=[{"name": "throttle", "values": [101]}, GOOD["signals"][1]]),
+            r"input 'throttle': 101 is outside its range \[0, 100\]$",
+        ),
         (changed(signals=[{"name": "throttle", "values": []}, GOOD["signals"][1]]), "has no values"),
         (changed(signals=[{"name": "throttle", "value": 3}]), r"signals\.0\.values: Field required"),
         (changed(signals=[{"name": "throttle", "values": ["lots"]}]), "'lots' is neither a number nor a run"),

@@ -1,5 +1,8 @@
+import subprocess
+import sys
 import threading
 from contextvars import ContextVar
+from pathlib import Path
 
 import httpx
 import pytest
@@ -35,6 +38,24 @@ def test_an_action_that_does_not_return_is_given_up() -> None:
             within(0.05, done.wait)
     finally:
         done.set()
+
+
+def test_a_process_ends_although_a_call_was_given_up_while_it_imported(tmp_path: Path) -> None:
+    # What the interpreter's own lock for imports does in a thread that is stopped at the wrong moment.
+    slow = "import _imp, time\n_imp.acquire_lock()\ntime.sleep(0.4)\n_imp.release_lock()\n"
+    closes = "class Closing:\n    def __del__(self):\n        import colorsys\nclosing = Closing()\n"
+    main = (
+        "import holder\n"
+        "from contextlib import suppress\n"
+        "from falsifier.llm.transport import within\n"
+        "with suppress(TimeoutError):\n"
+        "    within(0.1, lambda: __import__('slow'))\n"
+    )
+    for name, source in (("slow", slow), ("holder", closes), ("main", main)):
+        (tmp_path / f"{name}.py").write_text(source)
+    subprocess.run(
+        [sys.executable, "main.py"], cwd=tmp_path, timeout=HANG, check=True, stderr=subprocess.DEVNULL
+    )
 
 
 def test_connections_are_cut_when_the_call_is_given_up() -> None:

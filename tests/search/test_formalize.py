@@ -82,7 +82,7 @@ SENTENCES: list[tuple[str, list[str]]] = [
     ]),
     ("At 20 s the car is slower than 110.", ["G[20,20] (speed < 110)", "G[0,20] (speed < 110)"]),
     ("The gear never exceeds 2 while the speed is below 15.", ["G[0,50] (speed < 15 -> gear < 2.5)"]),
-    ("Whenever rpm is above 4000, the next sample is below 4500.", [
+    ("Whenever rpm is above 4000, rpm is below 4500 at the next recorded time.", [
         "G[0,49] (rpm > 4000 -> X (rpm < 4500))",
     ]),
     ("The speed is at least 10 times the gear after 10 s.", ["G[10,50] (speed - 10*gear >= 0)"]),

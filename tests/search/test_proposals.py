@@ -40,7 +40,7 @@ class Mine:
     [
         (
             level(5.0),
-            r"input 'u' at t = 0, 3.33333, 6.66667, 10 s: 5, 5, 5, 5 are outside its range \[-1, 1\]",
+            r"input 'u': 5 is outside its range \[-1, 1\]",
         ),
         (level(1.0, "throttle"), "engine 'mine': unknown input or parameter 'throttle'"),
         (Candidate(), "engine 'mine': input 'u' is missing"),

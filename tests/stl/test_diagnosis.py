@@ -57,7 +57,7 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
         ("x <= 5 -> y >= 3", "the consequence of -> failed: y = 2 is below 3 by 1."),
         ("x <= 4 -> y >= 9", "the condition of -> decided: x = 3 is below 4 by 1."),
         ("x <= 5 <-> y <= 3", "the right side of '<->' decided: y = 2 is below 3 by 1."),
-        ("X (x <= 3)", "the next sample is at 1 s: x = 1 is below 3 by 2."),
+        ("X (x <= 3)", "the next recorded time is 1 s: x = 1 is below 3 by 2."),
         ("(x <= 9) U[0,1] (y >= 8)", "U over [0, 1] s was decided by its right side at 1 s: "
          "y = 7 is below 8 by 1."),
         ("(x <= 2) U (y >= 5)", "U over [0, 1] s was decided by its left side at 0 s: "

@@ -140,6 +140,7 @@ class SampleLines(_Block):
 
     number: int
     mark: str = Field(default="", description="Why an old sample is shown: 'best so far', ...")
+    weight: int = Field(default=0, description="Those with smaller weights are shortened first.")
     inputs: tuple[str, ...]
     robustness: str = Field(default="", description="Empty if there is no verdict.")
     doubt: str = Field(default="", description="Why a violation does not count.")

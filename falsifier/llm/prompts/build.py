@@ -34,7 +34,6 @@ from falsifier.llm.prompts.reply import reply_block
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl import in_words
-from falsifier.stl.formula import Always, Eventually, Until
 
 # Control-point times listed individually; of longer lists the first ones and the last.
 _MAX_TIMES = 25
@@ -100,7 +99,7 @@ def _requirement(view: View, variant: Variant) -> RequirementBlock:
         formula=str(formula),
         reading=in_words(formula),
         description=view.requirement.description,
-        terms=tuple(str(e) for e in formula.expressions),
+        terms=tuple(str(e) for e in formula.expressions if set(e.signals) & set(view.formula_outputs)),
     )
 
 
@@ -129,7 +128,7 @@ def _outputs(view: View, variant: Variant, circumstances: Circumstances) -> Outp
             )
             for name in (*view.formula_outputs, *others)
         ),
-        legend=_LEGEND if variant.has("observations") else "",
+        legend=_legend(view) if variant.has("observations") else "",
     )
 
 
@@ -139,6 +138,13 @@ _LEGEND = (
     "signal's span is rounded off, 4 % of a signal outside the requirement, 1 % around the time that "
     "decided, and more where it oscillates."
 )
+
+
+def _legend(view: View) -> str:
+    """How signals over time are written."""
+    horizon = _horizon(view)
+    end = f" They are told up to {horizon} s, as the requirement looks no further." if horizon else ""
+    return f"{_LEGEND}{end}"
 
 
 def _start(view: View, variant: Variant, circumstances: Circumstances, name: str) -> str:
@@ -193,12 +199,7 @@ def _named_inputs(view: View, variant: Variant) -> InputsBlock:
 
 def _horizon(view: View) -> str:
     """Time up to which the requirement looks; empty if that is the end of the simulation."""
-    formula = view.requirement.formula
-    timed = [f for f in formula.walk() if isinstance(f, Always | Eventually | Until)]
-    if any(f.window is None for f in timed):
-        return ""
-    horizon = formula.horizon(view.experiment.output_interval)
-    return number(horizon, 6) if horizon < view.space.stop_time - view.experiment.output_interval else ""
+    return number(view.looked_at, 6) if view.looked_at < view.space.stop_time else ""
 
 
 def _input(view: View, r: InputRange, known: tuple[str, ...], *, free: bool) -> InputLine:
@@ -293,7 +294,13 @@ def _sample(
     circumstances: Circumstances,
     reply: ReplyKind,
 ) -> SampleLines:
-    inputs = _chosen(view, variant, evaluation.candidate, reply)
+    inputs = _chosen(
+        view,
+        variant,
+        evaluation.candidate,
+        reply,
+        in_brief=depth == "summary" or (depth == "plain" and not mark),
+    )
     if evaluation.robustness is None:
         return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
     rich = variant.has("observations")
@@ -304,6 +311,7 @@ def _sample(
     return SampleLines(
         number=index + 1,
         mark=mark,
+        weight=selection.weight(mark, depth) if rich else 0,
         inputs=inputs,
         robustness=robustness,
         doubt=circumstances.doubts.get(evaluation.candidate.key, ""),
@@ -329,10 +337,14 @@ def _failure(evaluation: Evaluation) -> str:
     return f"no verdict, the simulation {how}: {evaluation.reason}".rstrip(": ")
 
 
-def _chosen(view: View, variant: Variant, candidate: Candidate, reply: ReplyKind) -> tuple[str, ...]:
+def _chosen(
+    view: View, variant: Variant, candidate: Candidate, reply: ReplyKind, *, in_brief: bool = False
+) -> tuple[str, ...]:
     if not variant.has("names") or (variant.is_published and reply == "points"):
         return choices.as_point(view, candidate)
-    return (choices.as_signals if variant.has("system") else choices.as_values)(view, candidate)
+    if not variant.has("system"):
+        return choices.as_values(view, candidate)
+    return choices.as_signals(view, candidate, in_brief=in_brief)
 
 
 def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:

@@ -19,6 +19,9 @@ _MOST_PIECES = 12
 _ROUGHLY = 0.02
 _PUBLISHED_DECIMALS = 3
 
+# Of a signal with more switches only their number and distances, and its mean are told in brief.
+_MOST_IN_BRIEF = 16
+
 # Said of values where the sample had other control points than those that are told.
 _READ = " (values at these times of an input with other control points)"
 
@@ -55,26 +58,47 @@ def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:
     return len(set(signal.values)) == 1 or view.space.is_fixed(r, signal)
 
 
-def as_signals(view: View, candidate: Candidate) -> tuple[str, ...]:
-    """Each input with its own control points and interpolation, and parameters."""
+def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> tuple[str, ...]:
+    """Each input with its own control points and interpolation, and parameters.
+
+    Args:
+        view: the problem.
+        candidate: what was or will be simulated.
+        in_brief: whether signals of many pieces are only described.
+    """
+    stop_time = view.space.stop_time
     return (
         *(
-            f"{r.name}: {_signal_text_in(r, candidate.signals[r.name], view.space.stop_time)}"
+            f"{r.name}: {_signal_text_in(r, candidate.signals[r.name], stop_time, in_brief=in_brief)}"
             for r in view.space.inputs
         ),
         *_parameters(view, candidate),
     )
 
 
-def _signal_text_in(r: InputRange, signal: Signal, stop_time: float) -> str:
+def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief: bool) -> str:
     """Parameterization with values rounded to some thousandths of the range."""
     decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
     rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
     if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
         rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
+        if in_brief and rough.switches > _MOST_IN_BRIEF:
+            return _described(rough, stop_time, decimals)
         if rough.switches < rounded.switches:
             return f"told within {_ROUGHLY:.0%} of the range: {signal_text(rough, stop_time=stop_time)}"
     return signal_text(rounded, stop_time=stop_time)
+
+
+def _described(signal: Signal, stop_time: float, decimals: int) -> str:
+    """What is to be known of constant pieces that are not listed."""
+    lengths = np.diff((*signal.times, stop_time))
+    low, high = (plain(v, decimals) for v in (min(signal.values), max(signal.values)))
+    mean = plain(float(np.average(signal.values, weights=lengths)), decimals)
+    apart = [number(float(f(lengths)), 3) for f in (np.min, np.median, np.max)]
+    return (
+        f"{len(lengths)} constant pieces between {low} and {high}, mean {mean}, "
+        f"each {apart[0]} to {apart[2]} s long, {apart[1]} s in the median"
+    )
 
 
 def _merged(signal: Signal, tolerance: float) -> Signal:

@@ -71,7 +71,7 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
     """How often each value was entered, and its shortest stay.
 
-    The first interval does not count as entered, and the last one is cut off by the end of the simulation.
+    The first interval does not count as entered, and the last one is cut off by the end of the times.
     """
     found = pieces(times, column)
     if len(found) < 2:
@@ -87,7 +87,8 @@ def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda
             begin = plain(shortest.start, clock)
             words.append(f"{name}: entered {_times(len(again))}, shortest stay {length} s from {begin} s")
         elif again:
-            words.append(f"{name}: entered at {plain(again[0].start, clock)} s and kept to the end")
+            end = plain(float(times[-1]), clock)
+            words.append(f"{name}: entered at {plain(again[0].start, clock)} s and still held at {end} s")
         else:
             words.append(f"{name}: never entered again")
     return "; ".join(words)

@@ -10,12 +10,12 @@ from falsifier.problem.templates import TEMPLATES
 # Maximum number of variables that are listed; inputs and outputs come first.
 _MOST_VARIABLES = 120
 
-_LANGUAGE = """Formulas are Signal Temporal Logic over the signals below, judged from time 0 on samples.
+_LANGUAGE = """Formulas are Signal Temporal Logic over the signals below, judged at recorded times from 0 on.
 - Comparisons: < <= > >= ; 1 <= x <= 3 is allowed. A Boolean signal b may stand alone.
 - not, and, or, -> (implies), <-> ; put the scope of temporal operators in parentheses.
 - G[a,b] (f): f holds throughout from a to b seconds later. F[a,b] (f): f holds at some time then.
 - f U[a,b] g: g holds at some time from a to b seconds later, and f until then.
-- X (f): f holds at the next sample.
+- X (f): f holds at the next recorded time.
 - Arithmetic: + - * / ^ abs sqrt exp log sin cos min max. There are no derivatives and no earlier values.
 - "Becomes true" is: (not (c) and X (c)) -> X (...).
 - Windows are closed, in seconds, look forward, and nested ones add up. The sum must not exceed the stop time.

@@ -29,9 +29,9 @@ ROBUSTNESS_DIGITS = 5
 # Distance from a signal that its course may have, as a share of its span: of those compared, of others.
 _TOLERANCE = 0.02
 _TOLERANCE_OF_OTHERS = 0.04
-# Oscillations with a shorter period than this share of the stop time are told by their envelopes.
+# Oscillations with a shorter period than this share of the told time are told by their envelopes.
 _SLOWEST_OSCILLATION = 1 / 20
-# The interval around the critical time that is told more exactly: its share of the stop time, its number of
+# The interval around the critical time that is told more exactly: its share of the told time, its number of
 # periods if the signal oscillates, and its tolerance as a share of the span there.
 _CLOSE_SHARE = 1 / 12
 _CLOSE_PERIODS = 2.5
@@ -63,6 +63,7 @@ def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator
     if trajectory is None:
         yield from summary(evaluation)
         return
+    looked_at = _looked_at(view, trajectory)
     monitor = monitor_for(view)
     diagnosis = monitor.diagnose(trajectory)
     clock = _clock(view)
@@ -71,10 +72,11 @@ def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator
         yield _values_there(view, trajectory, diagnosis)
     yield from _parts(view, monitor, diagnosis, trajectory)
     for name in view.formula_outputs:
-        if is_discrete(trajectory[name], kind=view.kind(name)):
+        times, column = looked_at.times, looked_at[name]
+        if is_discrete(column, kind=view.kind(name)):
             label = partial(view.labelled, name)
-            yield f"{name}: {change_list(trajectory.times, trajectory[name], clock=clock, label=label)}"
-            if stays := dwell_list(trajectory.times, trajectory[name], clock=clock, label=label):
+            yield f"{name}: {change_list(times, column, clock=clock, label=label)}"
+            if stays := dwell_list(times, column, clock=clock, label=label):
                 yield f"{name} stays: {stays}"
     if close:
         for predicate in view.requirement.formula.predicates:
@@ -93,6 +95,7 @@ def details(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterat
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     if verdict is None or trajectory is None:
         return
+    trajectory = _looked_at(view, trajectory)
     times = trajectory.times
     steps = _input_steps(evaluation) if close else ()
     compared = compared_columns(view, trajectory)
@@ -110,6 +113,12 @@ def details(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterat
             yield f"{name}: {_drawn(view, name, column, times, kept, most)}"
     if close:
         yield from _close_up(view, compared, times, verdict)
+
+
+def _looked_at(view: View, trajectory: Trajectory) -> Trajectory:
+    """The part of a trajectory at which the requirement looks."""
+    end = int(np.searchsorted(trajectory.times, view.looked_at + trajectory.step / 2))
+    return Trajectory(trajectory.times[:end], {n: column[:end] for n, column in trajectory.columns.items()})
 
 
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
@@ -236,7 +245,7 @@ def drawn_course(
     """What is told of a signal over the whole simulation."""
     in_formula = name in view.requirement.formula.signals or name not in view.info
     share = _TOLERANCE if in_formula else _TOLERANCE_OF_OTHERS
-    slowest = _SLOWEST_OSCILLATION * view.space.stop_time
+    slowest = _SLOWEST_OSCILLATION * float(times[-1])
     tolerance = share * float(np.ptp(column))
     return course(times, column, tolerance=tolerance, slower_than=slowest, kept=steps, most=most)
 
@@ -258,8 +267,8 @@ def _close_up(view: View, compared: Mapping[str, Array], times: Array, verdict: 
     for name, column in compared.items():
         if name not in _deciding(view, verdict) or is_discrete(column, kind=view.kind(name)):
             continue
-        reach = _CLOSE_SHARE / 2 * view.space.stop_time
-        swings = oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * view.space.stop_time)
+        reach = _CLOSE_SHARE / 2 * float(times[-1])
+        swings = oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * float(times[-1]))
         around = [s for s in swings if s.start <= verdict.critical_time <= s.end]
         if around:
             reach = _CLOSE_PERIODS / 2 * around[0].period_at(verdict.critical_time)

@@ -10,7 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.view import View
 
 RECENT = 10
-_BEST = 2
+_MARKS = ("best so far", "second best so far")
 # Latest samples of which more than one line is told.
 _PLAIN = 3
 _DIFFERENT = 2
@@ -33,8 +33,8 @@ def recent_best_and_different(view: View, evaluations: Sequence[Evaluation]) -> 
     chosen = dict.fromkeys(range(max(0, len(evaluations) - RECENT), len(evaluations)), "")
     judged = [(e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None]
     is_flat = len({value for value, _ in judged}) == 1
-    for rank, (_, i) in enumerate(sorted(judged)[: 0 if is_flat and len(judged) > 1 else _BEST]):
-        chosen[i] = "best so far" if rank == 0 else "second best so far"
+    for rank, (_, i) in enumerate(sorted(judged)[: 0 if is_flat and len(judged) > 1 else len(_MARKS)]):
+        chosen[i] = _MARKS[rank]
     others = [i for _, i in judged if i not in chosen]
     points = {i: _features(view, evaluations[i]) for i in (*chosen, *others)} if others else {}
     for _ in range(min(_DIFFERENT, len(others))):
@@ -53,6 +53,13 @@ def depths(chosen: Iterable[int], evaluations: Sequence[Evaluation]) -> dict[int
     close = {*by_robustness[:1], *judged[-1:]}
     plain = {*by_robustness[1:2], *judged[-_PLAIN:]}
     return {i: "close" if i in close else "plain" if i in plain else "summary" for i in judged}
+
+
+def weight(mark: str, depth: Depth) -> int:
+    """How long a sample stays in a prompt that is too long: the best one longest, then the latest one."""
+    if mark == _MARKS[0]:
+        return 3
+    return 2 if depth == "close" else 1 if mark else 0
 
 
 def _features(view: View, evaluation: Evaluation) -> NDArray[np.float64]:

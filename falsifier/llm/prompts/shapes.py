@@ -104,9 +104,19 @@ def course(
     whole, error = _breakpoints(times, column, tolerance, kept, most=most)
     if error <= tolerance:
         return Course((_points(times, column, whole),), (), error)
+    kept = tuple(kept)
+    fast = _with_swings(times, column, tolerance, slower_than, kept, most)
+    if fast.swings and fast.tolerance <= tolerance:
+        return fast
+    slow = _with_swings(times, column, tolerance, _SLOWER * slower_than, kept, most)
+    return min(fast, slow, key=lambda drawn: drawn.tolerance)
+
+
+def _with_swings(
+    times: Array, column: Array, tolerance: float, slower_than: float, kept: tuple[float, ...], most: int
+) -> Course:
+    """Redraw a signal with its longest oscillations, and breakpoints between them."""
     found = oscillations(times, column, slower_than=slower_than, tolerance=tolerance)
-    if not found:  # breakpoints did not suffice for a slower one either
-        found = oscillations(times, column, slower_than=_SLOWER * slower_than, tolerance=tolerance)
     longest = sorted(found, key=lambda s: s.start - s.end)[:_MOST_SWINGS]
     swings = sorted(longest, key=lambda s: s.start)
     spans = [(_index(times, s.start), _index(times, s.end)) for s in swings]
@@ -180,14 +190,16 @@ def oscillations(
 
 
 def turning_points(column: Array) -> list[int]:
-    """Indices of extrema that differ from their neighbours by more than ripple."""
+    """Indices of highs and lows in turn that differ from their neighbours by more than ripple."""
     least = _RIPPLE_SHARE * float(np.ptp(column))
     slopes = np.sign(np.diff(column))
     moving = np.flatnonzero(slopes)
     candidates = moving[1:][slopes[moving[1:]] != slopes[moving[:-1]]].tolist()
     turns: list[int] = []
     for k in candidates:
-        if not turns or abs(column[k] - column[turns[-1]]) > least:
+        if len(turns) > 1 and (column[k] - column[turns[-1]]) * (column[turns[-1]] - column[turns[-2]]) > 0:
+            turns[-1] = k
+        elif not turns or abs(column[k] - column[turns[-1]]) > least:
             turns.append(k)
     return turns
 

@@ -1,9 +1,9 @@
-"""Shortens a prompt to a token limit by removing history, the oldest samples first."""
+"""Shortens a prompt to a token limit by removing history, what matters least first."""
 
 from collections.abc import Callable
 
 from falsifier.errors import ChatError
-from falsifier.llm.prompts.blocks import HistoryBlock, Prompt, SampleLines
+from falsifier.llm.prompts.blocks import Prompt, SampleLines
 from falsifier.llm.prompts.render import render
 from falsifier.llm.tokens import count_tokens
 
@@ -18,8 +18,8 @@ _Change = Callable[[SampleLines], SampleLines | None]
 def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS, llm: str = "") -> Prompt:
     """Return the prompt with as much of its history as fits.
 
-    The details of old samples are removed first, then their facts, then the samples. The inputs and
-    robustness of marked samples (the best, the most different) are removed last.
+    The details of samples are removed first, then their facts, then the samples; of each, those with the
+    smallest weight and the oldest first, so that the best and the latest sample stay longest.
 
     Args:
         prompt: the full prompt.
@@ -31,12 +31,11 @@ def trimmed(prompt: Prompt, tokens: int = DEFAULT_PROMPT_TOKENS, llm: str = "") 
     """
     bare = size(prompt.model_copy(update={"history": None}), llm)
     aim = min(tokens, max(USUAL_PROMPT_TOKENS, 2 * bare))
-    for change, marked_too in _STAGES:
-        position = 0
-        while prompt.history is not None and position < len(prompt.history.samples):
+    for change in (_without_details, _without_facts, _dropped):
+        for number in _lightest_first(prompt):
             if size(prompt, llm) <= aim:
                 return prompt
-            prompt, position = _changed(prompt, prompt.history, position, change, marked_too=marked_too)
+            prompt = _changed(prompt, number, change)
     if size(prompt, llm) > tokens:
         raise ChatError(
             f"the prompt needs {size(prompt, llm)} tokens without any history, but the limit is {tokens}: "
@@ -58,23 +57,21 @@ def _without_facts(sample: SampleLines) -> SampleLines:
     return sample.model_copy(update={"details": (), "facts": ()})
 
 
-_STAGES: tuple[tuple[_Change, bool], ...] = (
-    (_without_details, False),
-    (_without_details, True),
-    (_without_facts, True),
-    (lambda _: None, False),
-    (lambda _: None, True),
-)
+def _dropped(sample: SampleLines) -> None:
+    return None
 
 
-def _changed(
-    prompt: Prompt, history: HistoryBlock, position: int, change: _Change, *, marked_too: bool
-) -> tuple[Prompt, int]:
-    """Change the sample at this position; return the prompt and the position of the next sample."""
-    sample = history.samples[position]
-    if sample.mark and not marked_too:
-        return prompt, position + 1
-    new = change(sample)
-    samples = (*history.samples[:position], *([new] if new else []), *history.samples[position + 1 :])
-    smaller = history.model_copy(update={"samples": samples, "omitted": history.omitted + (0 if new else 1)})
-    return prompt.model_copy(update={"history": smaller}), position + (1 if new else 0)
+def _lightest_first(prompt: Prompt) -> list[int]:
+    """Numbers of the samples; of those with the same weight, the oldest first."""
+    samples = prompt.history.samples if prompt.history is not None else ()
+    return [s.number for s in sorted(samples, key=lambda s: (s.weight, s.number))]
+
+
+def _changed(prompt: Prompt, number: int, change: _Change) -> Prompt:
+    """Change the sample with this number."""
+    assert prompt.history is not None
+    changed = (change(s) if s.number == number else s for s in prompt.history.samples)
+    samples = tuple(s for s in changed if s is not None)
+    lost = len(prompt.history.samples) - len(samples)
+    smaller = prompt.history.model_copy(update={"samples": samples, "omitted": prompt.history.omitted + lost})
+    return prompt.model_copy(update={"history": smaller})

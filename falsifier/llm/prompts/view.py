@@ -8,6 +8,7 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.space import SearchSpace
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
+from falsifier.stl.formula import Always, Eventually, Until
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,16 @@ class View:
     def chosen(self) -> str:
         """What is chosen, in one word."""
         return "inputs" if self.space.inputs else "parameters"
+
+    @property
+    def looked_at(self) -> float:
+        """Time in s up to which the requirement looks; the stop time if it is about as late."""
+        formula, stop_time = self.requirement.formula, self.space.stop_time
+        timed = [f for f in formula.walk() if isinstance(f, Always | Eventually | Until)]
+        if any(f.window is None for f in timed):
+            return stop_time
+        horizon = formula.horizon(self.experiment.output_interval)
+        return horizon if horizon < stop_time - self.experiment.output_interval else stop_time
 
     @property
     def formula_outputs(self) -> tuple[str, ...]:

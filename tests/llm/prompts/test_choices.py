@@ -42,6 +42,19 @@ def test_repeated_values_of_constant_pieces_are_left_out() -> None:
     assert signal_text(line, stop_time=10.0).endswith("[[0, 0], [1, 0], [2, 1], [5, 1]]")
 
 
+def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
+    times = [0.0, 2.5, *(2.5 + 0.25 * k for k in range(1, 30))]
+    signal = Signal(tuple(times), tuple(float(k % 2) for k in range(31)), "constant")
+    made = Candidate({"u": signal, "v": Signal((0.0,), (-1.0,), "pchip")}, {"x0": 0.25})
+    assert as_signals(VIEW, made, in_brief=True) == (
+        "u: 31 constant pieces between 0 and 1, mean 0.375, each 0.25 to 2.5 s long, 0.25 s in the median",
+        "v: constant -1",
+        "x0 = 0.25",
+    )
+    assert as_signals(VIEW, STEP, in_brief=True) == as_signals(VIEW, STEP)
+    assert "[[0, 0], [2.5, 1], [2.75, 0]" in as_signals(VIEW, made)[0]
+
+
 def test_a_signal_of_many_pieces_is_told_roughly() -> None:
     values = [0.0, *(0.5 + 0.001 * k for k in range(20)), -1.0]
     signal = Signal(tuple(0.4 * k for k in range(22)), tuple(values), "constant")

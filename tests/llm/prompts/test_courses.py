@@ -50,7 +50,7 @@ def test_dwell_list_names_the_shortest_stay_after_an_entry() -> None:
         "1: entered once, shortest stay 1.75 s from 5.25 s",
         "2: entered 2 times, shortest stay 0.25 s from 5 s",
         "3: entered once, shortest stay 0.64 s from 4.36 s",
-        "4: entered at 7 s and kept to the end",
+        "4: entered at 7 s and still held at 10 s",
     ]
     assert "1: never entered again" in dwell_list(TIMES, steps((0, 1), (2, 2)), clock=2)
 

@@ -54,6 +54,19 @@ def test_of_a_predicate_it_is_told_when_it_was_false(limit: float, parts: list[s
     assert all(part in told for part in parts), told
 
 
+@pytest.mark.parametrize(
+    ("pulse", "told"),
+    [
+        (4.0, "x <= 2, from 0 to 10 s: false only at 4 s"),
+        (0.0, "x <= 2, from 0 to 10 s: false only at 0 s"),
+        (10.0, "x <= 2, from 0 to 10 s: false only at 10 s"),
+    ],
+)
+def test_a_predicate_that_was_false_at_one_time_is_told_with_that_time(pulse: float, told: str) -> None:
+    x = np.where(np.abs(TIMES - pulse) < 0.01, 2.5, 1.5)
+    assert line(list(facts(*seen("G[0,10] (x <= 2)", x))), "x <= 2, ") == told
+
+
 def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     lines = list(facts(*seen("G[0,10] (x <= 11) and (F[0,10] (x >= 3) or G[0,10] (u >= 1))", TIMES.copy())))
     conjuncts = line(lines, "conjuncts at t = 0 s: ")
@@ -93,6 +106,17 @@ def test_a_predicate_is_judged_only_when_the_requirement_asks_for_it() -> None:
     view, evaluation = seen("G[2,5] (x <= 6)", TIMES.copy())
     told = line(list(facts(view, evaluation)), "x <= 6")
     assert told == "x <= 6, from 2 to 5 s: always true, smallest margin 1 at 5 s"
+
+
+def test_courses_and_changes_end_where_the_requirement_stops_looking() -> None:
+    for x, course in ((np.where(TIMES < 4.05, 1.0, 2.0) + (TIMES > 7), "x: 1, then 2 from 4.1 s"),):
+        lines = list(facts(*seen("G[0,3] F[0,3] (x <= 9)", x)))
+        assert line(lines, "x: ") == course
+        assert line(lines, "x stays: ").endswith("2: entered at 4.1 s and still held at 6 s")
+    over_time, around = details(*seen("G[2,6] (x <= 9)", TIMES.copy()))
+    assert (over_time, around.split()[-1]) == ("x: 0:0 6:6", "6:6")
+    (only,) = details(*seen("x <= 9", TIMES.copy()))
+    assert only == "x: constant 0"
 
 
 def test_outputs_have_a_breakpoint_where_an_input_steps() -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from falsifier.llm.prompts.shapes import Course, breakpoints, course, oscillations
+from falsifier.llm.prompts.shapes import Course, breakpoints, course, oscillations, turning_points
 
 TIMES = np.linspace(0.0, 10.0, 1001)
 FAST = 2 * np.sin(2 * np.pi * 5 * TIMES)
@@ -63,6 +63,21 @@ def test_phases_of_an_oscillation_have_their_own_period() -> None:
 def test_slow_signals_and_ripple_do_not_oscillate() -> None:
     assert oscillations(TIMES, np.sin(2 * np.pi * TIMES / 5), slower_than=0.5) == []
     assert oscillations(TIMES, 100 * TIMES + 0.1 * np.sin(60 * TIMES), slower_than=0.5) == []
+
+
+def test_a_rise_with_ripple_is_no_oscillation() -> None:
+    rise = TIMES + 0.15 * np.sin(2 * np.pi * TIMES / 0.5)
+    assert oscillations(TIMES, rise, slower_than=2.0) == []
+    high_low_high = np.interp(TIMES, [0, 2, 4, 4.1, 4.2, 6, 8, 10], [0, 5, 0, 0.05, 0, 5, 0, 0])
+    assert [round(float(TIMES[k])) for k in turning_points(high_low_high)] == [2, 4, 6]
+
+
+def test_slow_swings_are_told_as_such_if_points_between_fast_ones_do_not_suffice() -> None:
+    swinging = np.sin(2 * np.pi * TIMES) + np.where((TIMES > 4) & (TIMES < 5), FAST, 0)
+    drawn = course(TIMES, swinging, tolerance=0.05, slower_than=0.5, most=12)
+    (swing,) = drawn.swings
+    assert swing.end - swing.start > 9
+    assert drawn.tolerance <= 0.05
 
 
 def test_lines_and_oscillations_take_turns() -> None:

@@ -41,14 +41,27 @@ def test_courses_of_old_samples_go_first() -> None:
     assert all(s.facts for s in smaller.history.samples)
 
 
+def test_the_best_and_the_latest_sample_keep_their_courses_longest() -> None:
+    prompt = long_prompt()
+    limit = size(prompt)
+    kept: list[list[int]] = []
+    while not kept or any(kept[-1]):
+        assert prompt.history is not None
+        kept.append([s.number for s in prompt.history.samples if s.details])
+        prompt, limit = trimmed(prompt, limit), limit - 40
+    order = list(dict.fromkeys(map(tuple, kept)))
+    best = 1
+    assert order[-3:] == [(best, 17), (best,), ()]
+
+
 def test_the_best_sample_stays_longest() -> None:
     prompt = long_prompt()
     assert prompt.history is not None
     bare = size(prompt.model_copy(update={"history": None}))
     smaller = trimmed(prompt, bare + 190)
     assert smaller.history is not None
-    assert all(s.mark for s in smaller.history.samples)
-    assert smaller.history.samples
+    assert [s.mark for s in smaller.history.samples] == ["best so far", ""]
+    assert smaller.history.samples[-1].number == 17, "the latest one"
     lost = len(prompt.history.samples) - len(smaller.history.samples)
     assert smaller.history.omitted == prompt.history.omitted + lost
 

@@ -114,6 +114,16 @@ class TestMP5:
         assert "\n  abs(x - u): 0:0 " in changing
         assert "abs(x - u) <= 0.9, from 0 to 10 s: always true, smallest margin" in changing
 
+    def test_terms_of_inputs_alone_are_not_said_to_be_reported(self) -> None:
+        problem = lag_problem("G[0,10] (abs(x - u) <= 0.9 + 0.1*u)")
+        standing, _ = told(problem, "MP5")
+        assert "Derived signals, reported below: abs(x - u)\n" in f"{standing}\n"
+
+    def test_that_signals_are_told_up_to_where_the_requirement_looks(self) -> None:
+        standing, _ = told(lag_problem("G[0,4] (x <= 0.9)"), "MP5")
+        assert "They are told up to 4 s, as the requirement looks no further." in standing
+        assert "They are told up to" not in told(lag_problem(), "MP5")[0]
+
     def test_failed_samples_with_their_reason(self) -> None:
         problem = lag_problem()
         candidate = problem.space.decode([1, 1, 1, 1])

@@ -55,4 +55,6 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     standing, changing = (m.content for m in render(prompt))
     assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle) to 1 (Run)" in standing
     assert "x: 0 (Idle), then 1 (Run) from 5 s" in changing
-    assert "x stays: 0 (Idle): never entered again; 1 (Run): entered at 5 s and kept to the end" in changing
+    assert (
+        "x stays: 0 (Idle): never entered again; 1 (Run): entered at 5 s and still held at 10 s" in changing
+    )
