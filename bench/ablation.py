@@ -81,9 +81,9 @@ _MUTATIONS = mutations
 
 PARTS = {
     "the whole engine": Part(),
-    "no trust region": Part({"trusted_share": 1.0}, [(surrogate, "choose_arm", _only("dynamics"))]),
+    "no direct search": Part({"trusted_share": 1.0}, [(surrogate, "choose_arm", _only("dynamics"))]),
     "no dynamics": Part(
-        {"trial_share": 0.0, "trusted_error": 0.0}, [(surrogate, "choose_arm", _only("region"))]
+        {"trial_share": 0.0, "trusted_error": 0.0}, [(surrogate, "choose_arm", _only("direct"))]
     ),
     "no linear dynamics": Part(patches=[(forecast, "_KINDS", {"nonlinear": FourierDynamics})]),
     "no nonlinear dynamics": Part(patches=[(forecast, "_KINDS", {"linear": DeviationDynamics})]),

@@ -59,6 +59,18 @@ class Layout:
         """Whether each group consists of many held cells."""
         return (*(c.fine for c in self.codings), *(False for _ in self.space.parameters))
 
+    @cached_property
+    def starts(self) -> NDArray[np.float64]:
+        """Time in s from which on each coordinate has an effect, shape (d,); parameters: 0."""
+        parts = []
+        for coding in self.codings:
+            times = np.asarray(coding.times)
+            # Of a pchip curve, a control point also sets the slope at the one before it.
+            back = {"constant": 0, "linear": 1, "pchip": 2}[coding.interpolation]
+            parts.append(times[np.maximum(np.arange(len(times)) - back, 0)])
+        parts.append(np.zeros(len(self.space.parameters)))
+        return np.concatenate(parts)
+
     def inputs(self, points: Array, grid: Grid) -> Array:
         """Return scaled inputs and parameters in the horizon's cells for m points, (m, cells, groups)."""
         values = np.empty((len(points), grid.cells, len(self.groups)))
@@ -127,34 +139,9 @@ def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
     return Layout(
         space,
         tuple(
-            _fixed(space, r)
-            if r.free is None
-            else _held(grid.step * grid.cells, grid.cells, r.free, fine=True)
+            _fixed(space, r) if r.free is None else _held(grid.step * grid.cells, grid.cells, r.free)
             for r in space.inputs
         ),
-    )
-
-
-def region_layouts(space: SearchSpace, grid: Grid, pieces: Sequence[int]) -> tuple[Layout, ...]:
-    """Return layouts with few coordinates for the search without dynamics, to be used in turn.
-
-    Args:
-        space: the search space.
-        grid: the grid over whose horizon the pieces of free inputs are distributed.
-        pieces: number of held pieces of the free inputs in each layout.
-    """
-    if all(r.free is None for r in space.inputs):
-        return (Layout(space, tuple(_fixed(space, r) for r in space.inputs)),)
-    horizon = grid.step * grid.cells
-    return tuple(
-        Layout(
-            space,
-            tuple(
-                _fixed(space, r) if r.free is None else _held(horizon, count, r.free, fine=False)
-                for r in space.inputs
-            ),
-        )
-        for count in pieces
     )
 
 
@@ -162,9 +149,9 @@ def _fixed(space: SearchSpace, r: InputRange) -> Coding:
     return Coding(space.fixed_times(r), r.interpolation, fine=False)
 
 
-def _held(horizon: float, count: int, free: Freedom, *, fine: bool) -> Coding:
+def _held(horizon: float, count: int, free: Freedom) -> Coding:
     count = max(1, min(count, free.max_control_points, int(horizon / free.min_interval + 1e-6)))
-    return Coding(even_times(count, stop_time=horizon, interpolation="constant"), "constant", fine)
+    return Coding(even_times(count, stop_time=horizon, interpolation="constant"), "constant", fine=True)
 
 
 def _read(coding: Coding, values: Array, at: Array) -> Array:

@@ -13,7 +13,7 @@ from falsifier.testing import FREE, START, EngineContract, lag_problem
 
 # Neither the contract nor who proposes when depends on how thorough a plan is.
 HASTY = Settings(
-    cells=20, features=16, pool=40, children=20, generations=2, vertex_steps=1, region_start=3, trial=2
+    cells=20, features=16, pool=40, children=20, generations=2, vertex_steps=1, direct_start=3, trial=2
 )
 TARGET = np.array([0.6, -0.2, 0.15, -0.75, 0.35])
 

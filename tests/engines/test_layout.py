@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from falsifier.core.signals import Interpolation
 from falsifier.engines.grid import Grid
-from falsifier.engines.layout import planning_layout, region_layouts
+from falsifier.engines.layout import Coding, Layout, planning_layout
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
 from falsifier.testing import FREE, START, lag_problem
 
@@ -12,17 +13,33 @@ def test_layouts_keep_to_the_allowed_parameterization() -> None:
     grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
     rng = np.random.default_rng(0)
     for problem in (free, fixed):
-        for layout in (planning_layout(problem.space, grid), *region_layouts(problem.space, grid, (5, 8))):
-            points = [*random_points(layout, rng, 5), switching(layout, rng, 0.7), stepping(layout, rng, 12)]
-            points += list(mutations(layout, rng, np.array(points), 20, critical=np.full(7, 0.5)))
-            for point in points:
-                candidate = layout.candidate(point, origin="t", rationale="t")
-                assert problem.space.admit(candidate).key == candidate.key
-                assert layout.point(candidate) == pytest.approx(point, abs=1e-9)
+        layout = planning_layout(problem.space, grid)
+        points = [*random_points(layout, rng, 5), switching(layout, rng, 0.7), stepping(layout, rng, 12)]
+        points += list(mutations(layout, rng, np.array(points), 20, critical=np.full(7, 0.5)))
+        for point in points:
+            candidate = layout.candidate(point, origin="t", rationale="t")
+            assert problem.space.admit(candidate).key == candidate.key
+            assert layout.point(candidate) == pytest.approx(point, abs=1e-9)
     assert len(planning_layout(free.space, grid).codings[0].times) == 100
     assert len(planning_layout(fixed.space, grid).codings[0].times) == 4
-    assert [len(r.codings[0].times) for r in region_layouts(free.space, grid, (5, 8))] == [5, 8]
-    assert len(region_layouts(fixed.space, grid, (5, 8))) == 1
+
+
+@pytest.mark.parametrize(("interpolation", "back"), [("constant", 0), ("linear", 1), ("pchip", 2)])
+def test_no_coordinate_has_an_effect_before_it_starts(interpolation: Interpolation, back: int) -> None:
+    times = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0)
+    space = lag_problem(free=None, inputs=1, parameters=[START]).space
+    layout = Layout(space, (Coding(times, interpolation, fine=False),))
+    assert layout.starts.tolist() == [times[max(i - back, 0)] for i in range(6)] + [0.0]
+    grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
+    point = np.random.default_rng(0).random(7)
+    before = layout.inputs(point[None], grid)[0, :, 0]
+    for i, start in enumerate(layout.starts[:5]):
+        other = point.copy()
+        other[i] = 1.0 - other[i]
+        after = layout.inputs(other[None], grid)[0, :, 0]
+        assert after[grid.middles < start] == pytest.approx(before[grid.middles < start])
+        if interpolation != "pchip":  # whose slopes keep to zero at extremes
+            assert grid.middles[np.abs(after - before) > 1e-9][0] < start + 2.0
 
 
 def test_a_point_near_a_constant_extreme_is_known_as_one() -> None:

@@ -50,14 +50,11 @@ class Settings:
         trusted_error: recent prediction error, in scaled units, below which the dynamics are trusted.
         trusted_share: probability of the dynamics if they are trusted and no other arm is rated higher.
         least_share: approximate minimum probability of each arm.
-        region_pieces: number of held pieces of a free input in successive trust regions: most are coarse, as
-            those finish soon; violations that need more switches have their turn too.
-        region_start: number of points before the trust region fits its first process.
-        region_points: maximum number of points of its process, whose cost is cubic.
-        region_candidates: number of points among which it chooses.
-        region_bound_start: probability that a coordinate of one of the first points is at a bound.
-        region_bound: probability that a changed coordinate is moved to its nearer bound.
-        region_jump: probability that a changed coordinate is redrawn from its whole range.
+        direct_patience: number of simulations without improvement after which the direct search starts again
+            from other points.
+        direct_start: number of simulations of a round before their changes are tried.
+        direct_fresh: share of random points in the direct search.
+        direct_parents: number of best points of a round that are changed.
         flat: share of simulations with the same cost from which on coverage leads the search.
         flat_start: minimum number of simulations for that.
         coverage_share: probability of coverage where it leads.
@@ -104,13 +101,10 @@ class Settings:
     trusted_error: float = 0.5
     trusted_share: float = 0.8
     least_share: float = 0.1
-    region_pieces: tuple[int, ...] = (5, 5, 5, 8)
-    region_start: int = 16
-    region_points: int = 150
-    region_candidates: int = 1500
-    region_bound_start: float = 0.7
-    region_bound: float = 0.2
-    region_jump: float = 0.06
+    direct_patience: int = 30
+    direct_start: int = 8
+    direct_fresh: float = 0.1
+    direct_parents: int = 20
     flat: float = 0.6
     flat_start: int = 4
     coverage_share: float = 0.8

@@ -13,17 +13,17 @@ from falsifier.engines.box import Array
 from falsifier.engines.corner_walk import CornerWalk, Levels
 from falsifier.engines.coverage import Explorer
 from falsifier.engines.grid import Grid
-from falsifier.engines.layout import Layout, planning_layout, region_layouts
+from falsifier.engines.layout import Layout, planning_layout
 from falsifier.engines.surrogate.aims import Aims
 from falsifier.engines.surrogate.arms import choose_arm, flatness, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
+from falsifier.engines.surrogate.direct import Seen, propose
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.forecast import Ensemble, Forecast
 from falsifier.engines.surrogate.history import History, Sample, scaled_costs
 from falsifier.engines.surrogate.opening import opening
 from falsifier.engines.surrogate.planning import plan
 from falsifier.engines.surrogate.settings import Settings
-from falsifier.engines.surrogate.trust_region import TrustRegion
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -40,7 +40,6 @@ class Pending:
         point: the point in [0, 1]^d.
         why: rationale of the candidate.
         levels: its levels, for a constant extreme.
-        region: the trust region that proposed it, if any.
         forecast: predictions of the dynamics, if they proposed it.
     """
 
@@ -49,15 +48,14 @@ class Pending:
     point: Array
     why: str
     levels: Levels | None = None
-    region: TrustRegion | None = None
     forecast: Forecast | None = None
 
 
 class Surrogate:
     """Learns the dynamics from whole trajectories and proposes inputs with a low predicted robustness.
 
-    In addition it searches directly, in a trust region; the arm that does better gets more turns. Where most
-    simulations have the same robustness, what they covered leads the search.
+    In addition it searches directly, by changes of the best inputs; the arm that does better gets more turns.
+    Where most simulations have the same robustness, what they covered leads the search.
     """
 
     name = "surrogate"
@@ -85,9 +83,6 @@ class Surrogate:
             needs_several=coarse_formula(formula, self.grid.step).root.needs_several,
         )
         self._walk = CornerWalk(len(self.layout.groups))
-        self._region_layouts = region_layouts(space, self.grid, self.settings.region_pieces)
-        self._regions = 0
-        self._region: TrustRegion | None = None
         self._asked = self._planned = self._simple = 0
         self._pending: dict[object, Pending] = {}
         self._suggested: list[Array] = []
@@ -153,12 +148,6 @@ class Surrogate:
         """Learn from the evaluation of one of the engine's own candidates."""
         if pending.levels is not None:
             self._walk.learn(pending.levels, None if sample is None else sample.robustness)
-        if pending.region is not None:
-            if sample is None:
-                cost = max((s.robustness for s in self.history.samples), default=1.0)
-            else:
-                cost = self.history.direct_cost(sample)
-            pending.region.tell(pending.point, cost)
         if pending.forecast is not None and sample is not None:
             objective = self.history.scaled_objective()
             self.dynamics.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
@@ -183,8 +172,8 @@ class Surrogate:
         return candidate
 
     def _risk(self, pending: Pending) -> float:
-        """Return the excess risk that its simulation fails; plans and trust regions have considered it."""
-        if pending.region is not None or pending.forecast is not None:
+        """Return the excess risk that its simulation fails; plans and the direct search considered it."""
+        if pending.arm == "direct" or pending.forecast is not None:
             return 0.0
         return float(self.feasibility.excess(pending.layout, pending.point[None])[0])
 
@@ -228,12 +217,10 @@ class Surrogate:
             return "dynamics"
         arms = [s.arm for s in self.history.samples]
         may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
-        names = ("dynamics", "region", "switching") if may_switch else ("dynamics", "region")
+        names = ("dynamics", "direct", "switching") if may_switch else ("dynamics", "direct")
         qualities = {name: quality(name, arms, costs, window=settings.bandit_window) for name in names}
         if self.dynamics.is_trusted and qualities["dynamics"] == max(qualities.values()):
-            return "dynamics" if rng.random() < settings.trusted_share else "region"
-        if self._region is None or self._region.is_starting:
-            qualities["region"] = max(0.5, qualities["region"])
+            return "dynamics" if rng.random() < settings.trusted_share else "direct"
         return choose_arm(qualities, rng, least=settings.least_share)
 
     def _switch(self, rng: np.random.Generator) -> Pending:
@@ -286,14 +273,14 @@ class Surrogate:
         return order
 
     def _search(self, rng: np.random.Generator) -> Pending:
-        if self._region is None or self._region.is_exhausted:
-            layout = self._region_layouts[self._regions % len(self._region_layouts)]
-            self._regions += 1
-            self._region = TrustRegion(layout.dimension, self.settings)
-        layout = self._region_layouts[(self._regions - 1) % len(self._region_layouts)]
-        point = self._region.ask(rng, partial(self.feasibility.excess, layout))
-        why = f"direct search in a trust region of {layout.dimension} coordinates"
-        return Pending("region", layout, point, why, region=self._region)
+        samples, horizon = self.history.samples, self.grid.step * self.grid.cells
+        # What a predicate does in the rest of an inner window counts, too.
+        rest = min(self._windows, default=0.0)
+        decided = np.array([s.critical * horizon + rest for s in samples])
+        seen = Seen(self.history.points, np.array(self.history.direct_costs()), decided)
+        risk = partial(self.feasibility.excess, self.layout) if self.feasibility.has_failures else None
+        point = propose(seen, self.layout, self.settings, rng, risk)
+        return Pending("direct", self.layout, point, "a change of one of the best inputs")
 
 
 def _pace(layout: Layout, dwell: float) -> str:

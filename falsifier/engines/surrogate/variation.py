@@ -48,6 +48,15 @@ def mutations(
     return children
 
 
+def changed(layout: Layout, rng: np.random.Generator, points: Array) -> Array:
+    """Return a copy of the points, shape (m, d), each with one to three random changes."""
+    from falsifier.engines.surrogate.breeding import change
+
+    result = points.copy()
+    change(result, np.full(len(points), np.nan), *_groups(layout), rng)
+    return result
+
+
 def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
     """Return one point: every ``dwell`` s, with a random phase, each input is set to a random bound."""
     point = np.empty(layout.dimension)
