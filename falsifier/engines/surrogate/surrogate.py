@@ -36,15 +36,13 @@ class Pending:
 
     Attributes:
         arm: the engine's arm that proposed it.
-        layout: layout of the point.
-        point: the point in [0, 1]^d.
+        point: its point in the layout, in [0, 1]^d.
         why: rationale of the candidate.
         levels: its levels, for a constant extreme.
         forecast: predictions of the dynamics, if they proposed it.
     """
 
     arm: str
-    layout: Layout
     point: Array
     why: str
     levels: Levels | None = None
@@ -167,7 +165,7 @@ class Surrogate:
                 break
             pending = min(pending, self._propose(rng), key=self._risk)
         self._asked += 1
-        candidate = pending.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
+        candidate = self.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
         self._pending[candidate.key] = pending
         return candidate
 
@@ -175,7 +173,7 @@ class Surrogate:
         """Return the excess risk that its simulation fails; plans and the direct search considered it."""
         if pending.arm == "direct" or pending.forecast is not None:
             return 0.0
-        return float(self.feasibility.excess(pending.layout, pending.point[None])[0])
+        return float(self.feasibility.excess(self.layout, pending.point[None])[0])
 
     def _propose(self, rng: np.random.Generator) -> Pending:
         kind = self._opening[self._asked] if self._asked < len(self._opening) else ""
@@ -184,22 +182,22 @@ class Surrogate:
             kind = "constant"
         if kind == "constant" and (levels := self._walk.next(rng)) is not None:
             point = self.layout.constant(levels)
-            return Pending("constant", self.layout, point, "constant extremes", levels)
+            return Pending("constant", point, "constant extremes", levels)
         if kind == "switching":
             return self._switch(rng)
         if kind == "stepping":
             point = stepping(self.layout, rng, self.settings.probe_pieces)
-            return Pending("stepping", self.layout, point, "steps through many levels of each input")
+            return Pending("stepping", point, "steps through many levels of each input")
         if len(self.history.samples) < 2:
             point = random_points(self.layout, rng, 1)[0]
-            return Pending("random", self.layout, point, "random: too few simulations to learn from yet")
+            return Pending("random", point, "random: too few simulations to learn from yet")
         arm = self._choose_arm(rng)
         if arm == "coverage":
             idea = self._explorer.propose(rng)
-            return Pending("coverage", self.layout, idea.point, idea.why)
+            return Pending("coverage", idea.point, idea.why)
         if arm == "levels":
             idea = self._explorer.propose(rng, aimed=True)
-            return Pending("levels", self.layout, idea.point, f"levels of the context files: {idea.why}")
+            return Pending("levels", idea.point, f"levels of the context files: {idea.why}")
         if arm == "dynamics":
             return self._plan(rng)
         return self._switch(rng) if arm == "switching" else self._search(rng)
@@ -226,7 +224,7 @@ class Surrogate:
     def _switch(self, rng: np.random.Generator) -> Pending:
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
         why = f"inputs take a random bound{_pace(self.layout, dwell)}"
-        return Pending("switching", self.layout, switching(self.layout, rng, dwell), why)
+        return Pending("switching", switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
         settings, samples = self.settings, self.history.samples
@@ -235,7 +233,7 @@ class Surrogate:
         points, elites = self.history.points, order[: settings.elites]
         suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
         self._suggested = []
-        asked = [p.point for p in self._pending.values() if p.layout is self.layout] + self._failed
+        asked = [p.point for p in self._pending.values()] + self._failed
         # The exact extreme may violate if what stands for it is the best sample so far.
         asked += [extreme for extreme, robustness in self._stood_for if robustness > self._lowest]
         result = plan(
@@ -255,7 +253,7 @@ class Surrogate:
             f"{', preferred for its simple shape' if result.is_simple else ''}"
         )
         forecast = self.dynamics.forecast(self.layout, objective, result.point)
-        return Pending("dynamics", self.layout, result.point, why, forecast=forecast)
+        return Pending("dynamics", result.point, why, forecast=forecast)
 
     def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:
         """Return predicted costs that also count the risk of a failure, if there has been one."""
@@ -280,7 +278,7 @@ class Surrogate:
         seen = Seen(self.history.points, np.array(self.history.direct_costs()), decided)
         risk = partial(self.feasibility.excess, self.layout) if self.feasibility.has_failures else None
         point = propose(seen, self.layout, self.settings, rng, risk)
-        return Pending("direct", self.layout, point, "a change of one of the best inputs")
+        return Pending("direct", point, "a change of one of the best inputs")
 
 
 def _pace(layout: Layout, dwell: float) -> str:
