@@ -10,6 +10,7 @@ from falsifier.core import operating_system
 CORE = Path(operating_system.__file__).parent
 # Used by the forked way alone, or for Wine.
 UNIX_ONLY = {
+    "close_others",
     "end_marked",
     "fork",
     "reap",

@@ -33,7 +33,7 @@ def test_a_buffer_is_written_over_by_the_next_trajectory() -> None:
     ("times", "x", "named"),
     [
         (TIMES[:5], np.zeros(5), ["5", "11"]),
-        (TIMES**2, np.zeros(11), ["sample 1", "0.01 s", "0.1 s"]),
+        (TIMES**2, np.zeros(11), ["recorded time 1", "0.01 s", "0.1 s"]),
         (TIMES, np.where(TIMES > 0.55, np.nan, 0.0), ["'x'", "nan", "0.6 s"]),
     ],
 )
