@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Freedom, InputRange, SearchSpace
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, nearest_value
 from falsifier.engines.box import Array
 from falsifier.engines.grid import Grid
 
@@ -71,6 +71,33 @@ class Layout:
         parts.append(np.zeros(len(self.space.parameters)))
         return np.concatenate(parts)
 
+    @cached_property
+    def has_gaps(self) -> bool:
+        """Whether some points stand for the same candidate, because not every level of a range is a value."""
+        return any(r.kind != "real" or r.low == r.high for r in self._ranges)
+
+    def settled(self, points: Array) -> Array:
+        """Return the points, shape (..., d), that the candidates of these points have.
+
+        Integers, Booleans and enumerations are at the nearest number, what cannot vary is at 0.
+        """
+        if not self.has_gaps:
+            return points
+        result = np.array(points, dtype=np.float64)
+        for r, group in zip(self._ranges, self.groups, strict=True):
+            if r.low == r.high:
+                result[..., group] = 0.0
+            elif r.kind != "real":
+                levels, which = np.unique(np.clip(result[..., group], 0.0, 1.0), return_inverse=True)
+                values = [nearest_value(r, r.low + (r.high - r.low) * float(v)) for v in levels]
+                scaled = (np.array(values) - r.low) / (r.high - r.low)
+                result[..., group] = scaled[which].reshape(result[..., group].shape)
+        return result
+
+    @property
+    def _ranges(self) -> tuple[InputRange | ParameterRange, ...]:
+        return (*self.space.inputs, *self.space.parameters)
+
     def inputs(self, points: Array, grid: Grid) -> Array:
         """Return scaled inputs and parameters in the horizon's cells for m points, (m, cells, groups)."""
         values = np.empty((len(points), grid.cells, len(self.groups)))
@@ -121,7 +148,7 @@ class Layout:
         point = np.empty(self.dimension)
         for group, level in zip(self.groups, levels, strict=True):
             point[group] = level
-        return point
+        return self.settled(point)
 
     def nearest_extreme(self, point: Array, *, within: float) -> tuple[int, ...] | None:
         """Return the levels of the constant extreme that a point is near to, in each coordinate; or None."""

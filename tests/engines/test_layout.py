@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.signals import Interpolation
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Coding, Layout, planning_layout
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
@@ -22,6 +23,31 @@ def test_layouts_keep_to_the_allowed_parameterization() -> None:
             assert layout.point(candidate) == pytest.approx(point, abs=1e-9)
     assert len(planning_layout(free.space, grid).codings[0].times) == 100
     assert len(planning_layout(fixed.space, grid).codings[0].times) == 4
+
+
+def test_points_are_settled_where_their_candidates_are() -> None:
+    items = (("off", 1), ("low", 2), ("high", 7))
+    switch = InputRange("b", 0.0, 1.0, kind="boolean", free=FREE)
+    still = InputRange("still", 0.5, 0.5, free=FREE)
+    real = InputRange("u", -1.0, 1.0, free=FREE)
+    gear = ParameterRange("gear", 0.5, 3.7, kind="integer")
+    mode = ParameterRange("mode", 1.0, 7.0, kind="enumeration", items=items)
+    space = SearchSpace((switch, still, real), (gear, mode), 10.0)
+    grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
+    layout = planning_layout(space, grid)
+    points = np.random.default_rng(0).random((20, layout.dimension))
+    settled = layout.settled(points)
+    for point, simulated in zip(points, settled, strict=True):
+        candidate = layout.candidate(point, origin="t", rationale="t")
+        assert layout.point(candidate) == pytest.approx(simulated, abs=1e-9)
+        assert layout.settled(point) == pytest.approx(simulated, abs=1e-9)
+    assert layout.settled(settled) == pytest.approx(settled, abs=1e-9)
+    assert layout.has_gaps
+
+    all_real = planning_layout(SearchSpace((real,), (), 10.0), grid)
+    assert not all_real.has_gaps
+    drawn = random_points(all_real, np.random.default_rng(0), 3)
+    assert all_real.settled(drawn) is drawn
 
 
 @pytest.mark.parametrize(("interpolation", "back"), [("constant", 0), ("linear", 1), ("pchip", 2)])

@@ -62,10 +62,11 @@ def plan(
             mutations(layout, rng, elites, bred, critical=critical),
         ]
     )
-    pool, costs = _best(children, predict(children), settings.parents)
+    pool, costs = _best(layout, children, predict(children), settings.parents)
     for _ in range(settings.generations - 1):
         children = mutations(layout, rng, pool, settings.children)
         pool, costs = _best(
+            layout,
             np.concatenate([pool, children]),
             np.concatenate([costs, predict(children)]),
             settings.parents,
@@ -73,13 +74,14 @@ def plan(
     blocks = _blocks(layout, settings.directions)
     for step in range(settings.vertex_steps):
         base = pool[0] if step % 2 == 0 else pool[rng.integers(min(5, len(pool)))]
-        towards = _towards_bounds(predict, base, blocks)
+        towards = layout.settled(_towards_bounds(predict, base, blocks))
         pool, costs = _best(
+            layout,
             np.concatenate([pool, towards]),
             np.concatenate([costs, predict(towards)]),
             settings.parents,
         )
-    simple = np.array([p for p in _simple_points(layout, pool) if not _is_seen(p, seen)])
+    simple = np.array([p for p in _simple_points(layout, pool) if not is_seen(p, seen)])
     if len(simple):
         simple_costs = predict(simple)
         best = int(np.argmin(simple_costs))
@@ -88,11 +90,16 @@ def plan(
     # The additional points are used only if the whole pool has been simulated before.
     others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
     points = np.concatenate([pool, *others])
-    unseen = next((i for i, point in enumerate(points) if not _is_seen(point, seen)), 0)
+    unseen = next((i for i, point in enumerate(points) if not is_seen(point, seen)), 0)
     return Plan(points[unseen], float(costs[min(unseen, len(costs) - 1)]), is_simple=False)
 
 
-def _best(points: Array, costs: Array, count: int) -> tuple[Array, Array]:
+def _best(layout: Layout, points: Array, costs: Array, count: int) -> tuple[Array, Array]:
+    """Return the points with the lowest costs; where different draws are often equal, each point once."""
+    if layout.has_gaps:
+        _, firsts = np.unique(points, axis=0, return_index=True)
+        firsts.sort()
+        points, costs = points[firsts], costs[firsts]
     order = np.argsort(costs, kind="stable")[:count]
     return points[order], costs[order]
 
@@ -136,10 +143,11 @@ def _simple_points(layout: Layout, pool: Array) -> Iterator[Array]:
                 for group, level in zip(layout.groups, levels, strict=True):
                     if level is not None:
                         point[group] = level
+                point = layout.settled(point)
                 if _is_at_bounds(layout, point):
                     yield point
     for base in pool[:5]:
-        point = np.round(base)
+        point = layout.settled(np.round(base))
         if _is_at_bounds(layout, point):
             yield point
 
@@ -151,5 +159,6 @@ def _is_at_bounds(layout: Layout, point: Array) -> bool:
     return bool(extreme - changing > 0.99)
 
 
-def _is_seen(point: Array, seen: Array) -> bool:
+def is_seen(point: Array, seen: Array) -> bool:
+    """Whether a point, shape (d,), is the same simulation as one of others, shape (s, d)."""
     return bool(len(seen)) and bool((np.abs(seen - point).max(axis=1) < _SAME_POINT).any())

@@ -22,7 +22,7 @@ from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.forecast import Ensemble, Forecast
 from falsifier.engines.surrogate.history import History, Sample, scaled_costs
 from falsifier.engines.surrogate.opening import opening
-from falsifier.engines.surrogate.planning import plan
+from falsifier.engines.surrogate.planning import is_seen, plan
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
@@ -161,13 +161,27 @@ class Surrogate:
         rng = np.random.default_rng([self.seed, self._asked])
         pending = self._propose(rng)
         for _ in range(self.settings.retries):
-            if self._risk(pending) == 0.0:
+            if self._objection(pending) == 0.0:
                 break
-            pending = min(pending, self._propose(rng), key=self._risk)
+            pending = min(pending, self._propose(rng), key=self._objection)
         self._asked += 1
         candidate = self.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
         self._pending[candidate.key] = pending
         return candidate
+
+    def _objection(self, pending: Pending) -> float:
+        """Return the excess risk that its simulation fails, plus 1 if that would repeat another one.
+
+        Where all levels of all ranges are values, repetitions are so rare that nobody looks for them.
+        """
+        repeats = self.layout.has_gaps and is_seen(pending.point, self._tried)
+        return self._risk(pending) + repeats
+
+    @property
+    def _tried(self) -> Array:
+        """Points that were simulated or are about to be, shape (m, d)."""
+        asked = [p.point for p in self._pending.values()] + self._failed
+        return np.concatenate([self.history.points, np.array(asked).reshape(-1, self.layout.dimension)])
 
     def _risk(self, pending: Pending) -> float:
         """Return the excess risk that its simulation fails; plans and the direct search considered it."""
@@ -233,15 +247,14 @@ class Surrogate:
         points, elites = self.history.points, order[: settings.elites]
         suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
         self._suggested = []
-        asked = [p.point for p in self._pending.values()] + self._failed
         # The exact extreme may violate if what stands for it is the best sample so far.
-        asked += [extreme for extreme, robustness in self._stood_for if robustness > self._lowest]
+        replaced = [extreme for extreme, robustness in self._stood_for if robustness > self._lowest]
         result = plan(
             self._with_risk(self.dynamics.predictor(self.layout, objective)),
             self.layout,
             elites=np.concatenate([suggested, points[elites]]),
             critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
-            seen=np.concatenate([points, np.array(asked).reshape(-1, self.layout.dimension)]),
+            seen=np.concatenate([self._tried, np.array(replaced).reshape(-1, self.layout.dimension)]),
             settings=settings,
             snap=settings.snap * settings.snap_decay**self._simple,
             rng=rng,

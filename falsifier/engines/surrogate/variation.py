@@ -16,7 +16,7 @@ def random_points(layout: Layout, rng: np.random.Generator, count: int) -> Array
 
     points = np.empty((count, layout.dimension))
     draw(points, *_groups(layout), rng)
-    return points
+    return layout.settled(points)
 
 
 def mutations(
@@ -45,7 +45,7 @@ def mutations(
     cross(children, parents, ends, len(layout.codings), _CROSSED, rng)
     until = np.full(count, np.nan) if critical is None else critical[chosen]
     change(children, until, ends, is_fine, rng)
-    return children
+    return layout.settled(children)
 
 
 def changed(layout: Layout, rng: np.random.Generator, points: Array) -> Array:
@@ -54,7 +54,7 @@ def changed(layout: Layout, rng: np.random.Generator, points: Array) -> Array:
 
     result = points.copy()
     change(result, np.full(len(points), np.nan), *_groups(layout), rng)
-    return result
+    return layout.settled(result)
 
 
 def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
@@ -66,7 +66,7 @@ def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
             continue
         piece = (np.asarray(layout.codings[j].times) / dwell + rng.random()).astype(int)
         point[group] = rng.integers(0, 2, int(piece[-1]) + 1)[piece]
-    return point
+    return layout.settled(point)
 
 
 def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
@@ -76,7 +76,7 @@ def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
         count = min(pieces, len(group))
         levels = (rng.permutation(count) + rng.random(count)) / count
         point[group] = levels[np.arange(len(group)) * count // len(group)]
-    return point
+    return layout.settled(point)
 
 
 def _groups(layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:

@@ -1,5 +1,8 @@
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from falsifier.context.values import Context, Level
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, InputRange, SearchSpace
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings, Surrogate
@@ -143,6 +146,30 @@ def test_parallel_candidates_differ() -> None:
     engine = Surrogate(problem, seed=0, settings=Settings(pool=60, children=30, generations=2))
     engine.tell([evaluate(problem, c) for c in engine.ask(3)])
     assert len({c.key for c in engine.ask(6)}) == 6
+
+
+SWITCH = {"low": 0.0, "high": 1.0, "kind": "boolean"}
+STEPS = [replace(p, low=0.0, high=9.0, kind="integer") for p in (START, BIAS)]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "parameters"),
+    [
+        ([{}, {"low": 0.5, "high": 0.5}], []),
+        ([SWITCH | {"free": None}, SWITCH | {"free": None}], []),
+        ([{}, SWITCH], []),
+        ([], STEPS),
+    ],
+    ids=["one cannot vary", "switches at control points", "one switch", "whole parameters"],
+)
+def test_nothing_is_simulated_twice_where_many_points_are_the_same_candidate(
+    inputs: Sequence[dict[str, Any]], parameters: Sequence[ParameterRange]
+) -> None:
+    problem = lag_problem("G[0,10] (x <= 99)", free=FREE, inputs=len(inputs), parameters=parameters)
+    ranges = tuple(replace(r, **new) for r, new in zip(problem.space.inputs, inputs, strict=True))
+    problem = replace(problem, space=replace(problem.space, inputs=ranges))
+    asked = drive(Surrogate(problem, seed=1), partial(evaluate, problem), rounds=60)
+    assert len({c.key for c in asked}) == 60
 
 
 @pytest.mark.parametrize(
