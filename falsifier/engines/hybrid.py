@@ -26,6 +26,7 @@ from falsifier.engines.box import Array
 from falsifier.engines.protocol import FollowsRun
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
+from falsifier.engines.surrogate.planning import is_seen
 from falsifier.engines.turns import TRIAL, Half, Ledger, Who, due, helps, next_turn
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
@@ -206,6 +207,8 @@ class Hybrid:
         if answer is not None and answer.queue and self._is_due(answer):
             candidate = answer.queue.pop(0)
             answer.asked.add(candidate.key)
+            if self._numeric is not None and self._is_same(candidate, self._numeric):
+                self._numeric = None  # the LLM was told of it, and agrees
             return candidate
         candidate, self._numeric = self._numeric or self.surrogate.ask(1)[0], None
         self._own.add(candidate.key)
@@ -297,6 +300,11 @@ class Hybrid:
         distances = np.abs(np.array(self._points) - point).max(axis=1, initial=0.0)
         nearest = int(np.argmin(distances))
         return nearest + 1 if distances[nearest] <= self.settings.same else None
+
+    def _is_same(self, one: Candidate, other: Candidate) -> bool:
+        """Whether two candidates differ by no more than the digits in which the LLM was told one of them."""
+        layout = self.surrogate.layout
+        return one.key == other.key or is_seen(layout.point(one), layout.point(other)[None])
 
     def _repeat_told(self, candidate: Candidate, sample: int) -> str:
         return (

@@ -180,6 +180,30 @@ def test_of_one_answer_what_is_new_comes_before_what_repeats_a_sample() -> None:
     assert asked[2].signals["u"].values == pytest.approx((1.5,), abs=0.01)
 
 
+@pytest.mark.parametrize("rounding", [0.0, 1e-6])
+def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> None:
+    problem = wide_problem()
+    engine, _ = hybrid(problem, [[0.1]])
+
+    class Agrees(Script):
+        def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> Advice:
+            told = engine._numeric
+            if told is None:
+                return super().propose(count, notes)
+            signals = {
+                name: replace(s, values=tuple(v * (1 - rounding) for v in s.values))
+                for name, s in told.signals.items()
+            }
+            return Advice([replace(told, signals=signals, origin=self.name)])
+
+    engine.adviser = Agrees([[0.1]], problem)
+    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=8)
+    assert course(asked)[:3] == "LSL"
+    points = np.array([engine.surrogate.layout.point(c) for c in asked])
+    distances = np.abs(points[:, None] - points).max(axis=2)[np.triu_indices(len(asked), 1)]
+    assert distances.min() > 1e-3
+
+
 def test_the_model_is_told_of_a_stall_and_is_asked_ever_more_rarely() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[0.1, 0.2], [0.3, 0.4, 0.5]])
