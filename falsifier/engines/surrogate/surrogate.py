@@ -172,10 +172,11 @@ class Surrogate:
     def _objection(self, pending: Pending) -> float:
         """Return the excess risk that its simulation fails, plus 1 if that would repeat another one.
 
-        Where all levels of all ranges are values, repetitions are so rare that nobody looks for them.
+        Plans repeat nothing unless all has been tried. Where all levels of all ranges are values, the
+        other arms repeat something so rarely that nobody looks for it.
         """
-        repeats = self.layout.has_gaps and is_seen(pending.point, self._tried)
-        return self._risk(pending) + repeats
+        may_repeat = self.layout.has_gaps and pending.forecast is None
+        return self._risk(pending) + (may_repeat and is_seen(pending.point, self._tried))
 
     @property
     def _tried(self) -> Array:
