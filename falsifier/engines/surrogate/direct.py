@@ -8,12 +8,12 @@ import numpy as np
 from falsifier.engines.box import Array
 from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate.settings import Settings
-from falsifier.engines.surrogate.variation import changed, random_points
+from falsifier.engines.surrogate.variation import changed, held_from, paced
 
 # Changes that are drawn for one proposal; the first that matters is taken.
 _TRIES = 100
 # Mean rank, from 0, of the point that is changed.
-_MEAN_RANK = 1.0
+_MEAN_RANK = 0.5
 _TOLERANCE = 1e-9
 
 
@@ -32,14 +32,27 @@ class Seen:
     decided: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Draw:
+    """A proposal.
+
+    Attributes:
+        point: shape (d,).
+        why: what it is.
+    """
+
+    point: Array
+    why: str
+
+
 def propose(
     seen: Seen,
     layout: Layout,
     settings: Settings,
     rng: np.random.Generator,
     risk: Callable[[Array], Array] | None = None,
-) -> Array:
-    """Return a change of one of the best points of the current round, or a random point, shape (d,).
+) -> Draw:
+    """Return a change of one of the best points of the current round, or a random point.
 
     What comes after the time that decided a cost cannot lower it, so such changes are not proposed.
 
@@ -51,16 +64,29 @@ def propose(
         risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,); None: none fails.
     """
     start = round_start(seen.costs, settings.direct_patience)
-    if len(seen.costs) - start < settings.direct_start or rng.random() < settings.direct_fresh:
-        return _least_risky(random_points(layout, rng, max(settings.retries, 1)), risk)
+    if len(seen.costs) - start >= settings.direct_start and rng.random() >= settings.direct_fresh:
+        children = _changes(seen, start, layout, settings, rng)
+        if len(children):
+            return Draw(_least_risky(children, risk), "a change of one of the best candidates")
+    fresh = [
+        paced(layout, rng, settings.direct_pieces, settings.direct_at_bounds)
+        for _ in range(max(settings.retries, 1) if risk else 1)
+    ]
+    return Draw(_least_risky(np.array(fresh), risk), "random pieces, after which the inputs stay constant")
+
+
+def _changes(seen: Seen, start: int, layout: Layout, settings: Settings, rng: np.random.Generator) -> Array:
+    """Return changes of good points of a round that can matter, shape (m, d); m may be 0."""
     order = start + np.argsort(seen.costs[start:], kind="stable")[: settings.direct_parents]
     rank = rng.exponential(_MEAN_RANK, _TRIES).astype(np.intp)
     chosen = order[np.minimum(rank, len(order) - 1)]
-    parents = seen.points[chosen]
+    parents, decided = seen.points[chosen], seen.decided[chosen]
     children = changed(layout, rng, parents)
-    early = layout.starts[None] < seen.decided[chosen, None]
+    held = rng.random(_TRIES) < settings.direct_held
+    children[held] = held_from(layout, rng, parents[held], decided[held], settings.direct_at_bounds)
+    early = layout.starts[None] <= decided[:, None]
     matters = ((np.abs(children - parents) > _TOLERANCE) & early).any(axis=1)
-    return _least_risky(children[matters] if matters.any() else children, risk)
+    return np.asarray(children[matters])
 
 
 def round_start(costs: Array, patience: int) -> int:

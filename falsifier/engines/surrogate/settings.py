@@ -45,6 +45,8 @@ class Settings:
         stretches: factors of inner windows in the relaxations of a formula over discrete signals, whose
             robustness alone has no slope.
         bandit_window: number of recent proposals by which an arm is rated.
+        bandit_power: power to which the share of costs that a proposal improves on is raised: an arm is rated
+            by its best proposals.
         trial: number of proposals during which the dynamics are preferred, so that they can learn.
         trial_share: probability of the dynamics during their trial.
         trusted_error: recent prediction error, in scaled units, below which the dynamics are trusted.
@@ -55,6 +57,11 @@ class Settings:
         direct_start: number of simulations of a round before their changes are tried.
         direct_fresh: share of random points in the direct search.
         direct_parents: number of best points of a round that are changed.
+        direct_pieces: maximum number of pieces of its random points, which all inputs share; more are found
+            by changes.
+        direct_at_bounds: probability that a level of these, or of a constant end, is a bound.
+        direct_held: share of its changes that keep all inputs constant from some time on: an excited system
+            that is left alone may do by itself what constant disturbance hides.
         flat: share of simulations with the same cost from which on coverage leads the search.
         flat_start: minimum number of simulations for that.
         coverage_share: probability of coverage where it leads.
@@ -96,6 +103,7 @@ class Settings:
     snap_decay: float = 0.5
     stretches: tuple[float, ...] = (1.0, 1.4, 2.0, 3.0, 4.5, 7.0)
     bandit_window: int = 8
+    bandit_power: float = 4.0
     trial: int = 8
     trial_share: float = 0.9
     trusted_error: float = 0.5
@@ -103,8 +111,11 @@ class Settings:
     least_share: float = 0.1
     direct_patience: int = 30
     direct_start: int = 8
-    direct_fresh: float = 0.1
+    direct_fresh: float = 0.05
     direct_parents: int = 20
+    direct_pieces: int = 6
+    direct_at_bounds: float = 0.8
+    direct_held: float = 0.2
     flat: float = 0.6
     flat_start: int = 4
     coverage_share: float = 0.8

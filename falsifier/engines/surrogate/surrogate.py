@@ -172,11 +172,10 @@ class Surrogate:
     def _objection(self, pending: Pending) -> float:
         """Return the excess risk that its simulation fails, plus 1 if that would repeat another one.
 
-        Plans repeat nothing unless all has been tried. Where all levels of all ranges are values, the
-        other arms repeat something so rarely that nobody looks for it.
+        Plans repeat nothing unless all has been tried.
         """
-        may_repeat = self.layout.has_gaps and pending.forecast is None
-        return self._risk(pending) + (may_repeat and is_seen(pending.point, self._tried))
+        is_repeated = pending.forecast is None and is_seen(pending.point, self._tried)
+        return self._risk(pending) + is_repeated
 
     @property
     def _tried(self) -> Array:
@@ -231,7 +230,10 @@ class Surrogate:
         arms = [s.arm for s in self.history.samples]
         may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
         names = ("dynamics", "direct", "switching") if may_switch else ("dynamics", "direct")
-        qualities = {name: quality(name, arms, costs, window=settings.bandit_window) for name in names}
+        qualities = {
+            name: quality(name, arms, costs, window=settings.bandit_window, power=settings.bandit_power)
+            for name in names
+        }
         if self.dynamics.is_trusted and qualities["dynamics"] == max(qualities.values()):
             return "dynamics" if rng.random() < settings.trusted_share else "direct"
         return choose_arm(qualities, rng, least=settings.least_share)
@@ -291,8 +293,8 @@ class Surrogate:
         decided = np.array([s.critical * horizon + rest for s in samples])
         seen = Seen(self.history.points, np.array(self.history.direct_costs()), decided)
         risk = partial(self.feasibility.excess, self.layout) if self.feasibility.has_failures else None
-        point = propose(seen, self.layout, self.settings, rng, risk)
-        return Pending("direct", point, "a change of one of the best inputs")
+        draw = propose(seen, self.layout, self.settings, rng, risk)
+        return Pending("direct", draw.point, draw.why)
 
 
 def _pace(layout: Layout, dwell: float) -> str:

@@ -79,6 +79,55 @@ def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
     return layout.settled(point)
 
 
+def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds: float) -> Array:
+    """Return one point: all inputs change at the same times and keep their last levels; shape (d,).
+
+    Each order of magnitude of a piece's length is equally likely, so that short pulses, after which nothing
+    changes any more, are as likely as slow changes. Parameters get the levels of the first piece.
+
+    Args:
+        layout: layout of the point.
+        rng: random generator.
+        most_pieces: maximum number of pieces; each number is equally likely.
+        at_bounds: probability that a level is a bound.
+    """
+    pieces = int(rng.integers(1, most_pieces + 1))
+    cells = max((len(group) for group in layout.groups), default=1)
+    ends = np.cumsum(np.exp(rng.random(pieces - 1) * np.log(cells)) // 1) / cells
+    point = np.empty(layout.dimension)
+    for group in layout.groups:
+        levels = _levels(rng, pieces, at_bounds)
+        point[group] = levels[np.searchsorted(ends, np.arange(len(group)) / len(group), side="right")]
+    return layout.settled(point)
+
+
+def held_from(
+    layout: Layout, rng: np.random.Generator, points: Array, until: Array, at_bounds: float
+) -> Array:
+    """Return a copy of the points in which all inputs are constant from a random time on; shape (m, d).
+
+    Args:
+        layout: layout of the points.
+        rng: random generator.
+        points: shape (m, d).
+        until: latest time in s at which the constant end begins, shape (m,).
+        at_bounds: probability that a constant is a bound.
+    """
+    result = points.copy()
+    starts = rng.random(len(points)) * np.minimum(until, layout.starts.max(initial=0.0))
+    for group in layout.groups[: len(layout.codings)]:
+        levels = _levels(rng, len(points), at_bounds)
+        is_end = layout.starts[group] >= starts[:, None]
+        result[:, group] = np.where(is_end, levels[:, None], points[:, group])
+    return layout.settled(result)
+
+
+def _levels(rng: np.random.Generator, count: int, at_bounds: float) -> Array:
+    """Draw levels in [0, 1], at a bound with the given probability, shape (count,)."""
+    levels = rng.random(count)
+    return np.where(rng.random(count) < at_bounds, np.rint(levels), levels)
+
+
 def _groups(layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return the end of each group of coordinates, and whether it consists of many held cells."""
     return np.array([group[-1] + 1 for group in layout.groups]), np.array(layout.is_fine)

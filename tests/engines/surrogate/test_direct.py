@@ -1,5 +1,7 @@
 """The direct search: changes of the best inputs that can matter, in rounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -30,14 +32,15 @@ def test_a_change_is_near_a_good_point_and_before_its_cost_was_decided(free: boo
     rng = np.random.default_rng(1)
     near = []
     for _ in range(60):
-        point = propose(seen, layout, SETTINGS, rng)
-        assert point.shape == (layout.dimension,) and 0.0 <= point.min() <= point.max() <= 1.0
-        same = (np.abs(seen.points - point) < 1e-9).mean(axis=1)
-        changed = np.abs(seen.points[int(np.argmax(same))] - point) > 1e-9
-        if same.max() > 0.2:
-            near.append(int(np.argmax(same)))
-            assert (layout.starts[changed] < 4.0).any()
-    assert len(near) > 40, "most are changes, some random points"
+        draw = propose(seen, layout, SETTINGS, rng)
+        assert draw.point.shape == (layout.dimension,) and 0.0 <= draw.point.min() <= draw.point.max() <= 1.0
+        if draw.why.startswith("random"):
+            continue
+        same = np.abs(seen.points - draw.point) < 1e-9
+        parent = int(np.argmax(same.mean(axis=1)))
+        near.append(parent)
+        assert (layout.starts[~same[parent]] <= 4.0).any()
+    assert 50 < len(near) < 60, "most are changes, some random points"
     assert np.mean(np.array(near) >= 36) > 0.8, "the last ones are the best"
 
 
@@ -49,7 +52,7 @@ def test_a_system_is_led_to_the_lowest_cost() -> None:
     costs = [float(((point - target) ** 2).sum()) for point in points]
     for _ in range(150):
         seen = Seen(np.array(points), np.array(costs), np.full(len(costs), np.inf))
-        points.append(propose(seen, layout, SETTINGS, rng))
+        points.append(propose(seen, layout, SETTINGS, rng).point)
         costs.append(float(((points[-1] - target) ** 2).sum()))
     assert min(costs) < 0.25 * min(costs[:8])
 
@@ -66,9 +69,11 @@ def test_a_round_ends_when_nothing_improves() -> None:
 def test_a_new_round_begins_with_random_points() -> None:
     layout = layout_of(free=True)
     stuck = seen_of(layout, [1.0, *(2.0 for _ in range(SETTINGS.direct_patience))], decided=10.0)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(7)
     for _ in range(20):
-        point = propose(stuck, layout, SETTINGS, rng)
+        draw = propose(stuck, layout, SETTINGS, rng)
+        assert draw.why.startswith("random")
+        point = draw.point
         assert (np.abs(stuck.points - point) > 1e-9).all()
 
 
@@ -80,5 +85,27 @@ def test_the_least_risky_is_proposed() -> None:
     def risk(points: Array) -> Array:
         return np.asarray(points[:, -1] > 0.5, dtype=np.float64)
 
-    proposed = np.array([propose(seen, layout, SETTINGS, rng, risk) for _ in range(30)])
+    proposed = np.array([propose(seen, layout, SETTINGS, rng, risk).point for _ in range(30)])
     assert (proposed[:, -1] <= 0.5).all()
+
+
+def test_a_cost_that_the_start_decides_depends_on_parameters_and_first_levels() -> None:
+    layout = layout_of(free=True)
+    seen = seen_of(layout, [float(i) for i in range(40, 0, -1)], decided=0.0)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        draw = propose(seen, layout, SETTINGS, rng)
+        if draw.why.startswith("random"):
+            continue
+        same = (np.abs(seen.points - draw.point) < 1e-9).mean(axis=1)
+        changed = np.abs(seen.points[int(np.argmax(same))] - draw.point) > 1e-9
+        assert (layout.starts[changed] == 0.0).any()
+
+
+def test_where_nothing_can_change_the_cost_points_are_random() -> None:
+    layout = layout_of(free=False)
+    late = Layout(layout.space, tuple(replace(c, times=(1.0, *c.times[1:])) for c in layout.codings))
+    late = replace(late, space=replace(late.space, parameters=()))
+    seen = seen_of(late, [float(i) for i in range(40, 0, -1)], decided=0.5)
+    rng = np.random.default_rng(0)
+    assert all(propose(seen, late, SETTINGS, rng).why.startswith("random") for _ in range(20))

@@ -3,7 +3,14 @@ import numpy as np
 from falsifier.engines.box import Array
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout, planning_layout
-from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
+from falsifier.engines.surrogate.variation import (
+    held_from,
+    mutations,
+    paced,
+    random_points,
+    stepping,
+    switching,
+)
 from falsifier.testing import FREE, START, lag_problem
 
 
@@ -65,3 +72,31 @@ def test_stepping_inputs_go_through_all_levels_once() -> None:
     levels = point[::10]
     assert pieces(np.append(point, 0.0)[None]).tolist() == [10]
     assert sorted((10 * levels).astype(int)) == list(range(10))
+
+
+def test_paced_inputs_change_together_after_pieces_of_all_lengths() -> None:
+    problem = lag_problem(free=FREE, inputs=2, parameters=[START])
+    layout = planning_layout(problem.space, Grid.over(10.0, 10.0, cells=100, shortest=0.05))
+    rng = np.random.default_rng(0)
+    firsts, counts = [], []
+    for _ in range(400):
+        point = paced(layout, rng, 4, 1.0)
+        first, second = (point[group] for group in layout.groups[:2])
+        assert set(np.concatenate([first, second]).tolist()) <= {0.0, 1.0}
+        changes = np.flatnonzero((np.diff(first) != 0) | (np.diff(second) != 0)) + 1
+        firsts += changes[:1].tolist()
+        counts.append(1 + len(changes))
+    assert max(counts) == 4 and counts.count(1) > 60
+    # A first piece of up to ten cells is about as likely as one of ten to a hundred.
+    assert 0.35 < np.mean(np.array(firsts) <= 10) < 0.75
+
+
+def test_an_end_is_constant_from_a_time_before_the_latest_on() -> None:
+    layout = free_layout()
+    rng = np.random.default_rng(0)
+    points = random_points(layout, rng, 200)
+    held = held_from(layout, rng, points, np.full(200, 3.0), 0.5)
+    assert (held[:, 31:100] == held[:, 31:32]).all()
+    assert (held[:, 100] == points[:, 100]).all(), "parameters stay"
+    kept = (held[:, :31] == points[:, :31]).mean(axis=0)
+    assert kept[0] > 0.9 > 0.6 > kept[25]
