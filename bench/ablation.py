@@ -2,6 +2,7 @@
 
     python bench/ablation.py                                             # free parameterization
     python bench/ablation.py --parameterization fixed --requirements AT52 AT53 AT6a CC3
+    python bench/ablation.py --requirements CC4 CC5 CCx --budget 400
     python bench/ablation.py --parts "the whole engine" "no offsets" --requirements CC5
 
 Each run ends at the first violation or after --budget simulations; the cells are their mean number. The
@@ -23,11 +24,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from falsifier.engines.surrogate import forecast, history, planning, surrogate, trace
+from falsifier.engines.box import Array
+from falsifier.engines.layout import Layout
+from falsifier.engines.surrogate import direct, forecast, history, planning, surrogate, trace
 from falsifier.engines.surrogate.coordinates import Coordinates
 from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics
 from falsifier.engines.surrogate.settings import Settings
-from falsifier.engines.surrogate.variation import mutations
+from falsifier.engines.surrogate.variation import mutations, random_points
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -73,6 +76,10 @@ def _uncritical(*arguments: Any, **_: Any) -> Any:
     return _MUTATIONS(*arguments)
 
 
+def _random(layout: Layout, rng: np.random.Generator, *_: Any) -> Array:
+    return np.asarray(random_points(layout, rng, 1)[0])
+
+
 def _only(arm: str) -> Callable[..., str]:
     return lambda *_, **__: arm
 
@@ -85,6 +92,10 @@ PARTS = {
     "no dynamics": Part(
         {"trial_share": 0.0, "trusted_error": 0.0}, [(surrogate, "choose_arm", _only("direct"))]
     ),
+    "no rounds of the direct search": Part({"direct_patience": 10**9}),
+    "no constant ends in the direct search": Part({"direct_held": 0.0}),
+    "independent instead of common pieces in the direct search": Part(patches=[(direct, "paced", _random)]),
+    "arms rated by mean ranks": Part({"bandit_power": 1.0}),
     "no linear dynamics": Part(patches=[(forecast, "_KINDS", {"nonlinear": FourierDynamics})]),
     "no nonlinear dynamics": Part(patches=[(forecast, "_KINDS", {"linear": DeviationDynamics})]),
     "best trajectories weigh as much as others": Part({"best_weight": 0.0}),
