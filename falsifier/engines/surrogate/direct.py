@@ -72,7 +72,7 @@ def propose(
         paced(layout, rng, settings.direct_pieces, settings.direct_at_bounds)
         for _ in range(max(settings.retries, 1) if risk else 1)
     ]
-    return Draw(_least_risky(np.array(fresh), risk), "random pieces, after which the inputs stay constant")
+    return Draw(_least_risky(np.array(fresh), risk), "random: a new start of the search by changes")
 
 
 def _changes(seen: Seen, start: int, layout: Layout, settings: Settings, rng: np.random.Generator) -> Array:

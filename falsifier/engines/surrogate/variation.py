@@ -83,7 +83,7 @@ def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds:
     """Return one point: all inputs change at the same times and keep their last levels; shape (d,).
 
     Each order of magnitude of a piece's length is equally likely, so that short pulses, after which nothing
-    changes any more, are as likely as slow changes. Parameters get the levels of the first piece.
+    changes any more, are as likely as slow changes. Parameters get any values: extremes are tried anyway.
 
     Args:
         layout: layout of the point.
@@ -94,11 +94,11 @@ def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds:
     pieces = int(rng.integers(1, most_pieces + 1))
     cells = max((len(group) for group in layout.groups), default=1)
     ends = np.cumsum(np.exp(rng.random(pieces - 1) * np.log(cells)) // 1) / cells
-    point = np.empty(layout.dimension)
-    for group in layout.groups:
+    values = []
+    for group in layout.groups[: len(layout.codings)]:
         levels = _levels(rng, pieces, at_bounds)
-        point[group] = levels[np.searchsorted(ends, np.arange(len(group)) / len(group), side="right")]
-    return layout.settled(point)
+        values.append(levels[np.searchsorted(ends, np.arange(len(group)) / len(group), side="right")])
+    return layout.settled(np.concatenate([*values, rng.random(len(layout.space.parameters))]))
 
 
 def held_from(
