@@ -52,12 +52,15 @@ class Coordinates:
                 matrix[this, before] = -1.0
         return np.delete(matrix, [family[0] for family in self.families], axis=0)
 
-    def of(self, trajectory: Trajectory) -> NDArray[np.float64]:
+    def of(self, trajectory: Trajectory) -> Array:
         """Return the coordinates of a trajectory, shape (samples, dimension)."""
         if not self.outputs:
             return np.empty((len(trajectory), 0))
-        stacked = np.stack([trajectory[name] for name in self.outputs], axis=1)
-        return np.asarray(stacked @ self._differences.T)
+        return self.transformed(np.stack([trajectory[name] for name in self.outputs], axis=1))
+
+    def transformed(self, outputs: Array) -> Array:
+        """Return the coordinates, shape (m, dimension), of outputs, shape (m, outputs)."""
+        return np.asarray(outputs @ self._differences.T)
 
     def columns(self, values: Array) -> dict[str, Array]:
         """Return the output columns for coordinates, shape (..., dimension), with each reference set to 0."""

@@ -69,21 +69,24 @@ class Dynamics(Protocol):
 
 
 class StartState:
-    """The initial state as a linear function of the first inputs and the parameters."""
+    """The state at the start as a linear function of the first inputs and the parameters.
 
-    def __init__(self, traces: Traces) -> None:
-        first = traces.states[:, 0]
+    Args:
+        first: states at the start, shape (m, n).
+        inputs: scaled inputs and parameters in the first cell, shape (m, p).
+    """
+
+    def __init__(self, first: Array, inputs: Array) -> None:
         self._mean = first.mean(axis=0)
         self._weights = None
         if np.ptp(first, axis=0).max(initial=0.0) > 1e-9 * max(1.0, float(np.abs(first).max(initial=0.0))):
-            inputs = traces.inputs[:, 0]
             self._centre = inputs.mean(axis=0)
             z = inputs - self._centre
             gram = z.T @ z + 1e-6 * np.eye(z.shape[1])
             self._weights = np.linalg.solve(gram, z.T @ (first - self._mean))
 
     def predict(self, inputs: Array) -> Array:
-        """Return the initial states, shape (m, dimension), for inputs, shape (m, cells, inputs)."""
+        """Return the states at the start, shape (m, n), for inputs, shape (m, cells, p)."""
         if self._weights is None:
             return np.repeat(self._mean[None], len(inputs), axis=0)
         return np.asarray(self._mean + (inputs[:, 0] - self._centre) @ self._weights)

@@ -1,4 +1,4 @@
-"""Both kinds of learnt dynamics: choice of the one to plan on, and correction by their past errors."""
+"""All kinds of learnt dynamics: choice of the one to plan on, and correction by their past errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 
 from falsifier.engines.box import Array
 from falsifier.engines.layout import Layout
+from falsifier.engines.surrogate.automaton.predictions import AutomatonDynamics
 from falsifier.engines.surrogate.coarse import Envelope
 from falsifier.engines.surrogate.dynamics import (
     DeviationDynamics,
@@ -24,6 +25,7 @@ _KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
     "nonlinear": FourierDynamics,
     "linear": DeviationDynamics,
 }
+SWITCHED = "switched"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,14 +44,14 @@ class Forecast:
 
 
 class Ensemble:
-    """Fits both kinds of dynamics, prefers the one with smaller recent errors, and corrects its leaves.
+    """Fits the kinds of dynamics, prefers the one with the smallest recent errors, and corrects its leaves.
 
     The errors are those of predictions made before the simulation, not of the fit.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._errors: dict[str, list[float]] = {name: [] for name in _KINDS}
+        self._errors: dict[str, list[float]] = {}
         self._deltas: list[list[float]] = []
         self._missed: list[bool] = []
         self._fitted: dict[str, Dynamics] = {}
@@ -77,16 +79,42 @@ class Ensemble:
             count += 1
         return count
 
-    def fit(self, traces: Sequence[Trace], best: Sequence[int], rng: np.random.Generator) -> None:
-        """Fit to traces, of which ``best`` have the lowest robustness, and choose the dynamics to plan on."""
+    def fit(
+        self,
+        traces: Sequence[Trace],
+        best: Sequence[int],
+        automaton: AutomatonDynamics | None,
+        rng: np.random.Generator,
+    ) -> None:
+        """Fit to traces and choose the dynamics to plan on.
+
+        Args:
+            traces: all simulations.
+            best: indices of those with the lowest robustness.
+            automaton: the automaton, if one explains the simulations.
+            rng: random generator.
+        """
         stacked = Traces.of(traces)
         self._fitted = {name: kind(stacked, best, self._settings, rng) for name, kind in _KINDS.items()}
-        self._start = StartState(stacked)
+        self._start = StartState(stacked.states[:, 0], stacked.inputs[:, 0])
+        if automaton is not None:
+            self._fitted[SWITCHED] = automaton
+            self._errors.setdefault(SWITCHED, [automaton.error])
         errors = self._recent_errors()
-        if errors and rng.random() >= self._settings.exploration:
+        if self.is_exact or (errors and rng.random() >= self._settings.exploration):
             self.chosen = min(errors, key=lambda name: errors[name])
         else:
             self.chosen = str(rng.choice(list(_KINDS)))
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there is an automaton, and recent simulations were nearly what it predicted."""
+        return self._recent_errors().get(SWITCHED, np.inf) < self._settings.exact_error
+
+    @property
+    def is_surprised(self) -> bool:
+        """Whether the last simulation was not what the automaton had predicted."""
+        return SWITCHED in self._fitted and self._errors[SWITCHED][-1] >= self._settings.exact_error
 
     def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
         """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""
@@ -103,15 +131,15 @@ class Ensemble:
         return corrected.verdicts(self._values(self.chosen, layout, corrected, points))
 
     def forecast(self, layout: Layout, objective: Objective, point: Array) -> Forecast:
-        """Return both kinds' predictions for one point, to be passed to ``judge`` after its simulation."""
-        values = {name: self._values(name, layout, objective, point[None]) for name in _KINDS}
+        """Return all kinds' predictions for one point, to be passed to ``judge`` after its simulation."""
+        values = {name: self._values(name, layout, objective, point[None]) for name in self._fitted}
         cost = float(self._corrected(objective).cost(values[self.chosen])[0])
         return Forecast(values, self.chosen, cost)
 
     def judge(self, forecast: Forecast, true: LeafValues, objective: Objective, *, violated: bool) -> None:
         """Record the errors of a forecast, given the simulated values of the leaves."""
         for name, values in forecast.values.items():
-            self._errors[name].append(_error(objective, values, true))
+            self._errors.setdefault(name, []).append(_error(objective, values, true))
         self._missed.append(forecast.cost < 0 and not violated)
         self._deltas.append(_deltas(objective, forecast.values[forecast.chosen], true))
 
@@ -130,7 +158,9 @@ class Ensemble:
 
     def _recent_errors(self) -> dict[str, float]:
         recent = self._settings.recent_errors
-        return {name: float(np.median(e[-recent:])) for name, e in self._errors.items() if e}
+        return {
+            name: float(np.median(e[-recent:])) for name, e in self._errors.items() if name in self._fitted
+        }
 
 
 def _error(objective: Objective, predicted: LeafValues, true: LeafValues) -> float:

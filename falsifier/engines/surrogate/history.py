@@ -9,6 +9,7 @@ from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.engines.box import Array, learnable
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout
+from falsifier.engines.surrogate.automaton.predictions import AutomatonDynamics, AutomatonLearner
 from falsifier.engines.surrogate.coordinates import Coordinates, choose_coordinates
 from falsifier.engines.surrogate.objective import LeafValues, Objective, make_objective
 from falsifier.engines.surrogate.settings import Settings
@@ -47,6 +48,7 @@ class History:
     layout: Layout
     settings: Settings
     samples: list[Sample] = field(default_factory=list)
+    learner: AutomatonLearner = field(default_factory=AutomatonLearner)
     objective: Objective | None = None
     _coordinates: Coordinates | None = None
     _scaled: Objective | None = None
@@ -65,6 +67,7 @@ class History:
             space, self.grid, self._coordinates, self.objective.leaves, evaluation.candidate, trajectory
         )
         cells = self.grid.cells
+        self.learner.hear(space, self._coordinates.outputs, evaluation.candidate, trajectory, trace)
         values = self.objective.leaf_values(
             trace.states[None, : cells + 1], trace.excess[None, :cells], trace.inputs[None, :cells]
         )
@@ -103,6 +106,10 @@ class History:
         if self._scaled is None:
             self._scaled = self.objective.rescaled([s.values for s in self.samples])
         return self._scaled
+
+    def automaton(self, seed: int) -> AutomatonDynamics | None:
+        """Return the automaton that explains the samples, or None; the seed is for its learning."""
+        return self.learner.current(self.scaled_objective(), np.random.default_rng([seed, len(self.samples)]))
 
     @property
     def points(self) -> Array:

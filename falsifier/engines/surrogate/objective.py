@@ -76,6 +76,19 @@ class Objective:
             values.append(margin)
         return values
 
+    def margins(self, outputs: Array, inputs: Array) -> list[Array]:
+        """Return each leaf's margin at samples, shape (m,).
+
+        Args:
+            outputs: shape (m, outputs).
+            inputs: scaled inputs, shape (m, inputs).
+        """
+        columns = {name: outputs[:, i] for i, name in enumerate(self.coordinates.outputs)}
+        columns |= {name: np.full(len(outputs), value) for name, value in self.constants.items()}
+        for j, r in enumerate(self.space.inputs):
+            columns[r.name] = r.low + (r.high - r.low) * inputs[:, j]
+        return [np.broadcast_to(leaf.margin(columns), len(outputs)) for leaf in self.leaves]
+
     def scaled(self, values: LeafValues) -> LeafValues:
         """Return the leaf values after offset and scaling."""
         return [

@@ -1,7 +1,7 @@
 """The surrogate engine: learn the dynamics, plan on them, simulate, refit."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
@@ -149,6 +149,8 @@ class Surrogate:
         if pending.forecast is not None and sample is not None:
             objective = self.history.scaled_objective()
             self.dynamics.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
+            if self.dynamics.is_surprised:
+                self.history.learner.doubt()
 
     def _hear(self, point: Array, sample: Sample) -> None:
         """Learn from another engine's candidate; near a constant extreme, that one need not be simulated."""
@@ -258,8 +260,8 @@ class Surrogate:
             elites=np.concatenate([suggested, points[elites]]),
             critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
             seen=np.concatenate([self._tried, np.array(replaced).reshape(-1, self.layout.dimension)]),
-            settings=settings,
-            snap=settings.snap * settings.snap_decay**self._simple,
+            settings=self._plan_settings(),
+            snap=0.0 if self.dynamics.is_exact else settings.snap * settings.snap_decay**self._simple,
             rng=rng,
         )
         self._planned += 1
@@ -270,6 +272,13 @@ class Surrogate:
         )
         forecast = self.dynamics.forecast(self.layout, objective, result.point)
         return Pending("dynamics", result.point, why, forecast=forecast)
+
+    def _plan_settings(self) -> Settings:
+        settings = self.settings
+        if not self.dynamics.is_exact:
+            return settings
+        pool, children = (round(settings.exact_share * n) for n in (settings.pool, settings.children))
+        return replace(settings, pool=pool, children=children)
 
     def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:
         """Return predicted costs that also count the risk of a failure, if there has been one."""
@@ -283,7 +292,7 @@ class Surrogate:
         samples = self.history.samples
         order = np.argsort(scaled_costs(samples, self.history.scaled_objective()), kind="stable")
         best = [int(i) for i in order[: self.settings.best_count]]
-        self.dynamics.fit([s.trace for s in samples], best, rng)
+        self.dynamics.fit([s.trace for s in samples], best, self.history.automaton(self.seed), rng)
         return order
 
     def _search(self, rng: np.random.Generator) -> Pending:

@@ -14,7 +14,7 @@ def test_dynamics_predict_an_unseen_input_from_a_few_trajectories(
     traces = [s.trace for s in history.samples]
     known = Traces.of(traces[:-2])
     fitted = dynamics(known, [0, 1, 2], SETTINGS, np.random.default_rng(0))
-    start = StartState(known)
+    start = StartState(known.states[:, 0], known.inputs[:, 0])
     for trace in traces[-2:]:
         inputs = trace.inputs[None, :50]
         predicted = fitted.predict(inputs, start.predict(inputs)).states[0, :, 0]

@@ -16,6 +16,7 @@ from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings, Surrogate
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.search.run import falsify
@@ -246,3 +247,14 @@ def test_an_extreme_for_which_another_sample_stands_is_planned_only_if_that_is_t
     engine.tell([evaluate(problem, near)])
     asked = drive(engine, lambda candidate: evaluate(problem, candidate), rounds=4)
     assert any(set(c.signals["u"].values) == {-2.0} for c in asked) == is_best
+
+
+@pytest.mark.parametrize("name", ["CC:CC4", "CC:CCx"])
+def test_chattering_cars_are_predicted_once_their_automaton_is_known(name: str) -> None:
+    problem = load_problem(name)
+    engine = Surrogate(problem, seed=0)
+    result = falsify(problem, engine=engine, seed=0, budget=30)
+    assert result.counterexample is not None
+    # Without the automaton, about a hundred simulations.
+    assert len(result.evaluations) <= 15
+    assert engine.dynamics.is_exact

@@ -1,0 +1,1 @@
+"""A hybrid automaton learnt from trajectories: modes, guards and resets with located events."""
