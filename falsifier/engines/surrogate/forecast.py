@@ -114,7 +114,7 @@ class Ensemble:
     @property
     def is_surprised(self) -> bool:
         """Whether the last simulation was not what the automaton had predicted."""
-        return SWITCHED in self._fitted and self._errors[SWITCHED][-1] >= self._settings.exact_error
+        return SWITCHED in self._fitted and self._errors[SWITCHED][-1] >= self._settings.surprise
 
     def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
         """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""

@@ -50,8 +50,9 @@ class Settings:
         trial: number of proposals during which the dynamics are preferred, so that they can learn.
         trial_share: probability of the dynamics during their trial.
         trusted_error: recent prediction error, in scaled units, below which the dynamics are trusted.
-        exact_error: prediction error of an automaton below which it is planned on, without a liking for
-            extremes, and from which on it is learnt again.
+        exact_error: recent prediction error of an automaton below which it is always the one that is planned
+            on, without a liking for extremes.
+        surprise: prediction error of an automaton from which on it is learnt again.
         exact_share: share of the usual candidates of a plan on an automaton, whose roll-outs take longer.
         trusted_share: probability of the dynamics if they are trusted and no other arm is rated higher.
         least_share: approximate minimum probability of each arm.
@@ -111,6 +112,7 @@ class Settings:
     trial_share: float = 0.9
     trusted_error: float = 0.5
     exact_error: float = 0.1
+    surprise: float = 0.02
     exact_share: float = 0.4
     trusted_share: float = 0.8
     least_share: float = 0.1

@@ -12,10 +12,10 @@ from falsifier.engines.surrogate.automaton.recording import Motion, Recording
 
 # Samples at most between the pieces before and after an event.
 _NEAR = 4
-# Events of one kind: at least so many, and this share of all of the output's; fewer are not understood.
+# Events of one kind: at least so many, and this share of all of the output's; what is rarer is left out.
 _FEWEST, _LEAST_SHARE = 2, 0.02
-# Events that are looked at, and the share of them at which a difference must be known.
-_MOST_EVENTS, _LEAST_KNOWN = 200, 0.2
+# Events that are looked at, and the number of them at which a difference must be known, if there are so many.
+_MOST_EVENTS, _KNOWN = 200, 5
 # Share of the events for which a guard must hold: some events coincide with others.
 _MOST_OF_THEM = 0.8
 # Spread of a guard's value at its events, as a share of its spread at all times.
@@ -108,21 +108,23 @@ def _events(recordings: Sequence[Recording], motion: Motion, modes: Modes) -> It
         middle = 0.5 * (before.stop + after.start + 1) * recording.step
         ahead = _parabola(recording, motion.output, before.last, middle)
         behind = _parabola(recording, motion.output, after.first, middle)
-        time = _meeting(ahead - behind, motion.unit * recording.step)
-        is_located = time is not None and abs(time) <= _NEAR * recording.step
-        if not is_located and source == target:
-            continue
-        time = time if time is not None and is_located else 0.0
-        yield _Event(
-            before.recording,
-            middle + time,
-            int(source),
-            int(target),
-            float(np.polyval(ahead, time)),
-            float(np.polyval(np.polyder(ahead), time)),
-            float(np.polyval(np.polyder(behind), time)),
-            is_located,
-        )
+        least = motion.unit * recording.step
+        time = _meeting(ahead - behind, least)
+        is_near = time is not None and abs(time) <= _NEAR * recording.step
+        time = time if time is not None and is_near else 0.0
+        old, new = (float(np.polyval(np.polyder(part), time)) for part in (ahead, behind))
+        is_located = is_near and abs(new - old) > least
+        if is_located or source != target:
+            yield _Event(
+                before.recording,
+                middle + time,
+                int(source),
+                int(target),
+                float(np.polyval(ahead, time)),
+                old,
+                new,
+                is_located,
+            )
 
 
 def _meeting(difference: Array, least: float) -> float | None:
@@ -150,7 +152,7 @@ def _guard(
         for low in range(-1, high):
             at = value[:, high] - (value[:, low] if low >= 0 else 0.0)
             known = np.isfinite(at)
-            if known.sum() < max(_FEWEST, _LEAST_KNOWN * len(chosen)):
+            if known.sum() < min(_KNOWN, len(chosen)):
                 continue
             threshold = float(np.median(at[known]))
             rate = slope[known, high] - (slope[known, low] if low >= 0 else 0.0)

@@ -14,8 +14,8 @@ _TOLERANCE = 0.02
 # Share of the motion that the modes must explain.
 _EXPLAINED = 0.97
 _MOST_MODES = 3
-# Share of the time that must be smooth motion: else it is noise.
-_COVERED = 0.5
+# Samples in smooth pieces that it takes to tell a law from noise.
+_FEWEST_SAMPLES = 100
 # Pieces that take part in the fits, and rows of each of them.
 _MOST_PIECES, _ROWS = 300, 8
 # Draws of a few pieces that a law is fitted to.
@@ -92,7 +92,7 @@ def find_modes(recordings: Sequence[Recording], motion: Motion, rng: np.random.G
     The pieces that one law explains are found by fits to a few pieces drawn at random (RANSAC: Fischler and
     Bolles, Communications of the ACM 24(6), 1981).
     """
-    if motion.covered < _COVERED:
+    if motion.samples < _FEWEST_SAMPLES:
         return None
     everything = np.arange(len(motion.pieces))
     drawn = everything

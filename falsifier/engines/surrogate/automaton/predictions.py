@@ -20,8 +20,10 @@ _MOST_RECORDINGS = 6
 # Numbers of simulations after which that is tried: where it fails, it takes milliseconds.
 _ATTEMPTS = frozenset({*range(2, 17), 24, 32, 48, 64, 96, 128})
 _FEWEST_SAMPLES, _MOST_SAMPLES = 10, 100_000
+# Times that it is learnt again after a wrong prediction.
+_MOST_DOUBTS = 12
 # An automaton is used if its error on the simulations it was learnt from is at most this share of the spread.
-_BELIEVED = 0.1
+_BELIEVED = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +77,7 @@ class AutomatonLearner:
     learnt: AutomatonDynamics | None = None
     _heard: list[tuple[Recording, Trace]] = field(default_factory=list)
     _count: int = 0
+    _doubts: int = 0
     _is_due: bool = False
 
     def hear(
@@ -95,8 +98,9 @@ class AutomatonLearner:
             del self._heard[int(np.argmin([recording.kinks for recording, _ in self._heard[:-1]]))]
 
     def doubt(self) -> None:
-        """Learn again before the next use: a prediction was wrong."""
-        self._is_due = True
+        """Learn again before the next use, as a prediction was wrong; after some times, that is of no use."""
+        self._doubts += 1
+        self._is_due |= self._doubts <= _MOST_DOUBTS
 
     def current(self, objective: Objective, rng: np.random.Generator) -> AutomatonDynamics | None:
         """Return the automaton, learnt again if that is due; None if there is none."""

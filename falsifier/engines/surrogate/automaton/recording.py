@@ -94,14 +94,12 @@ class Motion:
         pieces: pieces of smooth motion, in order.
         is_smooth: for each recording, whether no event lies between samples k + 1 and k + 2, shape
             (samples - 3,).
-        covered: share of the time that the pieces cover, except where inputs switch.
     """
 
     output: int
     unit: float
     pieces: tuple[Piece, ...]
     is_smooth: tuple[NDArray[np.bool_], ...]
-    covered: float
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], output: int) -> "Motion":
@@ -117,8 +115,12 @@ class Motion:
             edges = np.concatenate([[0], breaks, [len(even) + 1]])
             pieces += [Piece(k, int(a), int(b)) for a, b in pairwise(edges) if b - a >= _SHORTEST]
             is_smooth.append(even)
-        covered = sum(p.stop - p.start for p in pieces) / max(sum(map(len, driven)), 1)
-        return cls(output, unit, tuple(pieces), tuple(is_smooth), covered)
+        return cls(output, unit, tuple(pieces), tuple(is_smooth))
+
+    @property
+    def samples(self) -> int:
+        """Number of samples in the pieces."""
+        return sum(p.stop - p.start for p in self.pieces)
 
 
 def _typical(acceleration: Array) -> float:
