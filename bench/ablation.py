@@ -2,12 +2,13 @@
 
     python bench/ablation.py                                             # free parameterization
     python bench/ablation.py --parameterization fixed --requirements AT52 AT53 AT6a CC3
-    python bench/ablation.py --requirements CC4 CC5 CCx --budget 400
+    python bench/ablation.py --requirements CC4 CC5 CCx --budget 400 --without "no automaton"
     python bench/ablation.py --parts "the whole engine" "no offsets" --requirements CC5
 
 Each run ends at the first violation or after --budget simulations; the cells are their mean number. The
 last column is the mean difference from the whole engine over all runs, with its standard error: it is
-positive if the part helps. Violations are the monitor's and are not confirmed a second time.
+positive if the part helps. With --without PART, that part is off in all rows. Violations are the monitor's
+and are not confirmed a second time.
 """
 
 import argparse
@@ -27,6 +28,7 @@ import numpy as np
 from falsifier.engines.box import Array
 from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate import direct, forecast, history, planning, surrogate, trace
+from falsifier.engines.surrogate.automaton import predictions
 from falsifier.engines.surrogate.coordinates import Coordinates
 from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics
 from falsifier.engines.surrogate.settings import Settings
@@ -49,6 +51,10 @@ class Part:
 
     settings: Mapping[str, Any] = field(default_factory=dict)
     patches: Sequence[tuple[Any, str, Any]] = ()
+
+    def __add__(self, other: "Part") -> "Part":
+        """Both at once."""
+        return Part({**self.settings, **other.settings}, [*self.patches, *other.patches])
 
     @contextmanager
     def off(self) -> Iterator[Settings]:
@@ -88,6 +94,7 @@ _MUTATIONS = mutations
 
 PARTS = {
     "the whole engine": Part(),
+    "no automaton": Part(patches=[(predictions, "learn", lambda *_: None)]),
     "no direct search": Part({"trusted_share": 1.0}, [(surrogate, "choose_arm", _only("dynamics"))]),
     "no dynamics": Part(
         {"trial_share": 0.0, "trusted_error": 0.0}, [(surrogate, "choose_arm", _only("direct"))]
@@ -142,6 +149,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS, metavar="NAME")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
+    parser.add_argument("--without", choices=PARTS, default="the whole engine", metavar="PART")
     parser.add_argument("--parameterization", choices=["free", "fixed"], default="free")
     parser.add_argument("--seeds", type=int, nargs=2, default=(100, 109), metavar=("FIRST", "LAST"))
     parser.add_argument("--budget", type=int, default=60)
@@ -151,7 +159,7 @@ def main() -> None:
     print(f"| | {' | '.join(names)} | all | difference |\n|{'---|' * (len(names) + 3)}")
     whole = None
     for part in options.parts:
-        with PARTS[part].off() as settings:
+        with (PARTS[options.without] + PARTS[part]).off() as settings:
             counts = np.array([[count(p, settings, s, options.budget) for s in seeds] for p in problems])
         whole = counts if whole is None else whole
         cells = [*(_with_error(row) for row in counts), f"{counts.mean():.2f}"]
