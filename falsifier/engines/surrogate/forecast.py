@@ -25,7 +25,7 @@ _KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
     "nonlinear": FourierDynamics,
     "linear": DeviationDynamics,
 }
-SWITCHED = "switched"
+AUTOMATON = "automaton"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +98,8 @@ class Ensemble:
         self._fitted = {name: kind(stacked, best, self._settings, rng) for name, kind in _KINDS.items()}
         self._start = StartState(stacked.states[:, 0], stacked.inputs[:, 0])
         if automaton is not None:
-            self._fitted[SWITCHED] = automaton
-            self._errors.setdefault(SWITCHED, [automaton.error])
+            self._fitted[AUTOMATON] = automaton
+            self._errors.setdefault(AUTOMATON, [automaton.error])
         errors = self._recent_errors()
         if self.is_exact or (errors and rng.random() >= self._settings.exploration):
             self.chosen = min(errors, key=lambda name: errors[name])
@@ -109,12 +109,12 @@ class Ensemble:
     @property
     def is_exact(self) -> bool:
         """Whether there is an automaton, and recent simulations were nearly what it predicted."""
-        return self._recent_errors().get(SWITCHED, np.inf) < self._settings.exact_error
+        return self._recent_errors().get(AUTOMATON, np.inf) < self._settings.exact_error
 
     @property
     def is_surprised(self) -> bool:
         """Whether the last simulation was not what the automaton had predicted."""
-        return SWITCHED in self._fitted and self._errors[SWITCHED][-1] >= self._settings.surprise
+        return AUTOMATON in self._fitted and self._errors[AUTOMATON][-1] >= self._settings.surprise
 
     def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
         """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""
