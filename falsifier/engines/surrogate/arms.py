@@ -38,6 +38,12 @@ def flatness(costs: Sequence[float]) -> float:
     return float(counts.max() / len(costs))
 
 
+def has_lead(costs: Sequence[float]) -> bool:
+    """Return whether a cost is lower than the most common one."""
+    counts = np.unique(np.asarray(costs), return_counts=True)[1]
+    return bool(counts.argmax() > 0)
+
+
 def choose_arm(qualities: Mapping[str, float], rng: np.random.Generator, *, least: float) -> str:
     """Draw an arm; better ones are more likely, and each has a probability of about ``least`` or more."""
     names = list(qualities)

@@ -1,4 +1,4 @@
-"""Dynamics learnt from whole trajectories: one nonlinear and one linear kind.
+"""Dynamics learnt from whole trajectories: one nonlinear and one linear kind; ``switched`` has a third.
 
 Both predict, cell by cell, the next state and the excess of each leaf's envelope (see ``grid.Trace``) from
 the current state and input. The nonlinear dynamics use no earlier states. The linear dynamics predict
@@ -125,9 +125,7 @@ class FourierDynamics:
         waves *= np.float32(amplitude)
         phi[:, settings.features : -1] = 0.3 * z
         centre, unit = target.mean(axis=0), target.std(axis=0) + 1e-9
-        solution = _ridge(
-            phi, (target - centre) / unit, weight * rng.exponential(size=len(z)), settings.ridge
-        )
+        solution = ridge(phi, (target - centre) / unit, weight * rng.exponential(size=len(z)), settings.ridge)
         # For fast rollouts, all scalings are folded into two single-precision matrices.
         solution = solution * unit
         raw = frequencies / spread[:, None]
@@ -138,7 +136,7 @@ class FourierDynamics:
         )
         self._to_turns = to_turns.astype(np.float32)
         self._to_steps = np.ascontiguousarray(to_steps.T, dtype=np.float32)
-        self._low, self._high = _seen_range(states)
+        self._low, self._high = seen_range(states)
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
         """Predict m traces in single precision; arguments as in ``Dynamics.predict``."""
@@ -175,14 +173,14 @@ class DeviationDynamics:
         x = np.concatenate([part.reshape(len(part), -1) for part in lagged], axis=1)
         de = (excess[others] - self._base.excess)[rows] / self._excess_unit
         target = np.concatenate([dy[rows[0], rows[1] + lags], de], axis=1)
-        linear = _ridge(x, target, weight, settings.linear_ridge).T
+        linear = ridge(x, target, weight, settings.linear_ridge).T
         own, driving = np.split(linear, [lags * states.shape[2]], axis=1)
         # Rollouts in single precision: rounding is far below what the dynamics do not know.
         self._own, self._driving = (
             np.ascontiguousarray(part.reshape(len(linear), lags, -1), dtype=np.float32)
             for part in (own, driving)
         )
-        self._low, self._high = _seen_range(states)
+        self._low, self._high = seen_range(states)
 
     def _deviations(self, states: Array, inputs: Array) -> tuple[Array, Array]:
         """Return deviations in units of their spread, preceded by zeros for the lags."""
@@ -246,8 +244,18 @@ def _drawn(
     return places, weight if uniformly or weights.size <= count else np.ones(len(rows))
 
 
-def _ridge(x: Array, target: Array, weights: Array, strength: float) -> Array:
-    """Solve a weighted ridge regression; the strength is relative to the mean eigenvalue."""
+def ridge(x: Array, target: Array, weights: Array, strength: float) -> Array:
+    """Solve a weighted ridge regression; the strength is relative to the mean eigenvalue.
+
+    Args:
+        x: shape (rows, features).
+        target: shape (rows, k).
+        weights: shape (rows,).
+        strength: the ridge.
+
+    Returns:
+        Weights of the features, shape (features, k).
+    """
     root = np.sqrt(weights)[:, None].astype(x.dtype)
     weighted = x * root
     gram = (weighted.T @ weighted).astype(np.float64)
@@ -261,7 +269,7 @@ def _spread(deviations: Array) -> Array:
     return np.asarray(np.sqrt(np.diag(flat.T @ flat) / len(flat)))
 
 
-def _seen_range(states: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def seen_range(states: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the lowest and the highest state that is predicted, shape (n,) each."""
     # A copy by columns: along short rows, minima take ten times as long.
     columns = np.ascontiguousarray(_flat(states).T)

@@ -1,4 +1,4 @@
-"""All kinds of learnt dynamics: choice of the one to plan on, and correction by their past errors."""
+"""The kinds of learnt dynamics: choice of the one to plan on, and correction by their past errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,12 +18,14 @@ from falsifier.engines.surrogate.dynamics import (
 )
 from falsifier.engines.surrogate.objective import LeafValues, Objective
 from falsifier.engines.surrogate.settings import Settings
+from falsifier.engines.surrogate.switched import SwitchedDynamics, has_modes
 from falsifier.engines.surrogate.trace import Trace
 from falsifier.stl import Verdict
 
-_KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics]] = {
+_KINDS: dict[str, type[FourierDynamics] | type[DeviationDynamics] | type[SwitchedDynamics]] = {
     "nonlinear": FourierDynamics,
     "linear": DeviationDynamics,
+    "switched": SwitchedDynamics,
 }
 AUTOMATON = "automaton"
 
@@ -44,7 +46,7 @@ class Forecast:
 
 
 class Ensemble:
-    """Fits the kinds of dynamics, prefers the one with the smallest recent errors, and corrects its leaves.
+    """Fits all kinds of dynamics, prefers the one with the smallest recent errors, and corrects its leaves.
 
     The errors are those of predictions made before the simulation, not of the fit.
     """
@@ -83,19 +85,26 @@ class Ensemble:
         self,
         traces: Sequence[Trace],
         best: Sequence[int],
-        automaton: AutomatonDynamics | None,
         rng: np.random.Generator,
+        *,
+        automaton: AutomatonDynamics | None = None,
+        switched: bool = False,
     ) -> None:
-        """Fit to traces and choose the dynamics to plan on.
+        """Fit to traces, of which ``best`` have the lowest robustness, and choose the dynamics to plan on.
 
         Args:
-            traces: all simulations.
-            best: indices of those with the lowest robustness.
-            automaton: the automaton, if one explains the simulations.
+            traces: the traces.
+            best: indices of the best ones.
             rng: random generator.
+            automaton: the automaton, if one explains the traces.
+            switched: whether the times of mode changes matter, so that dynamics with modes are fitted, too.
         """
         stacked = Traces.of(traces)
-        self._fitted = {name: kind(stacked, best, self._settings, rng) for name, kind in _KINDS.items()}
+        self._fitted = {
+            name: kind(stacked, best, self._settings, rng)
+            for name, kind in _KINDS.items()
+            if name != "switched" or (switched and has_modes(stacked.states))
+        }
         self._start = StartState(stacked.states[:, 0], stacked.inputs[:, 0])
         if automaton is not None:
             self._fitted[AUTOMATON] = automaton
@@ -104,7 +113,7 @@ class Ensemble:
         if self.is_exact or (errors and rng.random() >= self._settings.exploration):
             self.chosen = min(errors, key=lambda name: errors[name])
         else:
-            self.chosen = str(rng.choice(list(_KINDS)))
+            self.chosen = str(rng.choice(list(self._fitted)))
 
     @property
     def is_exact(self) -> bool:

@@ -6,6 +6,7 @@ Importing this module imports numba, which the monitor has done by then.
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
 from falsifier.stl.numba_compilation import compiled
@@ -15,6 +16,8 @@ from falsifier.stl.numba_compilation import compiled
 _C0, _C1, _C2 = np.float32(0.999999211), np.float32(-19.7389804), np.float32(64.9286574)
 _C3, _C4, _C5 = np.float32(-85.2716215), np.float32(58.7904921), np.float32(-21.0711056)
 _HALF = np.float32(0.5)
+
+Ints = NDArray[np.intp]
 
 
 @partial(compiled, fastmath=True)
@@ -105,6 +108,73 @@ def roll_out_deviations(
             else:
                 for row in range(count):
                     excess[cell, out - n, row] = step[row]
+
+
+@partial(compiled, fastmath=True)
+def roll_out_modes(
+    factors: Ints,
+    mean: Array,
+    unit: Array,
+    steps: Array,
+    surfaces: Array,
+    ends: Ints,
+    followers: Ints,
+    low: Array,
+    high: Array,
+    inputs: Array,
+    modes: Ints,
+    states: Array,
+    excess: Array,
+) -> None:
+    """Predict m traces with dynamics that differ between modes and are linear in products.
+
+    Args:
+        factors: factors of each product among state, input and one, shape (p, degree).
+        mean: mean of state and input, shape (n + u,).
+        unit: their units, shape (n + u,).
+        steps: increments and excesses in each mode, shape (modes, p, n + leaves).
+        surfaces: where this sum of products is positive, a mode changes, shape (s, p).
+        ends: end of each mode's surfaces, shape (modes,).
+        followers: mode after each surface, shape (s,).
+        low: smallest states, shape (n,).
+        high: largest states, shape (n,).
+        inputs: shape (m, cells, u).
+        modes: shape (m, cells + 1); the first ones are given, the others are filled in.
+        states: shape (m, cells + 1, n); the first ones are given, the others are filled in.
+        excess: shape (m, cells, leaves), to be filled in.
+    """
+    count, cells, driven = inputs.shape
+    n, leaves = states.shape[2], excess.shape[2]
+    products, degree = factors.shape
+    known = np.ones(n + driven + 1)
+    z = np.empty(products)
+    for row in range(count):
+        for cell in range(cells):
+            for i in range(n):
+                known[i] = (states[row, cell, i] - mean[i]) / unit[i]
+            for i in range(n, n + driven):
+                known[i] = (inputs[row, cell, i - n] - mean[i]) / unit[i]
+            for p in range(products):
+                z[p] = known[factors[p, 0]]
+                for d in range(1, degree):
+                    z[p] *= known[factors[p, d]]
+            mode = after = modes[row, cell]
+            farthest = 0.0
+            for s in range(ends[mode - 1] if mode else 0, ends[mode]):
+                score = 0.0
+                for p in range(products):
+                    score += z[p] * surfaces[s, p]
+                if score > farthest:
+                    farthest, after = score, followers[s]
+            modes[row, cell + 1] = after
+            for out in range(n + leaves):
+                step = 0.0
+                for p in range(products):
+                    step += z[p] * steps[mode, p, out]
+                if out < n:
+                    states[row, cell + 1, out] = min(max(states[row, cell, out] + step, low[out]), high[out])
+                else:
+                    excess[row, cell, out - n] = step
 
 
 @compiled

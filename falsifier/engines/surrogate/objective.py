@@ -144,6 +144,8 @@ def make_objective(
     plain = coarse_formula(formula, grid.step, discrete=discrete)
     formulas = [plain]
     if any(leaf.discrete for leaf in plain.leaves):
-        formulas = [coarse_formula(formula, grid.step, discrete=discrete, stretch=s) for s in stretches]
+        relaxed = [coarse_formula(formula, grid.step, discrete=discrete, stretch=s) for s in stretches]
+        # Without inner windows, or with windows of the same number of cells, nothing is gained.
+        formulas = list(dict.fromkeys([plain, *relaxed]))
     count = len(plain.leaves)
     return Objective(space, grid, coordinates, tuple(formulas), (1.0,) * count, (0.0,) * count, constants)

@@ -43,7 +43,7 @@ class Settings:
             is preferred to the best one: extremes generalise better than fitted details.
         snap_decay: factor of snap after each simple input, so that the preference fades.
         stretches: factors of inner windows in the relaxations of a formula over discrete signals, whose
-            robustness alone has no slope.
+            robustness alone has no slope; so close to each other that a cell more or less makes a difference.
         bandit_window: number of recent proposals by which an arm is rated.
         bandit_power: power to which the share of costs that a proposal improves on is raised: an arm is rated
             by its best proposals.
@@ -69,6 +69,7 @@ class Settings:
         flat: share of simulations with the same cost from which on coverage leads the search.
         flat_start: minimum number of simulations for that.
         coverage_share: probability of coverage where it leads.
+        coverage_led_share: the same once a cost is lower than the most common one.
         aim_share: share of simulations that aim at levels which context files give, as long as these bring
             something new as often as the others do.
         most_aimed: maximum share of these.
@@ -105,7 +106,7 @@ class Settings:
     elites: int = 8
     snap: float = 0.5
     snap_decay: float = 0.5
-    stretches: tuple[float, ...] = (1.0, 1.4, 2.0, 3.0, 4.5, 7.0)
+    stretches: tuple[float, ...] = tuple(7.0 ** (i / 15) for i in range(16))
     bandit_window: int = 8
     bandit_power: float = 4.0
     trial: int = 8
@@ -126,6 +127,7 @@ class Settings:
     flat: float = 0.6
     flat_start: int = 4
     coverage_share: float = 0.8
+    coverage_led_share: float = 0.2
     aim_share: float = 0.3
     most_aimed: float = 0.7
     aim_trial: int = 16

@@ -15,7 +15,7 @@ from falsifier.engines.coverage import Explorer
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import Layout, planning_layout
 from falsifier.engines.surrogate.aims import Aims
-from falsifier.engines.surrogate.arms import choose_arm, flatness, quality
+from falsifier.engines.surrogate.arms import choose_arm, flatness, has_lead, quality
 from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
 from falsifier.engines.surrogate.direct import Seen, propose
 from falsifier.engines.surrogate.feasibility import Feasibility
@@ -225,8 +225,11 @@ class Surrogate:
         costs = self.history.direct_costs()
         is_flat = len(costs) >= settings.flat_start and flatness(costs) >= settings.flat
         # Where all outputs are continuous, the dynamics know how they leave a plateau.
-        if is_flat and self._explorer.has_modes and rng.random() < settings.coverage_share:
-            return "coverage"
+        if is_flat and self._explorer.has_modes:
+            # Once something is better than the plateau, that is a lead, too.
+            share = settings.coverage_led_share if has_lead(costs) else settings.coverage_share
+            if rng.random() < share:
+                return "coverage"
         if self._planned < settings.trial and rng.random() < settings.trial_share:
             return "dynamics"
         arms = [s.arm for s in self.history.samples]
@@ -290,9 +293,12 @@ class Surrogate:
     def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
         """Fit the dynamics; return the indices of the samples, those with the lowest robustness first."""
         samples = self.history.samples
-        order = np.argsort(scaled_costs(samples, self.history.scaled_objective()), kind="stable")
+        objective = self.history.scaled_objective()
+        order = np.argsort(scaled_costs(samples, objective), kind="stable")
         best = [int(i) for i in order[: self.settings.best_count]]
-        self.dynamics.fit([s.trace for s in samples], best, self.history.automaton(self.seed), rng)
+        traces = [s.trace for s in samples]
+        automaton = self.history.automaton(self.seed)
+        self.dynamics.fit(traces, best, rng, automaton=automaton, switched=objective.is_relaxed)
         return order
 
     def _search(self, rng: np.random.Generator) -> Pending:
@@ -300,6 +306,9 @@ class Surrogate:
         # What a predicate does in the rest of an inner window counts, too.
         rest = min(self._windows, default=0.0)
         decided = np.array([s.critical * horizon + rest for s in samples])
+        if self.history.scaled_objective().is_relaxed:
+            # A plateau is decided anywhere: relaxed formulas may be decided later.
+            decided[:] = horizon
         seen = Seen(self.history.points, np.array(self.history.direct_costs()), decided)
         risk = partial(self.feasibility.excess, self.layout) if self.feasibility.has_failures else None
         draw = propose(seen, self.layout, self.settings, rng, risk)

@@ -1,6 +1,6 @@
 import numpy as np
 
-from falsifier.engines.surrogate.arms import choose_arm, flatness, quality
+from falsifier.engines.surrogate.arms import choose_arm, flatness, has_lead, quality
 
 
 def test_arms_are_judged_by_their_latest_ranks() -> None:
@@ -32,3 +32,9 @@ def test_costs_are_flat_if_most_are_equal() -> None:
     assert flatness([]) == 0.0
     assert flatness([0.5, 0.5, -0.5, 0.5]) == 0.75
     assert flatness([0.1, 0.2, 0.3, 0.4]) == 0.25
+
+
+def test_a_cost_below_the_most_common_one_is_a_lead() -> None:
+    assert has_lead([0.5, 0.5, 0.4, 0.5])
+    assert not has_lead([0.5, 0.5, 0.6, 0.5])
+    assert not has_lead([0.5])

@@ -120,7 +120,7 @@ def test_uses_the_budget_up_without_a_false_claim_where_nothing_can_be_violated(
 
 
 def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
-    problem = switch_problem("G[0,7] (F[0,3] (mode == 0))")
+    problem = switch_problem("G[0,7] (mode == 0 or (F[0,1] (mode == 0)) or (G[0,3] (mode == 1)))")
     engine = make_engine("surrogate", problem, seed=0)
     assert isinstance(engine, Surrogate)
     (candidate,) = engine.ask()
@@ -130,6 +130,22 @@ def test_discrete_outputs_without_slope_are_searched_by_a_relaxation() -> None:
     assert history.objective is not None and history.objective.is_relaxed
     assert history.direct_costs() == [history.direct_cost(sample) for sample in history.samples]
     assert simulations_until_violation(problem, seed=1, budget=20) is not None
+
+
+@pytest.mark.parametrize(
+    ("formula", "relaxed"),
+    [
+        ("G[0,7] (mode == 0 or (G[0,1] (mode == 1)) or (F[0,3] (mode == 0)))", True),
+        ("G[0,7] (mode == 0)", False),
+    ],
+    ids=["inner window", "none"],
+)
+def test_dynamics_with_modes_are_planned_on_where_relaxing_helps(formula: str, relaxed: bool) -> None:
+    problem = switch_problem(formula)
+    engine = Surrogate(problem, seed=0, settings=replace(HASTY, coverage_share=0.0, trial=20))
+    asked = drive(engine, partial(evaluate, problem), rounds=20)
+    assert engine.history.objective is not None and engine.history.objective.is_relaxed == relaxed
+    assert any("the switched dynamics" in c.rationale for c in asked) == relaxed
 
 
 def test_coverage_leads_where_robustness_is_flat_and_only_there() -> None:
