@@ -30,7 +30,6 @@ from falsifier.engines.layout import Layout
 from falsifier.engines.surrogate import direct, forecast, history, planning, surrogate, trace
 from falsifier.engines.surrogate.automaton import predictions
 from falsifier.engines.surrogate.coordinates import Coordinates
-from falsifier.engines.surrogate.dynamics import DeviationDynamics, FourierDynamics
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import mutations, random_points
 from falsifier.evaluation.evaluate import evaluate
@@ -90,6 +89,11 @@ def _only(arm: str) -> Callable[..., str]:
     return lambda *_, **__: arm
 
 
+def _without_kind(name: str) -> Part:
+    kinds = {other: kind for other, kind in forecast._KINDS.items() if other != name}
+    return Part(patches=[(forecast, "_KINDS", kinds)])
+
+
 _MUTATIONS = mutations
 
 PARTS = {
@@ -103,8 +107,9 @@ PARTS = {
     "no constant ends in the direct search": Part({"direct_held": 0.0}),
     "independent instead of common pieces in the direct search": Part(patches=[(direct, "paced", _random)]),
     "arms rated by mean ranks": Part({"bandit_power": 1.0}),
-    "no linear dynamics": Part(patches=[(forecast, "_KINDS", {"nonlinear": FourierDynamics})]),
-    "no nonlinear dynamics": Part(patches=[(forecast, "_KINDS", {"linear": DeviationDynamics})]),
+    "no linear dynamics": _without_kind("linear"),
+    "no nonlinear dynamics": _without_kind("nonlinear"),
+    "no dynamics with modes": _without_kind("switched"),
     "best trajectories weigh as much as others": Part({"best_weight": 0.0}),
     "never the worse dynamics": Part({"exploration": 0.0}),
     "no offsets": Part({"offset_limit": 0.0}),
