@@ -41,8 +41,9 @@ class CornerWalk:
         self._costs[levels] = inf if cost is None else cost
 
     def heard(self, levels: Levels, cost: float) -> None:
-        """Learn the cost of a corner from a sample of someone else's, unless it has been tried."""
-        self._costs.setdefault(levels, cost)
+        """Learn the cost of a corner from a sample of someone else's, unless its own is known."""
+        if self._costs.get(levels, inf) == inf:
+            self._costs[levels] = cost
 
     @property
     def settled(self) -> bool:

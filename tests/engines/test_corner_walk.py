@@ -53,3 +53,17 @@ def test_a_corner_that_was_heard_of_is_built_upon_and_not_tried() -> None:
     walk.learn(first, 2.0)
     walk.heard(first, 0.5)
     assert walk.next(rng) == tuple(1 - level for level in first)
+
+
+def test_a_corner_that_is_pending_may_be_heard_of() -> None:
+    walk = CornerWalk(2)
+    rng = np.random.default_rng(0)
+    first = walk.next(rng)
+    assert first is not None
+    walk.heard(first, -5.0)
+    second = walk.next(rng)
+    assert second is not None
+    walk.learn(second, 3.0)
+    third = walk.next(rng)
+    assert third is not None
+    assert sum(a != b for a, b in zip(first, third, strict=True)) == 1, "the best one is built upon"
