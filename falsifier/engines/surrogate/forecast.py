@@ -1,6 +1,7 @@
 """The kinds of learnt dynamics: choice of the one to plan on, and correction by their past errors."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +81,12 @@ class Ensemble:
                 break
             count += 1
         return count
+
+    def copy(self) -> "Ensemble":
+        """Return a copy that can be fitted without this one."""
+        other = copy(self)
+        other._errors = {name: list(errors) for name, errors in self._errors.items()}
+        return other
 
     def fit(
         self,

@@ -107,6 +107,10 @@ class History:
             self._scaled = self.objective.rescaled([s.values for s in self.samples])
         return self._scaled
 
+    def copy(self) -> "History":
+        """Return a copy whose automaton can be learnt without this one's; samples are shared."""
+        return replace(self, learner=replace(self.learner))
+
     def automaton(self, seed: int) -> AutomatonDynamics | None:
         """Return the automaton that explains the samples, or None; the seed is for its learning."""
         return self.learner.current(self.scaled_objective(), np.random.default_rng([seed, len(self.samples)]))

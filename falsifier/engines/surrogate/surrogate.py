@@ -1,6 +1,7 @@
 """The surrogate engine: learn the dynamics, plan on them, simulate, refit."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
@@ -115,13 +116,17 @@ class Surrogate:
         """Return the verdicts that the better dynamics predict for candidates, without simulating them.
 
         The robustness is in the requirement's own unit. The list is empty until two simulations are known.
+        It changes nothing: what is asked next is the same without it.
         """
         if len(self.history.samples) < 2 or not candidates:
             return []
         rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
-        self._fit(rng)
+        # A copy learns: an automaton from these samples, and trust in it, would change what is asked next.
+        other = copy(self)
+        other.dynamics, other.history = self.dynamics.copy(), self.history.copy()
+        other._fit(rng)
         points = np.array([self.layout.point(c) for c in candidates])
-        return self.dynamics.verdicts(self.layout, self.history.scaled_objective(), points)
+        return other.dynamics.verdicts(self.layout, other.history.scaled_objective(), points)
 
     @property
     def recent_error(self) -> float:

@@ -9,6 +9,7 @@ from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import planning_layout
+from falsifier.engines.surrogate import Settings, Surrogate
 from falsifier.engines.surrogate.automaton.automaton import learn
 from falsifier.engines.surrogate.automaton.predictions import AutomatonLearner
 from falsifier.engines.surrogate.history import History
@@ -93,6 +94,24 @@ def test_simulations_with_many_events_are_kept() -> None:
     lively = [r.kinks for r, _ in history(problem, 3).learner._heard if r.kinks > again]
     assert lively
     assert set(lively) <= set(kept)
+
+
+def test_foresight_learns_nothing_for_later() -> None:
+    problem = puck_problem("G[0,28] (F[0,2] (x <= 0.85))")
+    settings = Settings(trial_share=0.0, constants=0, probes=0, bangs=0)
+    one, other = (Surrogate(problem, seed=0, settings=settings) for _ in range(2))
+    for u in driven(6):
+        told = evaluate(problem, one.layout.candidate(u, origin="t", rationale="t"))
+        one.tell([told])
+        other.tell([told])
+        one.foresee([told.candidate])
+    assert one.is_trusted == other.is_trusted
+    for _ in range(4):
+        (asked,), (same,) = one.ask(), other.ask()
+        assert asked.key == same.key
+        evaluation = evaluate(problem, asked)
+        one.tell([evaluation])
+        other.tell([evaluation])
 
 
 def test_what_is_too_large_is_not_kept() -> None:
