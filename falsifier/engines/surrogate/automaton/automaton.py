@@ -16,6 +16,8 @@ from falsifier.engines.surrogate.automaton.recording import Motion, Recording
 MOST_OUTPUTS = 20
 # A step of a roll-out takes so many output intervals at most, and this share of the fastest time constant.
 _STEP, _TURN = 20, 0.3
+# Largest rate of a law times the output interval: what is faster cannot be seen at the outputs.
+_FASTEST = 1.0
 # Events that a trajectory may have before its samples are thinned out.
 _MOST_EVENTS = 20_000
 
@@ -111,4 +113,5 @@ def learn(recordings: Sequence[Recording], rng: np.random.Generator) -> Automato
             if piece.start == 0 and label >= 0
         ]
         start[i] = np.bincount(early).argmax() if early else 0
-    return Automaton(laws, tuple(guards), start, recordings[0].step)
+    automaton = Automaton(laws, tuple(guards), start, recordings[0].step)
+    return automaton if automaton._fastest * automaton.interval <= _FASTEST else None

@@ -1,7 +1,11 @@
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from falsifier.engines.surrogate.automaton.automaton import learn
+from falsifier.engines.surrogate.automaton.modes import Modes, find_modes
 from falsifier.engines.surrogate.automaton.recording import Recording
 from tests.engines.surrogate.automaton.support import CELL, CONVOY, PUCK, STEP, System, driven
 
@@ -33,3 +37,18 @@ def test_noise_on_events_is_refused() -> None:
         Recording(r.step, r.outputs + 1e-3 * rng.standard_normal(r.outputs.shape), r.inputs) for r in true
     ]
     assert learn(noisy, rng) is None
+
+
+def test_laws_faster_than_the_output_interval_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from falsifier.engines.surrogate.automaton import automaton
+
+    def hasty(*arguments: Any) -> Modes | None:
+        found = find_modes(*arguments)
+        assert found is not None
+        laws = found.laws.copy()
+        laws[:, 1] = -1e9
+        return replace(found, laws=laws)
+
+    monkeypatch.setattr(automaton, "find_modes", hasty)
+    # A roll-out would take 1e11 steps.
+    assert learn([PUCK.solve(u) for u in driven(3)], np.random.default_rng(0)) is None
