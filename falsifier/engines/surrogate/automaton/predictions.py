@@ -24,6 +24,8 @@ _FEWEST_SAMPLES, _MOST_SAMPLES = 10, 100_000
 _MOST_DOUBTS = 12
 # An automaton is used if its error on the simulations it was learnt from is at most this share of the spread.
 _BELIEVED = 0.05
+# Largest size of a predicted output or error.
+_FARTHEST = 1e100
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +55,8 @@ class AutomatonDynamics:
 
     def _trace(self, inputs: Array, outputs: Array, velocities: Array) -> tuple[Array, Array]:
         samples, first = self.automaton.trajectory(inputs, outputs, velocities, self.objective.grid.step)
+        # What escapes to infinity stays finite, so that it can be compared and scaled.
+        samples = np.clip(np.nan_to_num(samples, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
         states = self.objective.coordinates.transformed(samples[first])
         held = np.repeat(inputs, np.diff(first), axis=0)
         margins = self.objective.margins(samples, np.concatenate([held, held[-1:]]))
@@ -148,7 +152,5 @@ def _error(dynamics: AutomatonDynamics, traces: Sequence[Trace]) -> float:
     true = np.stack([t.states for t in traces])
     predicted = dynamics.predict(inputs, true[:, 0]).states
     spread = true.std(axis=(0, 1)) + 1e-9 * np.abs(true).max(axis=(0, 1), initial=0.0) + 1e-300
-    difference = (predicted - true) / spread
-    if not np.isfinite(difference).all():
-        return float("inf")
+    difference = (predicted - true).clip(-_FARTHEST * spread, _FARTHEST * spread) / spread
     return float(np.median(np.sqrt(np.mean(difference**2, axis=(1, 2)))))

@@ -10,7 +10,7 @@ from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.engines.grid import Grid
 from falsifier.engines.layout import planning_layout
 from falsifier.engines.surrogate import Settings, Surrogate
-from falsifier.engines.surrogate.automaton.automaton import learn
+from falsifier.engines.surrogate.automaton.automaton import Automaton, learn
 from falsifier.engines.surrogate.automaton.predictions import AutomatonLearner
 from falsifier.engines.surrogate.history import History
 from falsifier.evaluation.evaluate import evaluate
@@ -77,6 +77,40 @@ def test_one_that_does_not_repeat_its_simulations_is_not_believed(monkeypatch: p
 
     monkeypatch.setattr(predictions, "learn", wrong)
     assert history(puck_problem(), 3).automaton(seed=0) is None
+
+
+def escaping(automaton: Automaton, stiffness: float) -> Automaton:
+    """Unstable, and without walls."""
+    laws = automaton.laws.copy()
+    laws[:, :, 2] = stiffness
+    never = replace(automaton.guards[0], source=1)
+    return replace(automaton, laws=laws, guards=(never,))
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("stiffness", [400.0, 4000.0])
+def test_one_that_escapes_to_infinity_is_not_believed(
+    stiffness: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from falsifier.engines.surrogate.automaton import predictions
+
+    def wrong(*arguments: object) -> object:
+        automaton = learn(*arguments)  # type: ignore[arg-type]
+        return None if automaton is None else escaping(automaton, stiffness)
+
+    monkeypatch.setattr(predictions, "learn", wrong)
+    assert history(puck_problem(), 3).automaton(seed=0) is None
+
+
+def test_predictions_that_escape_to_infinity_can_be_compared() -> None:
+    known = history(puck_problem(), 3)
+    learnt = known.automaton(seed=0)
+    assert learnt is not None
+    wrong = replace(learnt, automaton=escaping(learnt.automaton, 4000.0))
+    trace = known.samples[0].trace
+    predicted = wrong.predict(trace.inputs[None], trace.states[None, 0])
+    assert np.isfinite(predicted.states).all()
+    assert np.isfinite(predicted.excess).all()
 
 
 def test_simulations_with_many_events_are_kept() -> None:
