@@ -59,6 +59,8 @@ class Ensemble:
         self._missed: list[bool] = []
         self._fitted: dict[str, Dynamics] = {}
         self._start: StartState | None = None
+        self._surprised = False
+        self._load = 0.0
         self.chosen = ""
 
     @property
@@ -116,6 +118,7 @@ class Ensemble:
         if automaton is not None:
             self._fitted[AUTOMATON] = automaton
             self._errors.setdefault(AUTOMATON, [automaton.error])
+        self._load = automaton.load if automaton is not None else 0.0
         errors = self._recent_errors()
         if self.is_exact or (errors and rng.random() >= self._settings.exploration):
             self.chosen = min(errors, key=lambda name: errors[name])
@@ -130,7 +133,12 @@ class Ensemble:
     @property
     def is_surprised(self) -> bool:
         """Whether the last simulation was not what the automaton had predicted."""
-        return AUTOMATON in self._fitted and self._errors[AUTOMATON][-1] >= self._settings.surprise
+        return self._surprised
+
+    @property
+    def load(self) -> float:
+        """How long a roll-out of the automaton takes, compared with a usual one; 0 without one."""
+        return self._load
 
     def predictor(self, layout: Layout, objective: Objective) -> Callable[[Array], Array]:
         """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""
@@ -156,6 +164,9 @@ class Ensemble:
         """Record the errors of a forecast, given the simulated values of the leaves."""
         for name, values in forecast.values.items():
             self._errors.setdefault(name, []).append(_error(objective, values, true))
+        # Only a prediction that the automaton made can surprise.
+        foretold = AUTOMATON in forecast.values
+        self._surprised = foretold and self._errors[AUTOMATON][-1] >= self._settings.surprise
         self._missed.append(forecast.cost < 0 and not violated)
         self._deltas.append(_deltas(objective, forecast.values[forecast.chosen], true))
 

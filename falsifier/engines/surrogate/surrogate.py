@@ -285,7 +285,8 @@ class Surrogate:
         settings = self.settings
         if not self.dynamics.is_exact:
             return settings
-        pool, children = (round(settings.exact_share * n) for n in (settings.pool, settings.children))
+        share = settings.exact_share / max(self.dynamics.load, 1.0)
+        pool, children = (max(round(share * n), settings.parents) for n in (settings.pool, settings.children))
         return replace(settings, pool=pool, children=children)
 
     def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:

@@ -45,6 +45,10 @@ class Automaton:
         damping = np.abs(self.laws[:, :, 1]) + np.abs(self.laws[:, :, 3 + driven :]).sum(axis=2)
         return max(float((damping + np.sqrt(np.abs(self.laws[:, :, 2]))).max()), 1e-12)
 
+    def steps(self, cell: float) -> int:
+        """Return the number of steps that a roll-out takes in a cell of this length in s."""
+        return max(1, math.ceil(cell / min(_STEP * self.interval, _TURN / self._fastest) - 1e-9))
+
     def trajectory(
         self, inputs: Array, outputs: Array, velocities: Array, cell: float
     ) -> tuple[Array, NDArray[np.intp]]:
@@ -62,7 +66,7 @@ class Automaton:
         """
         from falsifier.engines.surrogate.automaton.kernel import roll_out
 
-        steps = max(1, math.ceil(cell / min(_STEP * self.interval, _TURN / self._fastest) - 1e-9))
+        steps = self.steps(cell)
         samples = np.empty((len(inputs) * steps + _MOST_EVENTS, len(outputs)))
         first = np.empty(len(inputs) + 1, np.intp)
         integers = np.array([(g.output, g.source, g.target, g.high, g.low) for g in self.guards], np.intp)

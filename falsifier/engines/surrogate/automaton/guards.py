@@ -20,6 +20,8 @@ _MOST_EVENTS, _KNOWN = 200, 5
 _MOST_OF_THEM = 0.8
 # Spread of a guard's value at its events, as a share of its spread at all times.
 _SHARPNESS = 0.01
+# Samples of a recording by which the latter is judged.
+_SPREAD_SAMPLES = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +114,7 @@ def _events(recordings: Sequence[Recording], motion: Motion, modes: Modes) -> It
         time = _meeting(ahead - behind, least)
         is_near = time is not None and abs(time) <= _NEAR * recording.step
         time = time if time is not None and is_near else 0.0
-        old, new = (float(np.polyval(np.polyder(part), time)) for part in (ahead, behind))
+        old, new = (float(2 * part[0] * time + part[1]) for part in (ahead, behind))
         is_located = is_near and abs(new - old) > least
         if is_located or source != target:
             yield _Event(
@@ -120,7 +122,7 @@ def _events(recordings: Sequence[Recording], motion: Motion, modes: Modes) -> It
                 middle + time,
                 int(source),
                 int(target),
-                float(np.polyval(ahead, time)),
+                float(ahead[2] + time * (ahead[1] + time * ahead[0])),
                 old,
                 new,
                 is_located,
@@ -136,7 +138,7 @@ def _meeting(difference: Array, least: float) -> float | None:
         slope = 2 * difference[0] * time + difference[1]
         if slope == 0.0:
             return None
-        time -= float(np.polyval(difference, time)) / slope
+        time -= float(difference[2] + time * (difference[1] + time * difference[0])) / slope
     return time
 
 
@@ -206,7 +208,6 @@ def _reset(before: Array, after: Array) -> tuple[float, float]:
 
 def _spread(recordings: Sequence[Recording], high: int, low: int) -> float:
     """Return the interquartile range of an output or a difference of two at all times."""
-    values = np.concatenate(
-        [r.outputs[:, high] - (r.outputs[:, low] if low >= 0 else 0.0) for r in recordings]
-    )
+    parts = [r.outputs[:: 1 + len(r.outputs) // _SPREAD_SAMPLES] for r in recordings]
+    values = np.concatenate([part[:, high] - (part[:, low] if low >= 0 else 0.0) for part in parts])
     return float(np.subtract(*np.percentile(values, [75, 25]))) + 1e-9 * float(np.abs(values).max()) + 1e-300

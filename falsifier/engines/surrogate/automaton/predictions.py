@@ -24,6 +24,8 @@ _FEWEST_SAMPLES, _MOST_SAMPLES = 10, 100_000
 _MOST_DOUBTS = 12
 # An automaton is used if its error on the simulations it was learnt from is at most this share of the spread.
 _BELIEVED = 0.05
+# Steps and events of a roll-out, times outputs, that take half a millisecond.
+_USUAL_LOAD = 10_000
 # Largest size of a predicted output or error.
 _FARTHEST = 1e100
 
@@ -37,12 +39,14 @@ class AutomatonDynamics:
         objective: what the predictions are for.
         start: outputs and velocities at the start.
         error: median error on what it was learnt from, see ``_error``.
+        load: how long a roll-out takes, compared with the usual half a millisecond.
     """
 
     automaton: Automaton
     objective: Objective
     start: StartState
-    error: float = 0.0
+    error: float
+    load: float
 
     def predict(self, inputs: Array, start: Array) -> Prediction:
         """Predict m traces; the start states are not used, as the automaton has its own."""
@@ -55,8 +59,7 @@ class AutomatonDynamics:
 
     def _trace(self, inputs: Array, outputs: Array, velocities: Array) -> tuple[Array, Array]:
         samples, first = self.automaton.trajectory(inputs, outputs, velocities, self.objective.grid.step)
-        # What escapes to infinity stays finite, so that it can be compared and scaled.
-        samples = np.clip(np.nan_to_num(samples, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
+        samples = _finite(samples)
         states = self.objective.coordinates.transformed(samples[first])
         held = np.repeat(inputs, np.diff(first), axis=0)
         margins = self.objective.margins(samples, np.concatenate([held, held[-1:]]))
@@ -118,10 +121,13 @@ class AutomatonLearner:
             return None
         firsts = np.stack([np.concatenate([r.outputs[0], r.starting_velocity]) for r in recordings])
         start = StartState(firsts, np.stack([t.inputs[0] for t in traces]))
-        dynamics = AutomatonDynamics(automaton, objective, start)
-        error = _error(dynamics, traces)
+        error = _error(automaton, objective, recordings)
         if error <= _BELIEVED:
-            self.learnt = AutomatonDynamics(automaton, objective, start, error)
+            grid = objective.grid
+            events = sum(r.kinks for r in recordings) / len(recordings)
+            steps = grid.cells * automaton.steps(grid.step) + events
+            load = steps * len(automaton.laws) / _USUAL_LOAD
+            self.learnt = AutomatonDynamics(automaton, objective, start, error, load)
         return self.learnt
 
 
@@ -143,14 +149,26 @@ def _recording(
     )
 
 
-def _error(dynamics: AutomatonDynamics, traces: Sequence[Trace]) -> float:
-    """Return the coordinates' root mean square error as a share of their spread: the traces' median.
+def _error(automaton: Automaton, objective: Objective, recordings: Sequence[Recording]) -> float:
+    """Return the coordinates' root mean square error as a share of their spread: the recordings' median.
 
-    The median, as a few may enter modes that were too rare to be learnt.
+    The median, as a few may enter modes that were too rare to be learnt. The inputs are those at the
+    samples, as they may switch within a cell.
     """
-    inputs = np.stack([t.inputs for t in traces])
-    true = np.stack([t.states for t in traces])
-    predicted = dynamics.predict(inputs, true[:, 0]).states
-    spread = true.std(axis=(0, 1)) + 1e-9 * np.abs(true).max(axis=(0, 1), initial=0.0) + 1e-300
-    difference = (predicted - true).clip(-_FARTHEST * spread, _FARTHEST * spread) / spread
-    return float(np.median(np.sqrt(np.mean(difference**2, axis=(1, 2)))))
+    true = [objective.coordinates.transformed(r.outputs) for r in recordings]
+    everything = np.concatenate(true)
+    spread = everything.std(axis=0) + 1e-9 * np.abs(everything).max(axis=0, initial=0.0) + 1e-300
+    errors = []
+    for recording, states in zip(recordings, true, strict=True):
+        samples, first = automaton.trajectory(
+            recording.inputs[:-1], recording.outputs[0], recording.starting_velocity, recording.step
+        )
+        predicted = objective.coordinates.transformed(_finite(samples[first]))
+        difference = (predicted - states).clip(-_FARTHEST * spread, _FARTHEST * spread) / spread
+        errors.append(float(np.sqrt(np.mean(difference**2))))
+    return float(np.median(errors))
+
+
+def _finite(outputs: Array) -> Array:
+    """Return outputs with large numbers for what escapes to infinity: these can be compared and scaled."""
+    return np.clip(np.nan_to_num(outputs, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
