@@ -80,7 +80,10 @@ def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
 
 
 def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds: float) -> Array:
-    """Return one point: all inputs change at the same times and keep their last levels; shape (d,).
+    """Return one point: all inputs change together and keep their last levels; shape (d,).
+
+    Together means at the same share of the control points of each, which is the same time if these cover the
+    same time.
 
     Each order of magnitude of a piece's length is equally likely, so that short pulses, after which nothing
     changes any more, are as likely as slow changes. Parameters get any values: extremes are tried anyway.
