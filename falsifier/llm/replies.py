@@ -385,8 +385,8 @@ def _unrolled(values: list[float | str]) -> list[float]:
             if len(numbers) + count > _LONGEST_RUN:
                 raise RejectedReplyError(f"{value!r} makes the signal longer than {_LONGEST_RUN} values")
             numbers.extend([float(run[1])] * int(count))
-        elif _NUMBER.fullmatch(value.strip()):
-            numbers.append(float(value))
+        elif _NUMBER.fullmatch(number := value.strip()):
+            numbers.append(float(number))
         else:
             raise RejectedReplyError(f"{value!r} is neither a number nor a run such as '0 x 187'")
     return numbers

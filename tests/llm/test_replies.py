@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from falsifier.core.signals import Signal
@@ -265,6 +265,7 @@ anything = st.recursive(
 
 @settings(max_examples=100)
 @given(st.dictionaries(keys, anything, max_size=4), st.booleans())
+@example({"point": ["0\x1f"]}, False)
 def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
     try:
         found = ReplyForm(SPACE, free=free).read(json.dumps(reply))
