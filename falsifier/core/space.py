@@ -52,7 +52,7 @@ class InputRange:
 
     Attributes:
         name: the input's name in the model.
-        low: lower bound in the input's unit.
+        low: lower bound in the input's unit; the next allowed number, unless reals are.
         high: upper bound.
         control_points: number of evenly spaced control points of the fixed parameterization.
         interpolation: interpolation between the control points.
@@ -98,7 +98,7 @@ class ParameterRange:
 
     Attributes:
         name: the parameter's name in the model.
-        low: lower bound in the parameter's unit.
+        low: lower bound in the parameter's unit; the next allowed number, unless reals are.
         high: upper bound.
         nominal: its value if it is not searched, if known.
         unit: its unit, empty if unknown.
@@ -312,10 +312,14 @@ def _check_range(what: str, ranged: InputRange | ParameterRange) -> None:
     one_of(f"{what}: kind", ranged.kind, get_args(ValueKind))
     if ranged.kind == "real":
         return
-    numbers = [n for _, n in ranged.items if low <= n <= high] if ranged.items else floor(high) >= ceil(low)
+    possible = [n for _, n in ranged.items] or [ceil(low), floor(high)]
+    numbers = [n for n in possible if low <= n <= high]
     if not numbers:
         missing = "item of the enumeration" if ranged.items else "integer"
         raise SpecError(f"{what}: [{low:g}, {high:g}] contains no {missing}; widen the range")
+    # Engines try the bounds, so these must be numbers that are allowed.
+    object.__setattr__(ranged, "low", float(min(numbers)))
+    object.__setattr__(ranged, "high", float(max(numbers)))
 
 
 def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:

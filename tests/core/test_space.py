@@ -95,7 +95,7 @@ GEAR = InputRange(
 COUNT = ParameterRange("count", 0.5, 3.5, kind="integer")
 
 
-@given(st.floats(1, 7), st.floats(0.5, 3.5))
+@given(st.floats(1, 7), st.floats(1, 3))
 def test_whole_numbers_are_admitted_whole(gear: float, count: float) -> None:
     space = SearchSpace((GEAR,), (COUNT,), 10.0)
     candidate = space.decode([gear, 1.0, 7.0, count])
@@ -109,6 +109,13 @@ def test_the_nearest_item_is_taken() -> None:
     space = SearchSpace((GEAR,), (COUNT,), 10.0)
     assert space.decode([1.9, 2.1, 5.2, 2.6]).signals["gear"].values == (1.0, 3.0, 7.0)
     assert space.decode([1.9, 2.1, 5.2, 2.6]).parameters["count"] == 3.0
+
+
+def test_bounds_are_allowed_numbers() -> None:
+    count = ParameterRange("count", 0.5, 3.7, kind="integer")
+    assert (count.low, count.high) == (1.0, 3.0)
+    gear = InputRange("gear", 1.5, 8.0, kind="enumeration", items=(("d", 7), ("r", 1), ("n", 3)))
+    assert (gear.low, gear.high) == (3.0, 7.0)
 
 
 def test_whole_numbers_are_not_interpolated_freely() -> None:
