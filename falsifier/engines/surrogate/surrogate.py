@@ -30,6 +30,9 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 
+# Random points among which one that was not simulated is looked for, where all other ideas were.
+_DRAWS = 100
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pending:
@@ -171,6 +174,8 @@ class Surrogate:
             if self._objection(pending) == 0.0:
                 break
             pending = min(pending, self._propose(rng), key=self._objection)
+        if self._is_repeated(pending):
+            pending = self._unseen(rng) or pending
         self._asked += 1
         candidate = self.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
         self._pending[candidate.key] = pending
@@ -181,8 +186,17 @@ class Surrogate:
 
         Plans repeat nothing unless all has been tried.
         """
-        is_repeated = pending.forecast is None and is_seen(pending.point, self._tried)
-        return self._risk(pending) + is_repeated
+        return self._risk(pending) + self._is_repeated(pending)
+
+    def _is_repeated(self, pending: Pending) -> bool:
+        return pending.forecast is None and is_seen(pending.point, self._tried)
+
+    def _unseen(self, rng: np.random.Generator) -> Pending | None:
+        """Return a random point that has not been simulated; None if all draws have been."""
+        points = self.layout.settled(rng.random((_DRAWS, self.layout.dimension)))
+        tried = self._tried
+        point = next((p for p in points if not is_seen(p, tried)), None)
+        return None if point is None else Pending("random", point, "random: all other ideas were simulated")
 
     @property
     def _tried(self) -> Array:
