@@ -2,6 +2,7 @@
 
 Returning before exploring is the idea of Go-Explore (Ecoffet et al., Nature 590 (2021) 580-586). Preferring
 what is rare is the power schedule of coverage-guided fuzzers (Böhme et al., IEEE TSE 45 (2019) 489-506).
+Values at which something happened are used again, as these fuzzers do with a dictionary.
 Systems are causal: inputs that stay the same up to a time do what they did until then.
 """
 
@@ -56,6 +57,7 @@ class Explorer:
     def __init__(self, problem: Problem, layout: Layout) -> None:
         self._marker = Marker.of(problem)
         self._programs = Programs(layout)
+        self._interval = problem.experiment.output_interval
         levels: dict[str, list[float]] = defaultdict(list)
         searched = problem.space.names
         for level in (found for found in problem.context.levels if found.signal in searched):
@@ -89,6 +91,8 @@ class Explorer:
             known = self._reached.get(mark)
             if known is None:
                 self._by_source[mark.source].append(mark)
+            if known is None and mark.what[0] == "changes" and mark.source in self._marker.kinds:
+                self._programs.remember(point, time, self._interval)
             if known is None or time < 0.95 * known.time:
                 self._reached[mark] = Reached(point, time, known.tries if known else 0)
         return any(source == MODES or source in self._marker.kinds for source in new)

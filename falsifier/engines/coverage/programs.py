@@ -20,6 +20,8 @@ _KEPT = 0.25
 _AIMED = 0.7
 # Of these, the share that is exactly at a level.
 _EXACT = 0.15
+# Share of values that are some at which something happened before, and how many of these are kept.
+_TELLING, _MOST_TELLING = 0.5, 64
 # Probability that a parameter is drawn again: nothing of what followed is certain then.
 _PARAMETER_REDRAWN = 0.1
 
@@ -39,6 +41,7 @@ class Programs:
         ranges: tuple[InputRange | ParameterRange, ...] = (*space.inputs, *space.parameters)
         self._levels = [_levels(r) for r in ranges]
         self._cuts = [_cuts(r, levels.get(r.name, ())) for r in ranges]
+        self._telling: list[list[float]] = [[] for _ in ranges]
         self._times = [np.asarray(coding.times) for coding in layout.codings]
         self._longest = max((len(times) for times in self._times), default=1)
 
@@ -46,6 +49,24 @@ class Programs:
     def has_inputs(self) -> bool:
         """Whether anything is an input over time."""
         return bool(self._times)
+
+    def remember(self, point: Array, time: float, interval: float) -> None:
+        """Remember the values that real inputs had when something happened, except bounds.
+
+        Args:
+            point: the program, shape (d,).
+            time: when it was seen, in s.
+            interval: time in s between two outputs: it may have happened so much earlier.
+        """
+        for j, times in enumerate(self._times):
+            if self._levels[j] is not None:
+                continue
+            known, values = self._telling[j], point[self._layout.groups[j]]
+            for at in (time - interval, time):
+                value = float(values[max(0, int(np.searchsorted(times, at, side="right")) - 1)])
+                if 0.0 < value < 1.0 and value not in known:
+                    known.append(value)
+            del known[:-_MOST_TELLING]
 
     def fresh(self, rng: np.random.Generator) -> Array:
         """Return a new program, shape (d,)."""
@@ -150,6 +171,8 @@ class Programs:
         if levels is not None:
             others = levels if last is None or len(levels) < 2 else levels[np.abs(levels - last) > 1e-9]
             return float(rng.choice(others))
+        if self._telling[j] and rng.random() < _TELLING:
+            return float(rng.choice(self._telling[j]))
         cuts = self._cuts[j]
         if len(cuts) and rng.random() < _AIMED:
             if rng.random() < _EXACT:

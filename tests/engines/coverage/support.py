@@ -1,4 +1,4 @@
-"""A lock that opens after a sequence of inputs, which its robustness does not show."""
+"""A lock and a safe that open after a sequence of inputs, which their robustness does not show."""
 
 from collections.abc import Mapping
 
@@ -14,8 +14,10 @@ from falsifier.stl import parse
 Array = NDArray[np.float64]
 STOP_TIME, INTERVAL = 10.0, 0.1
 CODE = (3, 1, 4, 2, 5, 1, 3)
-# A key counts if the previous one was pressed at most this long ago, in s.
+# A key or a turn counts if the previous one was at most this long ago, in s.
 PATIENCE = 1.2
+BANDS = ((2.1, 2.2), (0.7, 0.8))
+TURNS = 6
 
 
 def lock(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
@@ -33,6 +35,37 @@ def lock(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -
         last = key
         shown[k], opened[k] = done, done == len(CODE)
     return {"stage": shown, "open": opened}
+
+
+def safe(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Count how often the dial went from one narrow band to the other in time; six turns open the safe."""
+    turns, since = 0, 0.0
+    shown, opened = np.zeros(len(times)), np.zeros(len(times))
+    for k, dial in enumerate(inputs["dial"].tolist()):
+        since += INTERVAL
+        low, high = BANDS[turns % 2]
+        if low < dial < high and turns < TURNS:
+            turns, since = turns + 1, 0.0
+        elif since > PATIENCE and turns < TURNS:
+            turns = 0
+        shown[k], opened[k] = turns, turns == TURNS
+    return {"turns": shown, "open": opened}
+
+
+def safe_problem() -> Problem:
+    """The safe must never open; each band is a thirtieth of the dial's range."""
+    dial = InputRange("dial", 0.0, 3.0, interpolation="constant", free=Freedom(100, 0.1))
+    variables = (
+        Variable("dial", causality="input", low=0.0, high=3.0, start=0.0),
+        Variable("turns", causality="output", kind="integer", type="Int32"),
+        Variable("open", causality="output", kind="boolean", type="Boolean"),
+    )
+    return Problem(
+        FunctionModel(safe, ModelInfo("safe", "A safe.", variables=variables)),
+        Requirement("SAFE", parse("G[0,10] (open < 0.5)")),
+        SearchSpace((dial,), (), STOP_TIME),
+        Experiment(STOP_TIME, INTERVAL, ("turns", "open")),
+    )
 
 
 def lock_problem(*, points: int = 20, free: Freedom | None = None) -> Problem:

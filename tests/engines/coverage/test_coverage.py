@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.core.space import Freedom
 from falsifier.search.run import falsify
-from tests.engines.coverage.support import lock_problem
+from tests.engines.coverage.support import lock_problem, safe_problem
 from tests.engines.support import NamedEngine
 
 # Of uniform inputs one in 3600 opens the lock: a tenth of that is what the engine may use at most.
@@ -20,3 +20,8 @@ def test_a_sequence_that_robustness_does_not_show_is_found_step_by_step(
 ) -> None:
     result = falsify(lock_problem(free=free), "coverage", seed=seed, budget=TENTH)
     assert result.falsified
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_values_in_narrow_bands_are_used_again_once_they_are_found(seed: int) -> None:
+    assert falsify(safe_problem(), "coverage", seed=seed, budget=100).falsified

@@ -98,3 +98,17 @@ def test_values_are_drawn_between_levels_that_are_known() -> None:
     assert inside[0] > 0.15
     assert inside[1] < 0.02
     assert np.mean(aimed == 0.0) > 0.05, "bounds are still tried"
+
+
+def test_values_at_which_something_happened_are_used_again() -> None:
+    layout = layout_of(inputs=2)
+    programs = Programs(layout)
+    point = np.full(layout.dimension, 0.7)
+    first, second = layout.groups[:2]
+    point[first[:10]], point[second] = 0.3, 1.0
+    programs.remember(point, 2.0, 0.1)
+    fresh = np.array([programs.fresh(drawn(seed)) for seed in range(40)])
+    for value in (0.3, 0.7):
+        assert np.mean(fresh[:, first] == value) > 0.15, "before and after the change that may have caused it"
+    assert np.mean(fresh[:, second] == 0.7) == 0.0
+    assert np.mean(fresh[:, second] == 1.0) < 0.5, "bounds are drawn often enough"
