@@ -42,16 +42,21 @@ class Search:
     """One search.
 
     Attributes:
-        falsified: whether it found a violation.
         simulations: number of simulations.
         seconds: duration in s.
         simulating: duration of the simulations in s, with the monitor.
+        violation: what it found, not confirmed; None if nothing.
     """
 
-    falsified: bool
     simulations: int
     seconds: float
     simulating: float
+    violation: Evaluation | None = None
+
+    @property
+    def falsified(self) -> bool:
+        """Whether it found a violation."""
+        return self.violation is not None
 
 
 def search(problem: Problem, engine: str, *, seed: int, budget: int) -> Search:
@@ -64,9 +69,9 @@ def search(problem: Problem, engine: str, *, seed: int, budget: int) -> Search:
         evaluation = evaluate(problem, candidate)
         simulating += time.perf_counter() - begun
         if _violates(evaluation):
-            return Search(True, count, time.perf_counter() - started, simulating)
+            return Search(count, time.perf_counter() - started, simulating, evaluation)
         asked.tell([evaluation])
-    return Search(False, budget, time.perf_counter() - started, simulating)
+    return Search(budget, time.perf_counter() - started, simulating)
 
 
 def peer_search(
@@ -99,11 +104,11 @@ def peer_search(
             simulating += time.perf_counter() - begun
             if _violates(evaluation):
                 peer.kill()
-                return Search(True, count, time.perf_counter() - started, simulating)
+                return Search(count, time.perf_counter() - started, simulating, evaluation)
             print(evaluation.robustness, file=peer.stdin, flush=True)
             line = peer.stdout.readline()
         peer.kill()
-    return Search(False, budget, time.perf_counter() - started, simulating)
+    return Search(budget, time.perf_counter() - started, simulating)
 
 
 def _violates(evaluation: Evaluation) -> bool:

@@ -7,10 +7,9 @@
 
 A method is an engine, with the objective after a colon. A run that finds nothing in --seconds counts as that.
 The methods take turns seed by seed, so that another load of the machine hits all of them. Seconds are those
-of a run until its counterexample is confirmed, with the start of the FMU and of worker processes, without
-loading the spec; --slower lets each simulation wait that much longer, as a larger FMU would take. Those of
-psy-taliro are without the start of its process and of the FMU and without a confirmation; it searches the
-fixed parameterization. Committed result: bench/wall_clock.md.
+of a run until its counterexample is confirmed, without loading the spec and starting the FMU, and without the
+start of psy-taliro's process, which searches the fixed parameterization; --slower lets each simulation wait
+that much longer, as a larger FMU would take. Committed result: bench/wall_clock.md.
 """
 
 import argparse
@@ -31,6 +30,7 @@ from falsifier import Budget, Problem, falsify, load_problem
 from falsifier.core.model import Experiment, Model, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.confirm import confirm
 
 REQUIREMENTS = ("AT1", "AT6a", "CC3", "PulseMeter", "ChargerHandshake", "HeaterLimpHome")
 METHODS = ("surrogate:time", "surrogate:simulations", "uniform", "corners", "cma", "coverage")
@@ -89,21 +89,23 @@ def run(problem: Problem, method: str, *, jobs: int, seed: int, seconds: float) 
 
 
 def run_peer(problem: Problem, optimizer: str, python: Path, *, seed: int, seconds: float) -> Run:
-    """Search with psy-taliro."""
+    """Search with psy-taliro, and confirm what it found as ours is."""
     most = 1_000_000
     found = peer_search(problem, optimizer, python, seed=seed, budget=most, limit=seconds)
-    return Run(found.falsified, found.simulations, found.seconds)
+    started = time.perf_counter()
+    is_confirmed = found.violation is not None and confirm(problem, found.violation).outcome == "confirmed"
+    return Run(is_confirmed, found.simulations, found.seconds + time.perf_counter() - started)
 
 
 def cells(results: list[Run], limit: float) -> list[str]:
     """Falsified runs, simulations and seconds; a run that found nothing counts as the limit."""
     seconds = [r.seconds if r.falsified else limit for r in results]
     simulations = [r.simulations for r in results if r.falsified]
-    error = f" ± {stdev(seconds) / len(seconds) ** 0.5:.1f}" if len(seconds) > 1 else ""
+    error = f" ± {stdev(seconds) / len(seconds) ** 0.5:.2f}" if len(seconds) > 1 else ""
     return [
         f"{len(simulations)}/{len(results)}",
         f"{mean(simulations):.1f}" if simulations else "–",
-        f"{mean(seconds):.1f}{error}",
+        f"{mean(seconds):.2f}{error}",
     ]
 
 
@@ -120,12 +122,13 @@ def main() -> None:
     options = parser.parse_args()
     print("| requirement | method | jobs | FR | simulations | seconds |\n|---|---|---|---|---|---|")
     for name in options.requirements:
-        problem = load_problem(name)
+        problem, fixed = load_problem(name), load_problem(name, parameterization="fixed")
         if options.slower:
-            problem = replace(problem, model=Slower(problem.model, options.slower))
-        run(problem, "corners", jobs=1, seed=0, seconds=5.0)  # compiles what is compiled once
+            model = Slower(problem.model, options.slower)
+            problem, fixed = replace(problem, model=model), replace(fixed, model=model)
+        for method in options.methods:  # imports and compiles what is done once
+            run(problem, method, jobs=1, seed=0, seconds=5.0)
         ways = list(product(options.methods, options.jobs))
-        fixed = load_problem(name, parameterization="fixed")
         peers = PEERS if options.peer else ()
         results: dict[tuple[str, int], list[Run]] = {way: [] for way in ways}
         results |= {(f"psy-taliro, {peer}", 1): [] for peer in peers}
