@@ -34,7 +34,8 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 
 OURS = ("surrogate", "uniform", "corners", "cma")
 PEERS = ("uniform", "dual annealing")
-REQUIREMENTS = ("AT1", "AT2", "AT53", "AT6a", "CC1", "CC3", "CC5", "F16")
+REQUIREMENTS = ("AT1", "AT2", "AT53", "AT6a", "CC1", "CC3", "CC4", "CC5", "F16")
+FAULTS = ("PulseMeter", "ChargerHandshake", "HeaterLimpHome")
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +136,7 @@ def main() -> None:
     """Print the table, row by row."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--peer", type=Path, required=True, help="interpreter that can import staliro")
-    parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS, metavar="NAME")
+    parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS + FAULTS, metavar="NAME")
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 100 on")
     parser.add_argument("--budget", type=int, default=300)
     options = parser.parse_args()
