@@ -1,6 +1,6 @@
 """How long does an engine take for a proposal, and does that grow with the history?
 
-    python bench/proposal_time.py                      # default engine, AT51, fixed parameterization
+    python bench/proposal_time.py                      # default engine, AT51, free parameterization
     python bench/proposal_time.py --engine bayesian --requirement CC4
 
 Processor time of ask and tell, in a search that continues after a violation. Committed result:

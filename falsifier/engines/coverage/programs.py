@@ -20,7 +20,7 @@ _KEPT = 0.25
 _AIMED = 0.7
 # Of these, the share that is exactly at a level.
 _EXACT = 0.15
-# Share of values that are some at which something happened before, and how many of these are kept.
+# Share of a real input's new values that are ones at which something happened before; how many are kept.
 _TELLING, _MOST_TELLING = 0.5, 64
 # Probability that a parameter is drawn again: nothing of what followed is certain then.
 _PARAMETER_REDRAWN = 0.1
