@@ -373,7 +373,8 @@ def _into_range(value: float, ranged: InputRange | ParameterRange) -> float:
 
 
 def _is_outside(ranged: InputRange | ParameterRange, value: float) -> bool:
-    tolerance = _ROUNDING_SHARE * (ranged.high - ranged.low)
+    # Whatever is nearest to an allowed number is rounded to it.
+    tolerance = _ROUNDING_SHARE * (ranged.high - ranged.low) if ranged.kind == "real" else 0.5
     return not ranged.low - tolerance <= value <= ranged.high + tolerance
 
 

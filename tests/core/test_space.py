@@ -116,6 +116,17 @@ def test_bounds_are_allowed_numbers() -> None:
     assert (count.low, count.high) == (1.0, 3.0)
     gear = InputRange("gear", 1.5, 8.0, kind="enumeration", items=(("d", 7), ("r", 1), ("n", 3)))
     assert (gear.low, gear.high) == (3.0, 7.0)
+    single = ParameterRange("single", 2.6, 3.4, kind="integer")
+    space = SearchSpace((), (count, single), 1.0)
+    for wanted, taken in (
+        ((0.6, 2.6), (1.0, 3.0)),
+        ((3.4, 3.4), (3.0, 3.0)),
+        ((2.0, 3.0 - 1e-9), (2.0, 3.0)),
+    ):
+        candidate = space.admit(Candidate({}, dict(zip(space.names, wanted, strict=True))))
+        assert tuple(candidate.parameters.values()) == taken
+    with pytest.raises(CandidateError, match=r"'count': 3.7 is outside its range \[1, 3\]"):
+        space.admit(Candidate({}, {"count": 3.7, "single": 3.0}))
 
 
 def test_whole_numbers_are_not_interpolated_freely() -> None:
