@@ -120,6 +120,7 @@ class Hybrid:
         self._reasons: list[str] = []
         self._numeric: Candidate | None = None
         self._unanswered: list[str] = []
+        self._unrevised: list[str] = []
         self._points: list[Array] = []
         self._repeats: list[str] = []
 
@@ -165,12 +166,16 @@ class Hybrid:
             self._note(evaluation)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
-        """Return how many questions had no valid answer, and why."""
-        if not self._unanswered:
-            return ()
-        why = shorten(self._unanswered[-1], _LONGEST_REASON, placeholder=" ...")
-        count = f"{len(self._unanswered)} of {counted(self._llm.turns, 'question')}"
-        return (f"{count} had no valid answer, and the surrogate continued: {why}",)
+        """Return how many questions had no valid answer, or answers no revision, and why."""
+        questions = counted(self._llm.turns, "question")
+        return tuple(
+            f"{len(errors)} of {questions} {what}: {shorten(errors[-1], _LONGEST_REASON, placeholder=' ...')}"
+            for errors, what in (
+                (self._unanswered, "had no valid answer, and the surrogate continued"),
+                (self._unrevised, "had no revised answer, and the first one was used"),
+            )
+            if errors
+        )
 
     @property
     def next(self) -> Who:
@@ -259,8 +264,9 @@ class Hybrid:
             heard = self._predictions_told(candidates, predictions)
             try:
                 revised = self.adviser.propose(settings.count, [*notes, *heard], dispensable=True)
-            except ChatError:  # the first answer has been paid for
+            except ChatError as error:  # the first answer has been paid for
                 revised = advice
+                self._unrevised.append(str(error))
             candidates = list({c.key: c for c in (*candidates, *revised.candidates)}.values())
             predictions = self._trusted_predictions(candidates)
         self.surrogate.suggest(candidates)

@@ -145,6 +145,19 @@ def test_who_does_not_call_is_told_afterwards() -> None:
     assert not chat.requests[at + 1].tools
 
 
+def test_a_revision_that_fails_costs_the_first_answer_nothing_and_is_told() -> None:
+    def script(request: ChatRequest) -> Line:
+        if "was not simulated" in request.messages[-1].content:
+            return ChatError("quota used up")
+        return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+
+    chat = ScriptedChat(script)
+    engine = hybrid(chat)
+    run(engine)
+    (remark,) = engine.remarks([])
+    assert "had no revised answer, and the first one was used: quota used up" in remark
+
+
 def test_no_tool_where_no_call_is_allowed() -> None:
     def script(request: ChatRequest) -> Line:
         return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
