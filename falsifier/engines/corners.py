@@ -1,6 +1,7 @@
 """Constant extremes first: many requirements have their lowest robustness with inputs at their bounds."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.engines.corner_walk import CornerWalk, Levels
@@ -14,21 +15,26 @@ class Corners(BoxEngine):
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        self._groups = self.box.groups
+        varied = [
+            (n, g) for n, g in zip(problem.space.names, self.box.groups, strict=True) if self._varies(g)
+        ]
+        self._names, self._groups = [n for n, _ in varied], [g for _, g in varied]
         self._walk = CornerWalk(len(self._groups))
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         levels = self._walk.next(rng)
         if levels is None:
             return Proposal(rng.random(self.box.dimension), "uniform random: all corners were tried")
-        point = np.empty(self.box.dimension)
+        point = np.zeros(self.box.dimension)
         for indices, level in zip(self._groups, levels, strict=True):
             point[indices] = level
         words = ", ".join(
-            f"{name} {'high' if level else 'low'}"
-            for name, level in zip(self.box.space.names, levels, strict=True)
+            f"{name} {'high' if level else 'low'}" for name, level in zip(self._names, levels, strict=True)
         )
-        return Proposal(point, f"constant extremes: {words}")
+        return Proposal(point, f"constant extremes: {words or 'nothing varies'}")
+
+    def _varies(self, indices: NDArray[np.intp]) -> bool:
+        return bool(self.box.span[indices[0]] > 0.0)
 
     def _learn(self, point: Vector, cost: float | None) -> None:
         levels = self._levels(point)
