@@ -42,7 +42,7 @@ def plan(
     snap: float,
     rng: np.random.Generator,
 ) -> Plan:
-    """Return the most promising point that has not been simulated yet.
+    """Return the most promising point that has not been simulated yet, or one that has if none else is found.
 
     Args:
         predict: returns the predicted costs of points.
@@ -91,7 +91,8 @@ def plan(
     others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
     points = np.concatenate([pool, *others])
     unseen = next((i for i, point in enumerate(points) if not is_seen(point, seen)), 0)
-    return Plan(points[unseen], float(costs[min(unseen, len(costs) - 1)]), is_simple=False)
+    cost = costs[unseen] if unseen < len(costs) else predict(points[unseen][None])[0]
+    return Plan(points[unseen], float(cost), is_simple=False)
 
 
 def _best(layout: Layout, points: Array, costs: Array, count: int) -> tuple[Array, Array]:

@@ -184,12 +184,12 @@ class Surrogate:
     def _objection(self, pending: Pending) -> float:
         """Return the excess risk that its simulation fails, plus 1 if that would repeat another one.
 
-        Plans repeat nothing unless all has been tried.
+        A plan that repeats one has found nothing else: another one would take as long and repeat one, too.
         """
-        return self._risk(pending) + self._is_repeated(pending)
+        return self._risk(pending) + (pending.forecast is None and self._is_repeated(pending))
 
     def _is_repeated(self, pending: Pending) -> bool:
-        return pending.forecast is None and is_seen(pending.point, self._tried)
+        return is_seen(pending.point, self._tried)
 
     def _unseen(self, rng: np.random.Generator) -> Pending | None:
         """Return a random point that has not been simulated; None if all draws have been."""

@@ -177,8 +177,16 @@ STEPS = [replace(p, low=0.0, high=9.0, kind="integer") for p in (START, BIAS)]
         ([{}, SWITCH], []),
         ([], STEPS),
         ([{"free": None, "control_points": 1}], []),
+        ([], [ParameterRange("x0", 0, 59, kind="integer")]),
     ],
-    ids=["one cannot vary", "switches at control points", "one switch", "whole parameters", "one number"],
+    ids=[
+        "one cannot vary",
+        "switches at control points",
+        "one switch",
+        "whole parameters",
+        "one number",
+        "sixty whole numbers",
+    ],
 )
 def test_nothing_is_simulated_twice_where_many_points_are_the_same_candidate(
     inputs: Sequence[dict[str, Any]], parameters: Sequence[ParameterRange]
