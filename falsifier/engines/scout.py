@@ -24,19 +24,29 @@ class Scout:
     name = "scout"
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
+        self._coverage, self._strategy = Coverage(problem, seed=seed), CMA(problem, seed=seed)
         self._members: tuple[Engine, ...] = (
             Corners(problem, seed=seed),
-            Coverage(problem, seed=seed),
-            CMA(problem, seed=seed),
+            self._coverage,
+            self._strategy,
             Sobol(problem, seed=seed),
         )
         self._turns: Iterator[Engine] = cycle(self._members)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates; the origin of each says which member proposed it."""
-        return [candidate for member in islice(self._turns, max(n, 1)) for candidate in member.ask(1)]
+        return [self._ask_one(member) for member in islice(self._turns, max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Tell every member."""
         for member in self._members:
             member.tell(evaluations)
+
+    def _ask_one(self, member: Engine) -> Candidate:
+        """Return the member's candidate; if it was simulated already, one of coverage."""
+        (candidate,) = member.ask(1)
+        # The evolution strategy waits for the evaluations of all its points.
+        if member not in (self._coverage, self._strategy) and self._coverage.avoids(candidate):
+            (candidate,) = self._coverage.ask(1)
+        self._coverage.avoid(candidate)
+        return candidate

@@ -58,12 +58,11 @@ class Programs:
             time: when it was seen, in s.
             interval: time in s between two outputs: it may have happened so much earlier.
         """
-        for j, times in enumerate(self._times):
+        for j in range(len(self._times)):
             if self._levels[j] is not None:
                 continue
-            known, values = self._telling[j], point[self._layout.groups[j]]
-            for at in (time - interval, time):
-                value = float(values[max(0, int(np.searchsorted(times, at, side="right")) - 1)])
+            known = self._telling[j]
+            for value in self._layout.read(j, point, np.array([time - interval, time])).tolist():
                 if 0.0 < value < 1.0 and value not in known:
                     known.append(value)
             del known[:-_MOST_TELLING]

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,12 @@ def test_values_at_which_something_happened_are_used_again() -> None:
         assert np.mean(fresh[:, first] == value) > 0.15, "before and after the change that may have caused it"
     assert np.mean(fresh[:, second] == 0.7) == 0.0
     assert np.mean(fresh[:, second] == 1.0) < 0.5, "bounds are drawn often enough"
+
+
+def test_the_value_of_an_interpolated_input_is_remembered_not_its_control_point() -> None:
+    problem = lag_problem("G[0,10] (x <= 99)", points=3)
+    (u,) = problem.space.inputs
+    layout = planning_layout(replace(problem.space, inputs=(replace(u, interpolation="linear"),)), GRID)
+    programs = Programs(layout)
+    programs.remember(np.array([0.0, 1.0, 0.0]), 2.0, 0.0)
+    assert np.mean([np.any(programs.fresh(drawn(seed)) == 0.4) for seed in range(40)]) > 0.5
