@@ -334,7 +334,9 @@ class _Loop:
         self.spent = self.spent.plus_requests(count, usage)
 
     def clock(self) -> Spent:
-        """Update and return what has been spent."""
+        """Update and return what has been spent; while a record is repeated, time stands still."""
+        if self.count < self.steps.replayed:
+            self.started = perf_counter() - self.steps.seconds
         self.spent = replace(self.spent, seconds=perf_counter() - self.started)
         return self.spent
 

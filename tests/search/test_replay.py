@@ -3,6 +3,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from threading import Barrier
 
@@ -49,6 +50,18 @@ def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
     run(problem, tmp_path, budget=3)
     with pytest.raises(JournalError, match="candidate 0 of the engine 'uniform' differs from the journal"):
         resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
+
+
+def test_time_stands_still_while_a_record_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ticks = count()
+    monkeypatch.setattr("falsifier.search.loop.perf_counter", lambda: float(next(ticks)))
+    problem = lag_problem("G[0,10] (x <= 99)")
+    whole = run(problem, tmp_path, budget=20)
+    again = run(problem, tmp_path, budget=20)
+    assert whole.spent.seconds > 20
+    assert whole.spent.seconds <= again.spent.seconds < whole.spent.seconds + 8
 
 
 def test_a_run_whose_time_is_used_up_is_still_repeated(tmp_path: Path) -> None:
