@@ -106,10 +106,6 @@ class Layout:
             values[:, :, j] = _read(self.codings[j], own, grid.middles) if j < len(self.codings) else own
         return values
 
-    def read(self, number: int, point: Array, at: Array) -> Array:
-        """Return the scaled values of the input with this number at times in s, shape (times,)."""
-        return np.asarray(_read(self.codings[number], point[self.groups[number]][None], at)[0])
-
     def candidate(self, point: Array, *, origin: str, rationale: str) -> Candidate:
         """Return the candidate for a point; equal neighbours among held cells are merged into one piece."""
         point = np.clip(point, 0.0, 1.0)

@@ -20,7 +20,7 @@ _KEPT = 0.25
 _AIMED = 0.7
 # Of these, the share that is exactly at a level.
 _EXACT = 0.15
-# Share of a real input's new values that are ones at which something happened before; how many are kept.
+# Share of a held real input's new values that are ones at which something happened before; how many are kept.
 _TELLING, _MOST_TELLING = 0.5, 64
 # Probability that a parameter is drawn again: nothing of what followed is certain then.
 _PARAMETER_REDRAWN = 0.1
@@ -51,18 +51,19 @@ class Programs:
         return bool(self._times)
 
     def remember(self, point: Array, time: float, interval: float) -> None:
-        """Remember the values that real inputs had when something happened, except bounds.
+        """Remember the values that held real inputs had when something happened, except bounds.
 
         Args:
             point: the program, shape (d,).
             time: when it was seen, in s.
             interval: time in s between two outputs: it may have happened so much earlier.
         """
-        for j in range(len(self._times)):
-            if self._levels[j] is not None:
+        for j, times in enumerate(self._times):
+            if self._levels[j] is not None or self._layout.codings[j].interpolation != "constant":
                 continue
-            known = self._telling[j]
-            for value in self._layout.read(j, point, np.array([time - interval, time])).tolist():
+            known, values = self._telling[j], point[self._layout.groups[j]]
+            for at in (time - interval, time):
+                value = float(values[max(0, int(np.searchsorted(times, at, side="right")) - 1)])
                 if 0.0 < value < 1.0 and value not in known:
                     known.append(value)
             del known[:-_MOST_TELLING]
