@@ -2,7 +2,7 @@
 
     python bench/wall_clock.py                                    # engines beside the surrogate, one core
     python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a CC3 AFC27
-    python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a CC5 --slower 0.5
+    python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a PulseMeter --slower 0.3
     python bench/wall_clock.py --peer PEER/bin/python             # psy-taliro too, see peers.py
 
 A method is an engine, with the objective after a colon. A run that finds nothing in --seconds counts as that.

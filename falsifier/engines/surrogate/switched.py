@@ -109,9 +109,11 @@ def discrete_states(states: Array) -> NDArray[np.bool_]:
 
 def has_modes(states: Array) -> bool:
     """Whether traces, shape (m, cells + 1, n), have modes that change, and few enough to learn each."""
-    discrete = discrete_states(states)
-    values = states[:, :, discrete]
-    return bool(np.diff(values, axis=1).any()) and len(_modes(values)[0]) <= _MOST_MODES
+    values = states[:, :, discrete_states(states)]
+    changes = np.diff(values, axis=1).any(axis=2)
+    # Each mode is at a start or after a change; to compare all points with each other would take long.
+    entered = np.concatenate([values[:, 0], values[:, 1:][changes]])
+    return bool(changes.any()) and len(np.unique(entered, axis=0)) <= _MOST_MODES
 
 
 def _modes(values: Array) -> tuple[Array, Ints]:
