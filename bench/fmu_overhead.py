@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import FmuModel, archive
+from falsifier.fmu import FmuModel
 from falsifier.fmu.build import compiler
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description import archive
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.isolation import REGISTRY
 
 HERE = Path(__file__).parent

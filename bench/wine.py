@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.fmu import FmuModel, read_info, wine
+from falsifier.fmu import FmuModel, read_info
+from falsifier.fmu.description import wine
 
 HERE = Path(__file__).parent
 FMUS = HERE.parent / "fmus"

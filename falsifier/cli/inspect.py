@@ -292,7 +292,7 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
 
 def _binary_notes(source: "Path | System") -> tuple[str, ...]:
     """Return why binaries cannot be loaded on this machine; of a system, those of each component."""
-    from falsifier.fmu.needs import binary_remarks
+    from falsifier.fmu.description import binary_remarks
 
     if isinstance(source, Path):
         return binary_remarks(source)

@@ -5,8 +5,7 @@ from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
-from falsifier.fmu.archive import UNREADABLE, open_archive
-from falsifier.fmu.xml import read_xml
+from falsifier.fmu.description import UNREADABLE, open_archive, read_xml
 
 _DOCUMENTS = (".html", ".htm", ".md", ".txt")
 _RESOURCES = (".txt", ".md", ".json")

@@ -3,11 +3,11 @@
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
 from falsifier.fmu.isolation import stop_simulations
-from falsifier.fmu.network import Coupling, Frame
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.ssp import is_package, read_package
-from falsifier.fmu.system import Component, System
-from falsifier.fmu.wiring import Connection
+from falsifier.fmu.systems.network import Coupling, Frame
+from falsifier.fmu.systems.system import Component, System
+from falsifier.fmu.systems.wiring import Connection
 
 __all__ = [
     "Component",

@@ -14,8 +14,8 @@ from pathlib import Path
 from falsifier.core import operating_system
 from falsifier.core.words import counted
 from falsifier.errors import ModelError
-from falsifier.fmu import archive
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description import archive
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.sources import Sources, find_sources
 

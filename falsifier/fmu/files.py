@@ -7,7 +7,7 @@ from pathlib import Path
 
 from falsifier.core.model import Model
 from falsifier.fmu.simulator import FmuModel
-from falsifier.fmu.system import System
+from falsifier.fmu.systems.system import System
 
 
 def fmu_files(model: Model) -> dict[Path, str]:

@@ -9,9 +9,7 @@ from typing import Any
 
 from falsifier.core.model import Interface
 from falsifier.errors import ModelError
-from falsifier.fmu import archive
-from falsifier.fmu.description import Description
-from falsifier.fmu.libraries import misnamed_text, missing_binary_text
+from falsifier.fmu.description import Description, archive, misnamed_text, missing_binary_text
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
 # Type codes by FMI version; they name the functions that read and write values.

@@ -14,11 +14,11 @@ from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import status_name
 from falsifier.fmu.lifecycle import ModalLifecycle
 from falsifier.fmu.loops import enter_step_mode, write_row
-from falsifier.fmu.network import Member, Network
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, make_ports
 from falsifier.fmu.stepper import check_range, what_stopped
 from falsifier.fmu.system_tables import SystemTables, steps_with_events
+from falsifier.fmu.systems.network import Member, Network
 
 # Maximum number of variables that the error of an initialisation that does not converge names.
 _SHOWN = 6

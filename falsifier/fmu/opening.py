@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from falsifier.errors import ModelError
-from falsifier.fmu import archive
+from falsifier.fmu.description import archive
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import LogSink
 from falsifier.fmu.session import Session

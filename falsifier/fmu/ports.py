@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import ModelError
-from falsifier.fmu.description import Description
-from falsifier.fmu.slot import Slot
+from falsifier.fmu.description import Description, Slot
 
 Table = NDArray[np.int64]
 # What the compiled loops receive of Ports: integers, because compiled code counts references to arrays.

@@ -27,7 +27,7 @@ from falsifier.fmu.description import Description
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import TYPES, LogSink
 from falsifier.fmu.lifecycle import make_lifecycle
-from falsifier.fmu.network import Member
+from falsifier.fmu.systems.network import Member
 
 assert sys.platform == "linux"
 

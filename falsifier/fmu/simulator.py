@@ -13,11 +13,10 @@ from falsifier.core.model import Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu import archive, in_process
-from falsifier.fmu.description import Description, describe
+from falsifier.fmu import in_process
+from falsifier.fmu.description import Description, archive, describe, needed_tool_text
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.fmu.plan import make_plan
-from falsifier.fmu.remarks import needed_tool_text
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
 from falsifier.fmu.worker_order import Order
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import ModelError
-from falsifier.fmu.xml import read_xml
+from falsifier.fmu.description.xml import read_xml
 
 # The standard's name, and that of drafts of FMI 3, which some exporters still write.
 _BUILD_DESCRIPTIONS = ("buildDescription.xml", "build_description.xml")

@@ -10,8 +10,8 @@ from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import LogSink
 from falsifier.fmu.master import Master
-from falsifier.fmu.network import Network
 from falsifier.fmu.plan import Plan
+from falsifier.fmu.systems.network import Network
 
 
 class SystemInstance:

@@ -9,11 +9,11 @@ from falsifier.fmu import coupled_solver as solver
 from falsifier.fmu import equation, machine_code, solver_row
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.loop_numbers import DONE
-from falsifier.fmu.network import Member
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports
 from falsifier.fmu.solver_memory import NEXT_EVENT, Memory, make_memory
 from falsifier.fmu.stepper import component_failure
+from falsifier.fmu.systems.network import Member
 
 
 class SystemSolver:

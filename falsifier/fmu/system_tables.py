@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from falsifier.fmu import coupled_stepping as loops
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
-from falsifier.fmu.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.plan import Plan
 from falsifier.fmu.ports import Ports, fixed_elements, make_ports
 from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import check_range, is_held, write_fixed
+from falsifier.fmu.systems.network import SYSTEM, Link, Member, Network, Place
 
 if TYPE_CHECKING:
     from falsifier.fmu.system_solver import SystemSolver

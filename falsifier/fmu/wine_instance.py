@@ -14,6 +14,7 @@ from falsifier.core.model import Interface
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
+from falsifier.fmu.description.wine import windows_path
 from falsifier.fmu.library import TYPES, LogSink, status_name
 from falsifier.fmu.plan import Plan, solver_tolerance
 from falsifier.fmu.ports import Ports, fixed_elements, make_ports
@@ -26,7 +27,6 @@ from falsifier.fmu.stepper import (
     what_stopped,
     write_fixed,
 )
-from falsifier.fmu.wine import windows_path
 
 if sys.platform != "win32":
     from falsifier.fmu.wine_process import Answer, WineProcess, block, text

@@ -18,9 +18,9 @@ from typing import NoReturn
 
 from falsifier.core import linux, posix
 from falsifier.errors import ModelError
+from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.environment import worker_environment
 from falsifier.fmu.folders import REMOVING
-from falsifier.fmu.wine import HOW_TO_INSTALL, find_wine, windows_path
 
 assert sys.platform != "win32"
 

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 from falsifier.core.model import Interface
 from falsifier.fmu.description import Description
-from falsifier.fmu.network import Network
+from falsifier.fmu.systems.network import Network
 
 # How the next simulation starts, the cheapest first: with the same instance after a reset or from its saved
 # state, with a new instance, with the library loaded again, or in a new process.

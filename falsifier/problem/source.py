@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
-from falsifier.fmu.ssp_package import SUFFIXES as PACKAGES
+from falsifier.fmu.ssp import SUFFIXES as PACKAGES
 from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.sections import ModelChanges
 

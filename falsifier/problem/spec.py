@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from falsifier.errors import SpecError
-from falsifier.fmu.ssp_package import SUFFIXES as PACKAGES
+from falsifier.fmu.ssp import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
     AnyRequirement,
     Components,

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 from falsifier.core.model import Model, ModelInfo
 from falsifier.fmu import FmuModel
-from falsifier.fmu.structure import read_structure
-from falsifier.fmu.units import Units, conversion, is_known
+from falsifier.fmu.description import Units, conversion, is_known, read_structure
 from falsifier.stl import Formula
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
 from falsifier.stl.formula import Predicate

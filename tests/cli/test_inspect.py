@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.fmu import read_info
-from falsifier.fmu.archive import this_platform
+from falsifier.fmu.description.archive import this_platform
 from tests.command import ROOT, falsifier
 from tests.fixtures import simulink
 from tests.fmu.fixtures import path as fixture

@@ -3,7 +3,7 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.fmu.buffers import Room
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.plan import Plan, make_plan
 from tests.fmu import fixtures
 

@@ -8,7 +8,7 @@ from falsifier.errors import SimulationError
 from falsifier.fmu import Connection, Coupling
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ME, ramp
-from tests.fmu.systems import LOOP, component, run, sampled_loop, solved, system
+from tests.fmu.small_systems import LOOP, component, run, sampled_loop, solved, system
 
 STEPS = 10
 

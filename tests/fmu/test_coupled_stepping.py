@@ -4,8 +4,8 @@ import pytest
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
+from tests.fmu.small_systems import run, system
 from tests.fmu.support import DISCARD, END, ERROR
-from tests.fmu.systems import run, system
 
 
 @pytest.mark.parametrize("method", ["gauss-seidel", "jacobi"])
@@ -30,7 +30,7 @@ def test_a_component_that_ends_the_simulation_is_named() -> None:
 
 
 def test_values_recorded_between_own_steps_are_those_that_the_others_see() -> None:
-    from tests.fmu.systems import component
+    from tests.fmu.small_systems import component
 
     slow = component("Ticker_3", 0.5)
     model = system({"slow": slow, "plant": "Plant_2"}, {"plant.u": "slow.sampled"})

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu.description import describe
+from falsifier.fmu.description.model_description import describe
 from falsifier.fmu.equation import Equation
 from falsifier.fmu.plan import Plan
 from tests.fmu.fixtures import path
@@ -35,7 +35,7 @@ class _Library:
 
 
 def equation(name: str, library: _Library) -> Equation:
-    from falsifier.fmu.archive import file_hash
+    from falsifier.fmu.description.archive import file_hash
 
     fmu = path(name)
     return Equation(describe(fmu, file_hash(fmu)), library, PLAN, lambda *_: None)  # type: ignore[arg-type]

@@ -3,7 +3,7 @@ from pathlib import Path
 from falsifier.fmu import FmuModel, System, fmu_files, fmus_sha256, with_local_files
 from falsifier.testing import lag_problem
 from tests.fmu.fixtures import local, path
-from tests.fmu.systems import loop
+from tests.fmu.small_systems import loop
 
 
 def test_files_of_a_model_are_known_with_their_hashes() -> None:

@@ -84,7 +84,7 @@ def test_an_fmu_that_cannot_be_loaded_leaves_no_folder(
     def full(*_: object) -> None:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr("falsifier.fmu.archive.extract", full)
+    monkeypatch.setattr("falsifier.fmu.description.archive.extract", full)
     copy = tmp_path / "copy.fmu"
     copy.write_bytes(path("Ball_2").read_bytes() + b"\0\0")
     with pytest.raises(OSError, match="no space"):

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu import archive
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description import archive
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.instance import FmuInstance
 from tests.fmu.fixtures import path
 

@@ -12,7 +12,7 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.forking import Nursery
 from falsifier.fmu.isolation import _MOST_OF_A_THREAD, REGISTRY, IsolatedFmu, _Registry
 from falsifier.fmu.spawning import Spawner

@@ -6,8 +6,8 @@ import pytest
 
 from falsifier.core.model import Interface
 from falsifier.errors import ModelError
-from falsifier.fmu import archive
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description import archive
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.library import Library, status_name
 from tests.fmu import fixtures
 

@@ -5,8 +5,8 @@ import pytest
 
 from falsifier.core.model import Experiment, Interface
 from falsifier.errors import SimulationError
-from falsifier.fmu import archive
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description import archive
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.library import Library
 from falsifier.fmu.lifecycle import Lifecycle, make_lifecycle
 from falsifier.fmu.plan import Plan, make_plan

@@ -10,10 +10,10 @@ from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import Component, Connection, Coupling
 from falsifier.fmu.master import _Starter
-from falsifier.fmu.network import Method
 from falsifier.fmu.system_tables import SystemTables
+from falsifier.fmu.systems.network import Method
 from tests.fmu.fixtures import path
-from tests.fmu.systems import LOOP, STEP, component, loop, run, sampled_loop, solved, system
+from tests.fmu.small_systems import LOOP, STEP, component, loop, run, sampled_loop, solved, system
 
 DELAY = Coupling(loops="delay")
 

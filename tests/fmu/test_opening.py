@@ -5,8 +5,8 @@ import pytest
 from falsifier.errors import ModelError
 from falsifier.fmu.opening import open_session, unpack
 from falsifier.fmu.session import Session
-from falsifier.fmu.system import _order
-from tests.fmu.systems import loop, system
+from falsifier.fmu.systems.system import _order
+from tests.fmu.small_systems import loop, system
 
 
 def test_each_component_gets_a_folder_of_its_own_and_is_announced(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import FalsifierError, ModelError, SpecError
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.plan import make_plan
 from tests.fmu import fixtures
 

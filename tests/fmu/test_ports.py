@@ -1,8 +1,8 @@
 from falsifier.core.model import ModelInfo
 from falsifier.fmu import stepper
-from falsifier.fmu.description import Description
+from falsifier.fmu.description.model_description import Description
+from falsifier.fmu.description.slot import Slot
 from falsifier.fmu.ports import make_ports
-from falsifier.fmu.slot import Slot
 from tests.fmu import plain
 
 

@@ -12,8 +12,8 @@ from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Component, Connection, Coupling, System
 from falsifier.fmu.isolation import REGISTRY
 from tests.fmu.fixtures import path
+from tests.fmu.small_systems import LOOP, component, run, solved, system
 from tests.fmu.support import ALLOCATE, CRASH, HANG
-from tests.fmu.systems import LOOP, component, run, solved, system
 from tests.patience import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked, and end with a parent")

@@ -4,9 +4,9 @@ import pytest
 
 from falsifier.fmu import Coupling
 from falsifier.fmu.library import Library
-from tests.fmu import systems
+from tests.fmu import small_systems as systems
 from tests.fmu.fixtures import local, run
-from tests.fmu.systems import system
+from tests.fmu.small_systems import system
 
 
 def test_a_saved_state_is_taken_once_and_freed_before_its_instance(monkeypatch: pytest.MonkeyPatch) -> None:

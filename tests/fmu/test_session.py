@@ -9,9 +9,9 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu import archive
 from falsifier.fmu.buffers import Room
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description import archive
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.library import Library
 from falsifier.fmu.plan import make_plan

@@ -7,7 +7,7 @@ from falsifier.core.model import Experiment
 from falsifier.fmu import Frame
 from falsifier.fmu.step_effect import Movement, step_convergence, sufficient_step
 from tests.fmu.fixtures import local, ramp
-from tests.fmu.systems import loop
+from tests.fmu.small_systems import loop
 
 
 def test_halving_the_step_moves_outputs_by_half_the_error_of_holding() -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.ports import make_ports
 from falsifier.fmu.stepper import check_range
 from tests.fmu import fixtures

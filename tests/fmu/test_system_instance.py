@@ -9,9 +9,9 @@ from falsifier.core.model import Experiment
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.opening import open_session, unpack
 from falsifier.fmu.plan import make_plan
-from falsifier.fmu.system import _order
+from falsifier.fmu.systems.system import _order
 from falsifier.fmu.worker_order import Reuse
-from tests.fmu.systems import system
+from tests.fmu.small_systems import system
 
 
 @pytest.mark.parametrize(

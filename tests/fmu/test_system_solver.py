@@ -3,7 +3,7 @@
 import pytest
 
 from falsifier.core.signals import Signal
-from tests.fmu.systems import run, solved, system
+from tests.fmu.small_systems import run, solved, system
 
 
 def test_a_simulation_does_not_depend_on_the_one_before() -> None:

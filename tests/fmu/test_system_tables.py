@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.fmu import Component, archive
+from falsifier.fmu import Component
 from falsifier.fmu import coupled_stepping as loops
 from falsifier.fmu.buffers import Room
+from falsifier.fmu.description import archive
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.plan import make_plan
 from falsifier.fmu.system_tables import SystemTables
-from tests.fmu.systems import LOOP, component, run, solved, system
+from tests.fmu.small_systems import LOOP, component, run, solved, system
 
 
 def test_rows_are_in_the_order_of_stepping_and_connected_outputs_are_copied(tmp_path: Path) -> None:

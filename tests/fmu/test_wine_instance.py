@@ -11,7 +11,8 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu import FmuModel, read_info, wine
+from falsifier.fmu import FmuModel, read_info
+from falsifier.fmu.description import wine
 from tests import patience
 from tests.command import ROOT
 from tests.fixtures.fmus.catalogue import FIXTURES, WINDOWS

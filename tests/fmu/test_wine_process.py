@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import folders, wine, wine_process
+from falsifier.fmu import folders, wine_process
+from falsifier.fmu.description import wine
 from tests import patience
 from tests.fmu.test_wine_instance import needs_wine
 

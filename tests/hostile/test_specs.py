@@ -10,7 +10,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import FalsifierError, FormulaError, ModelError, SpecError, did_you_mean
-from falsifier.fmu.description import Description, parse, read_description
+from falsifier.fmu.description.model_description import Description, parse, read_description
 from falsifier.problem.loading import load_problem
 from falsifier.problem.spec import read_spec
 from falsifier.stl import parse as parse_formula
@@ -190,7 +190,7 @@ def test_texts_without_end_are_cut() -> None:
 def test_descriptions_of_any_size_are_refused_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("falsifier.fmu.archive._MAX_TEXT_BYTES", 2 << 20)
+    monkeypatch.setattr("falsifier.fmu.description.archive._MAX_TEXT_BYTES", 2 << 20)
     path = tmp_path / "a.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", b"<" * (3 << 20))

@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import FmuModel
-from falsifier.fmu.units import Unit
+from falsifier.fmu.description.units import Unit
 from falsifier.problem.unit_check import defined_units, unit_conflicts, unit_of
 from falsifier.stl import parse
 from falsifier.testing import lag_problem

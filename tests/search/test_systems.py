@@ -17,7 +17,7 @@ from falsifier.fmu import fmu_files
 from tests.command import falsifier
 from tests.fmu.fixtures import path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, write
-from tests.fmu.systems import loop
+from tests.fmu.small_systems import loop
 
 SPEC = """
 [components.plant]

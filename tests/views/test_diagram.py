@@ -4,7 +4,7 @@ from falsifier.core.model import Variable
 from falsifier.fmu import Connection, Coupling, Frame, System
 from falsifier.views.diagram import MOST_PORTS, diagram, diagram_text
 from tests.fmu.fixtures import path
-from tests.fmu.systems import LOOP, component, system
+from tests.fmu.small_systems import LOOP, component, system
 
 
 def test_the_text_says_order_ports_units_connections_and_what_is_late() -> None:

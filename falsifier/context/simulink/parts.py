@@ -8,8 +8,7 @@ from xml.etree.ElementTree import Element
 
 from falsifier.context.simulink.tree import Node
 from falsifier.errors import SpecError
-from falsifier.fmu.archive import UNREADABLE, open_archive
-from falsifier.fmu.xml import read_xml
+from falsifier.fmu.description import UNREADABLE, open_archive, read_xml
 
 _DIAGRAM = "simulink/blockdiagram.xml"
 _DEFAULTS = "simulink/bddefaults.xml"

@@ -14,8 +14,8 @@ from falsifier.counterexamples.export.components import copy_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import System, fmpy_master
 from falsifier.fmu.description import Description
-from falsifier.fmu.network import SYSTEM, Member, Network, Place
 from falsifier.fmu.stepper import is_held
+from falsifier.fmu.systems.network import SYSTEM, Member, Network, Place
 from falsifier.problem.problem import Problem
 
 # Rows that replay.py prints before and after the critical time.

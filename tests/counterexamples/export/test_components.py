@@ -18,7 +18,7 @@ from falsifier.fmu import Component, Connection, Coupling, System
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from tests.fmu.fixtures import path
-from tests.fmu.systems import LOOP, component, solved, system
+from tests.fmu.small_systems import LOOP, component, solved, system
 
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 1.0})
 LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}

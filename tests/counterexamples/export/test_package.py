@@ -10,8 +10,8 @@ from falsifier.counterexamples.export.package import write_package
 from falsifier.counterexamples.export.tables import write_ssv
 from falsifier.fmu import Connection, System, read_package
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
-from tests.fmu.systems import LOOP, run, solved
-from tests.fmu.systems import system as built
+from tests.fmu.small_systems import LOOP, run, solved
+from tests.fmu.small_systems import system as built
 
 
 def again(model: System, tmp_path: Path, resources: dict[str, Path] | None = None) -> System:

@@ -16,14 +16,14 @@ from falsifier.core.signals import Signal
 from falsifier.counterexamples.export.system_script import system_script, why_no_script
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import Component, Connection, Coupling, Frame, System, fmpy_master
-from falsifier.fmu.network import Isolation
+from falsifier.fmu.systems.network import Isolation
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.testing import lag_problem
 from tests.counterexamples.export.support import exported
 from tests.counterexamples.export.test_scripts import imported
 from tests.fmu.fixtures import path
-from tests.fmu.systems import LOOP, component, solved, system
+from tests.fmu.small_systems import LOOP, component, solved, system
 
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 0.5})
 LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}

@@ -7,7 +7,7 @@ from matplotlib.patches import Rectangle
 from falsifier.fmu import Component, Coupling
 from falsifier.views.diagram import diagram
 from falsifier.views.plotting import plot_diagram
-from tests.fmu.systems import LOOP, component, solved, system
+from tests.fmu.small_systems import LOOP, component, solved, system
 
 
 def test_boxes_ports_wires_and_their_kinds_are_drawn() -> None:

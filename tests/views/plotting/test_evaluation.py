@@ -14,7 +14,7 @@ from falsifier.search.result import Result
 from falsifier.testing import START, lag_problem
 from falsifier.views.panels import Panel
 from falsifier.views.plotting import plot, plot_evaluation, plot_panel, plot_requirement, png, save_figure
-from tests.fmu.systems import LOOP, system
+from tests.fmu.small_systems import LOOP, system
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import hard, unusable
 from tests.views.plotting.support import simulated, xs, ys

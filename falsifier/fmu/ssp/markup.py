@@ -1,0 +1,268 @@
+"""The XML of SSP 1.0 and 2.0 as frozen values: system descriptions, parameter values, parameter mappings.
+
+FMPy's reader is not used: it resolves entities, ignores transformations of connections (it looks for them in
+another namespace), default experiments and inline mappings, and reads packages only, not ``.ssd`` files.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite
+from xml.etree.ElementTree import Element
+
+from falsifier.errors import SpecError
+from falsifier.fmu.description import Unit, read_units, read_xml
+
+_NAMESPACE = "{http://ssp-standard.org/SSP"
+_VALUE_TAGS = ("Boolean", "String", "Enumeration", "Real", "Integer", "Float64", "Float32", *(
+    f"{u}Int{b}" for u in ("", "U") for b in (8, 16, 32, 64)
+))  # fmt: skip
+_MAPPINGS = tuple(f"{kind}MappingTransformation" for kind in ("Boolean", "Integer", "Enumeration"))
+
+
+@dataclass(frozen=True, slots=True)
+class Transformation:
+    """A linear transformation ``factor * value + offset``, and whether units are not converted before it."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+    suppress: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Connector:
+    """A port of a component or system; the type is the name of its element, empty if none is stated."""
+
+    name: str
+    kind: str
+    unit: str
+    type: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A connection of two connectors within a system; an element of None is the system itself."""
+
+    start: tuple[str | None, str]
+    end: tuple[str | None, str]
+    transformation: Transformation
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A value of a parameter set: a number, or the text of a string or of an enumeration's item."""
+
+    name: str
+    value: float | str
+    is_item: bool
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """An entry of a parameter mapping."""
+
+    source: str
+    target: str
+    transformation: Transformation
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """Parameter values for an element: inline, or in a file; with mappings, only what these name."""
+
+    prefix: str
+    source: str
+    values: tuple[Value, ...]
+    mapping_source: str
+    mappings: tuple[Mapping, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component (``source`` names its file) or a system of elements and connections."""
+
+    name: str
+    type: str
+    source: str
+    implementation: str
+    connectors: tuple[Connector, ...]
+    bindings: tuple[Binding, ...]
+    parts: "tuple[Part, ...]" = ()
+    wires: tuple[Wire, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """A system description: the root system, units, default experiment in s."""
+
+    root: Part
+    units: dict[str, Unit]
+    start_time: float | None
+    stop_time: float | None
+
+
+def parse_structure(text: bytes, shown: str) -> Structure:
+    """Return the content of an ``.ssd`` file.
+
+    Raises:
+        SpecError: naming the file and what is wrong.
+    """
+    root = _root(text, "SystemStructureDescription", shown)
+    version = root.get("version", "")
+    if version[:1] not in ("1", "2"):
+        raise SpecError(f"{shown}: SSP version {version!r}; export it as SSP 1.0 or 2.0")
+    try:
+        system = root.find("{*}System")
+        if system is None:
+            raise ValueError("it has no System")
+        experiment = root.find("{*}DefaultExperiment")
+        times = experiment if experiment is not None else Element("none")
+        return Structure(
+            _part(system),
+            read_units(root, tag="{*}Units/{*}Unit"),
+            _time(times.get("startTime")),
+            _time(times.get("stopTime")),
+        )
+    except (KeyError, ValueError) as error:
+        raise SpecError(f"{shown}: {_said(error)}") from None
+
+
+def parse_values(text: bytes, shown: str) -> tuple[Value, ...]:
+    """Return the content of an ``.ssv`` file.
+
+    Raises:
+        SpecError: naming the file and what is wrong.
+    """
+    try:
+        return tuple(_values(_root(text, "ParameterSet", shown)))
+    except (KeyError, ValueError) as error:
+        raise SpecError(f"{shown}: {_said(error)}") from None
+
+
+def parse_mappings(text: bytes, shown: str) -> tuple[Mapping, ...]:
+    """Return the content of an ``.ssm`` file.
+
+    Raises:
+        SpecError: naming the file and what is wrong.
+    """
+    try:
+        return tuple(_mappings(_root(text, "ParameterMapping", shown)))
+    except (KeyError, ValueError) as error:
+        raise SpecError(f"{shown}: {_said(error)}") from None
+
+
+def _said(error: Exception) -> str:
+    return f"the attribute {error} is missing" if isinstance(error, KeyError) else str(error)
+
+
+def _root(text: bytes, expected: str, shown: str) -> Element:
+    root = read_xml(text, shown, SpecError)
+    if not root.tag.startswith(_NAMESPACE) or root.tag.rpartition("}")[2] != expected:
+        raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
+    return root
+
+
+def _part(element: Element) -> Part:
+    kind = element.tag.rpartition("}")[2]
+    parts, wires = [], []
+    for child in element.findall("{*}Elements/*"):
+        tag = child.tag.rpartition("}")[2]
+        if tag == "SignalDictionaryReference":
+            raise ValueError(
+                f"{child.get('name')!r} refers to a signal dictionary, which is not supported; connect the "
+                "components directly"
+            )
+        if tag in ("Component", "System"):
+            parts.append(_part(child))
+    for wire in element.findall("{*}Connections/{*}Connection"):
+        wires.append(
+            Wire(
+                (wire.get("startElement"), wire.attrib["startConnector"]),
+                (wire.get("endElement"), wire.attrib["endConnector"]),
+                _transformation(wire),
+            )
+        )
+    name = element.get("name", "") if kind == "System" else element.attrib["name"]
+    source = element.attrib["source"] if kind == "Component" else ""
+    if kind == "Component" and not (name and source):
+        raise ValueError(f"a component has the name {name!r} and the source {source!r}; neither may be empty")
+    return Part(
+        name=name,
+        type=element.get("type", "application/x-fmu-sharedlibrary") if kind == "Component" else "",
+        source=source,
+        implementation=element.get("implementation", "any"),
+        connectors=tuple(map(_connector, element.findall("{*}Connectors/{*}Connector"))),
+        bindings=tuple(map(_binding, element.findall("{*}ParameterBindings/{*}ParameterBinding"))),
+        parts=tuple(parts),
+        wires=tuple(wires),
+    )
+
+
+def _connector(element: Element) -> Connector:
+    typed = next((child for child in element if child.tag.rpartition("}")[2] in _VALUE_TAGS), None)
+    unit = "" if typed is None else typed.get("unit", "")
+    kind = "" if typed is None else typed.tag.rpartition("}")[2]
+    return Connector(element.attrib["name"], element.attrib["kind"], "" if unit == "1" else unit, kind)
+
+
+def _transformation(element: Element) -> Transformation:
+    for child in element:
+        if child.tag.rpartition("}")[2] in _MAPPINGS:
+            kind = child.tag.rpartition("}")[2]
+            raise ValueError(f"the element {kind} is not supported; map the values inside a component")
+    linear = element.find("{*}LinearTransformation")
+    factor, offset = (1.0, 0.0) if linear is None else (
+        _number(linear.get("factor", "1")), _number(linear.get("offset", "0"))
+    )  # fmt: skip
+    if factor == 0.0:
+        raise ValueError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
+    return Transformation(factor, offset, _flag(element.get("suppressUnitConversion")))
+
+
+def _binding(element: Element) -> Binding:
+    for each in (element, *element.findall("{*}ParameterMapping")):
+        if each.get("sourceBase", "SSD") != "SSD":
+            raise ValueError("parameters inside an FMU (sourceBase) are not supported; put them beside it")
+    inline = element.find("{*}ParameterValues/{*}ParameterSet")
+    mapping = element.find("{*}ParameterMapping")
+    entries = None if mapping is None else mapping.find("{*}ParameterMapping")
+    return Binding(
+        prefix=element.get("prefix", ""),
+        source=element.get("source", ""),
+        values=() if inline is None else tuple(_values(inline)),
+        mapping_source="" if mapping is None else mapping.get("source", ""),
+        mappings=None if mapping is None else tuple(_mappings(mapping if entries is None else entries)),
+    )
+
+
+def _values(element: Element) -> Iterator[Value]:
+    for parameter in element.findall("{*}Parameters/{*}Parameter"):
+        name = parameter.attrib["name"]
+        typed = next((child for child in parameter if child.tag.rpartition("}")[2] in _VALUE_TAGS), None)
+        if typed is None:
+            raise ValueError(f"the parameter {name!r} has no value of a known type")
+        tag, text = typed.tag.rpartition("}")[2], typed.attrib["value"]
+        is_text = tag in ("String", "Enumeration")
+        number = float(_flag(text)) if tag == "Boolean" else 0.0 if is_text else _number(text)
+        unit = typed.get("unit", "")
+        yield Value(name, text if is_text else number, tag == "Enumeration", "" if unit == "1" else unit)
+
+
+def _mappings(element: Element) -> Iterator[Mapping]:
+    for entry in element.findall("{*}MappingEntry"):
+        yield Mapping(entry.attrib["source"], entry.attrib["target"], _transformation(entry))
+
+
+def _number(text: str) -> float:
+    number = float(text)
+    if not isfinite(number):
+        raise ValueError(f"{text!r} is not a finite number")
+    return number
+
+
+def _time(text: str | None) -> float | None:
+    return None if text is None else _number(text)
+
+
+def _flag(text: str | None) -> bool:
+    return text is not None and text.strip() in ("true", "1")

@@ -1,0 +1,1 @@
+"""Several connected FMUs as one model: components, connections, order of stepping."""

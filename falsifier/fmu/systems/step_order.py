@@ -1,0 +1,148 @@
+"""The order in which the components of a system step, from the dependencies that their FMUs declare.
+
+An output depends *directly* on an input if a change of the input changes it at once. A component whose
+outputs depend directly on an input must step after the component that feeds this input; otherwise its outputs
+are late by one communication step.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from graphlib import CycleError, TopologicalSorter
+
+from falsifier.fmu.description import Structure
+from falsifier.fmu.systems.network import SYSTEM, Link, Member, Place
+
+
+class Dependencies:
+    """What the components declare of their outputs and inputs.
+
+    Args:
+        members: the components.
+        structures: what their FMUs declare.
+    """
+
+    def __init__(self, members: Sequence[Member], structures: Sequence[Structure]) -> None:
+        self._members, self._structures = members, structures
+
+    def is_declared(self, place: Place, output: str) -> bool:
+        """Whether the component declares that its output depends directly on the input at this place."""
+        declared = self._inputs_of(place.member, output)
+        return declared is not None and self._declared(place.member, place.name) in declared
+
+    def is_possible(self, place: Place, output: str) -> bool:
+        """Whether the output may depend directly on the input: declared, or nothing is declared."""
+        return self._inputs_of(place.member, output) is None or self.is_declared(place, output)
+
+    def outputs(self, member: int) -> list[str]:
+        """Return the names of the outputs of a component."""
+        return [v.name for v in self._members[member].description.info.outputs]
+
+    def _inputs_of(self, member: int, output: str) -> frozenset[str] | None:
+        return self._structures[member].inputs_of.get(self._declared(member, output))
+
+    def _declared(self, member: int, name: str) -> str:
+        return self._members[member].description.slots[name].declared or name
+
+
+def direct_loop(links: Sequence[Link], dependencies: Dependencies) -> list[Place]:
+    """Return the inputs and outputs of a loop of declared direct dependencies; empty if there is none."""
+    by_member: dict[int, list[int]] = {}
+    for k, link in enumerate(links):
+        by_member.setdefault(link.source.member, []).append(k)
+    after = {
+        k: [
+            n
+            for n in by_member.get(link.target.member, ())
+            if dependencies.is_declared(link.target, links[n].source.name)
+        ]
+        for k, link in enumerate(links)
+    }
+    try:
+        TopologicalSorter(after).prepare()
+    except CycleError as error:
+        # To the sorter, what comes after a link comes before it: in reverse, the cycle follows the signals.
+        # Its first element is repeated at the end.
+        cycle: list[int] = error.args[1][:0:-1]
+        return [place for k in cycle for place in (links[k].source, links[k].target)]
+    return []
+
+
+def step_order(members: int, links: Iterable[Link], dependencies: Dependencies) -> tuple[int, ...]:
+    """Return the positions of the components in the order in which they step.
+
+    A component comes after those on whose outputs its own outputs depend directly: as declared, and if
+    possible also where nothing is declared. Otherwise the order is the given one.
+    """
+    declared = _predecessors(members, links, dependencies, dependencies.is_declared)
+    possible = _predecessors(members, links, dependencies, dependencies.is_possible)
+    left, order = set(range(members)), []
+    while left:
+        first = min(left, key=lambda m: (len(declared[m] & left), len(possible[m] & left), m))
+        left.remove(first)
+        order.append(first)
+    return tuple(order)
+
+
+def iterated_order(
+    members: int, links: Sequence[Link], dependencies: Dependencies
+) -> tuple[tuple[int, ...], tuple[tuple[int, int], ...]]:
+    """Return the order of stepping if loops are iterated, and the ranges of positions that iterate together.
+
+    An FMU that declares nothing may depend directly on all its inputs, and counts as such.
+    """
+    before = _predecessors(members, links, dependencies, dependencies.is_possible)
+    for link in links:
+        member = link.source.member
+        if member == link.target.member and any(
+            dependencies.is_possible(link.target, name) for name in dependencies.outputs(member)
+        ):
+            before[member].add(member)
+    reached = [_reached(m, before) for m in range(members)]
+    base = {m: k for k, m in enumerate(step_order(members, links, dependencies))}
+    groups = {m: sorted({m} | {n for n in reached[m] if m in reached[n]}, key=base.__getitem__) for m in base}
+    left, order, loops = set(base), list[int](), list[tuple[int, int]]()
+    while left:
+        ready = [m for m in left if not (reached[m] & left) - set(groups[m])]
+        group = groups[min(ready, key=base.__getitem__)]
+        if group[0] in reached[group[0]]:
+            loops.append((len(order), len(order) + len(group)))
+        order += group
+        left -= set(group)
+    return tuple(order), tuple(loops)
+
+
+def _reached(start: int, before: Sequence[set[int]]) -> set[int]:
+    found, left = set[int](), [start]
+    while left:
+        new = before[left.pop()] - found
+        found |= new
+        left += new
+    return found
+
+
+def late_links(
+    links: Iterable[Link], order: Sequence[int], loops: Sequence[tuple[int, int]] = ()
+) -> Iterator[Link]:
+    """Yield the connections whose target steps before their source, except for those that are iterated."""
+    position = {member: k for k, member in enumerate(order)}
+    for link in links:
+        if link.source.member != SYSTEM:
+            ends = position[link.source.member], position[link.target.member]
+            if ends[1] <= ends[0] and not any(
+                first <= min(ends) and max(ends) < last for first, last in loops
+            ):
+                yield link
+
+
+def _predecessors(
+    members: int,
+    links: Iterable[Link],
+    dependencies: Dependencies,
+    is_direct: Callable[[Place, str], bool],
+) -> list[set[int]]:
+    found: list[set[int]] = [set() for _ in range(members)]
+    for link in links:
+        target = link.target
+        outputs = dependencies.outputs(target.member)
+        if link.source.member != target.member and any(is_direct(target, name) for name in outputs):
+            found[target.member].add(link.source.member)
+    return found

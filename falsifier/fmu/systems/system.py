@@ -1,0 +1,254 @@
+"""Systems of FMUs as models: components, connections between them, and how they exchange values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import get_args
+
+from falsifier.core.arguments import instance, one_of, positive, whole
+from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, ModelInfo
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import SpecError
+from falsifier.fmu import in_process
+from falsifier.fmu.description import archive
+from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
+from falsifier.fmu.plan import make_plan
+from falsifier.fmu.systems.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
+from falsifier.fmu.systems.wiring import Connection, make_network
+from falsifier.fmu.tasks import Task, make_task, room_for, run_task
+from falsifier.fmu.worker_order import Order
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One FMU of a system.
+
+    Attributes:
+        fmu: path of the .fmu file.
+        step: step of its own in s, an integer multiple of the communication step; None for that step.
+        interface: ``co-simulation`` or ``model-exchange``; None: co-simulation if the FMU offers it.
+        sha256: hash of the file.
+
+    Raises:
+        ModelError: if the file cannot be read.
+        SpecError: if the step is not positive.
+    """
+
+    fmu: Path
+    step: float | None = None
+    interface: Interface | None = None
+    sha256: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fmu", Path(self.fmu).absolute())
+        if self.step is not None:
+            positive("step", self.step)
+        if self.interface is not None:
+            one_of("interface", self.interface, get_args(Interface))
+        object.__setattr__(self, "sha256", archive.file_hash(self.fmu))
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Several connected FMUs, simulated together; their variables are ``component.variable``.
+
+    Attributes:
+        components: the FMUs by name: a path, or a Component if it has a step of its own.
+        connections: by input, where its values come from: the name of an output, or a Connection.
+        coupling: how the components exchange values.
+        frame: inputs, names, values and stop time that the system has as a whole.
+        name: name of the system.
+        package: the SSP package that it was read from, if it was.
+        isolate: whether to simulate in a worker process; if not, a crash of an FMU crashes this process.
+        logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
+        key: hash of everything that determines the trajectories: FMUs, steps, connections, coupling, frame.
+
+    Raises:
+        ModelError: if a file is not an FMU.
+        SpecError: naming both ends of a connection that does not fit, and the remedy.
+
+    >>> System(
+    ...     {"plant": "plant.fmu", "controller": "controller.fmu"},
+    ...     {"plant.u": "controller.y", "controller.measured": "plant.y"},
+    ... )  # doctest: +SKIP
+    """
+
+    components: Mapping[str, Component | str | Path]
+    connections: Mapping[str, Connection | str] = field(default_factory=dict)
+    coupling: Coupling = field(default=Coupling(), kw_only=True)
+    frame: Frame = field(default=Frame(), kw_only=True)
+    name: str = field(default="system", kw_only=True)
+    package: Path | None = field(default=None, kw_only=True, compare=False)
+    key: str = field(default="", init=False, repr=False, compare=False)
+    isolate: bool = field(default=True, kw_only=True)
+    logging: bool = field(default=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        instance("components", self.components, Mapping, "FMUs by name")
+        instance("connections", self.connections, Mapping, "outputs by input")
+        if not self.components:
+            raise SpecError("components: expected at least one FMU")
+        if "" in self.components:
+            raise SpecError("components: the name of a component is empty; give it one")
+        components = {
+            name: each if isinstance(each, Component) else Component(Path(each))
+            for name, each in self.components.items()
+        }
+        connections = {
+            target: each if isinstance(each, Connection) else Connection(each)
+            for target, each in self.connections.items()
+        }
+        object.__setattr__(self, "components", components)
+        object.__setattr__(self, "connections", connections)
+        _check_coupling(self.coupling)
+        if self.coupling.isolation == "each" and not self.isolate:
+            raise SpecError('coupling.isolation: "each" needs worker processes; leave out isolate=False')
+        object.__setattr__(self, "key", _key(self))
+        _network(self)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    @property
+    def parts(self) -> dict[str, Component]:
+        """The components by name."""
+        return {name: each for name, each in self.components.items() if isinstance(each, Component)}
+
+    @property
+    def info(self) -> ModelInfo:
+        """The variables of all components, and what is known about the system."""
+        return self.network.description.info
+
+    @property
+    def network(self) -> Network:
+        """The checked system: members, links and the order of stepping."""
+        return _network(self)
+
+    def simulate(
+        self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
+    ) -> Trajectory:
+        """Simulate once, as described in ``falsifier.core.model.Model.simulate``.
+
+        An input that is not connected is set at each communication point to the signal's value at that time.
+
+        Raises:
+            SimulationError: if there is no complete trajectory; names the component that failed.
+            SpecError: if a component's own step is not an integer multiple of the communication step.
+        """
+        tables = [signal.pieces(experiment.stop_time) for signal in signals.values()]
+        if self.frame.values:
+            values = dict(self.frame.values)
+            numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
+            texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
+            experiment = replace(experiment, strings=(*texts, *experiment.strings))
+            parameters = numbers | dict(parameters)
+        task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
+        return run_task(self._runner(), task, tables, parameters, self.info.name)
+
+    def check_steps(self, experiment: Experiment) -> None:
+        """Check that each component's own step is an integer multiple of the communication step, and fits in.
+
+        Raises:
+            SpecError: naming the component and steps that fit.
+        """
+        step = experiment.step_size or experiment.output_interval
+        for name, component in self.parts.items():
+            if component.step is None:
+                continue
+            key = f"components.{name}.step"
+            if component.step > experiment.stop_time * (1.0 + GRID_ROUNDING):
+                raise SpecError(
+                    f"{component.step:g} s is longer than the simulation, which stops at "
+                    f"{experiment.stop_time:g} s; the component would never step; shorten its step",
+                    key=key,
+                )
+            count = max(round(component.step / step), 1)
+            if abs(component.step / step - count) > GRID_ROUNDING * count:
+                raise SpecError(
+                    f"{component.step:g} s is not an integer multiple of the communication step {step:g} s; "
+                    f"set step_size = {component.step / (count + (component.step > count * step)):.12g}, or "
+                    "another step here",
+                    key=key,
+                )
+
+    def load(self) -> None:
+        """Load all libraries and make instances in a worker process, without simulating.
+
+        Raises:
+            ModelError: if that fails.
+        """
+        fmu = IsolatedFmu(REGISTRY.starter, _order(self, logging=True))
+        try:
+            fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
+        finally:
+            fmu.close()
+
+    def close(self) -> None:
+        """End the worker process or unload the libraries; the next simulation starts again."""
+        drop = REGISTRY.drop if self.isolate else in_process.drop
+        drop(self.key, "co-simulation", logging=self.logging)
+
+    def _runner(self) -> "IsolatedFmu | in_process.LocalFmu":
+        order = _order(self, logging=self.logging)
+        return REGISTRY.fmu(order) if self.isolate else in_process.fmu(order)
+
+
+def _key(system: System) -> str:
+    components = [(name, each.sha256, each.step, each.interface) for name, each in system.parts.items()]
+    connections = sorted(system.connections.items(), key=str)
+    content = (system.name, components, connections, system.coupling, system.frame)
+    return sha256(repr(content).encode()).hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _order(system: System, *, logging: bool) -> Order:
+    network = system.network
+    return Order(
+        Path(system.name),
+        system.key,
+        network.description,
+        "co-simulation",
+        None,
+        logging=logging,
+        network=network,
+    )
+
+
+@lru_cache(maxsize=32)
+def _network(system: System) -> Network:
+    components = {
+        name: (each.fmu, each.sha256, each.step, each.interface) for name, each in system.parts.items()
+    }
+    connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
+    return make_network(system.name, components, connections, system.coupling, system.frame)
+
+
+@lru_cache(maxsize=64)
+def _task(
+    system: System,
+    experiment: Experiment,
+    inputs: tuple[str, ...],
+    parameters: tuple[str, ...],
+    pieces: int,
+) -> Task:
+    if experiment.outputs:
+        system.check_steps(experiment)
+    plan = make_plan(system.network.description, experiment, inputs, parameters, pieces=pieces)
+    return make_task(plan, experiment, system.info)
+
+
+def _check_coupling(coupling: Coupling) -> None:
+    one_of("coupling.method", coupling.method, get_args(Method))
+    one_of("coupling.loops", coupling.loops, get_args(Loops))
+    one_of("coupling.extrapolation", coupling.extrapolation, get_args(Extrapolation))
+    one_of("coupling.isolation", coupling.isolation, get_args(Isolation))
+    positive("coupling.tolerance", coupling.tolerance)
+    whole("coupling.max_rounds", coupling.max_rounds, least=1)
+    if coupling.loops == "iterate" and coupling.method == "jacobi":
+        raise SpecError(
+            'coupling.loops: with the method "jacobi" every connection has a delay, and no step is iterated; '
+            'use method = "gauss-seidel" or loops = "delay"'
+        )

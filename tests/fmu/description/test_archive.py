@@ -1,0 +1,118 @@
+import stat
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import ModelError
+from falsifier.fmu import read_info
+from falsifier.fmu.description import archive
+from tests.fmu import fixtures
+
+
+def write(path: Path, *entries: tuple[zipfile.ZipInfo | str, bytes]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
+        for entry, data in entries:
+            target.writestr(entry, data, zipfile.ZIP_DEFLATED)
+    return path
+
+
+@pytest.mark.parametrize(
+    "name", ["../evil.txt", "/etc/evil.txt", "a/../../evil.txt", "..\\evil.txt", "C:\\evil"]
+)
+def test_entries_that_leave_the_folder_are_refused(tmp_path: Path, name: str) -> None:
+    fmu = write(tmp_path / "evil.fmu", (name, b"x"))
+    with pytest.raises(ModelError, match="outside the folder"):
+        archive.extract(fmu, tmp_path / "deep" / "out")
+    assert not list(tmp_path.rglob("evil.txt"))
+
+
+def test_symbolic_links_are_refused(tmp_path: Path) -> None:
+    link = zipfile.ZipInfo("resources/passwd")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    with pytest.raises(ModelError, match="'resources/passwd' is a symbolic link"):
+        archive.extract(write(tmp_path / "link.fmu", (link, b"/etc/passwd")), tmp_path / "out")
+
+
+def test_a_bomb_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    fmu = tmp_path / "bomb.fmu"
+    with zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as target, target.open("zeros", "w") as entry:
+        for _ in range(300):
+            entry.write(bytes(1 << 20))
+    with pytest.raises(ModelError, match="'zeros' grows from"):
+        archive.extract(fmu, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_absurd_total_size_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archive, "_MAX_BYTES", 1000)
+    with pytest.raises(ModelError, match="would unpack to"):
+        archive.extract(write(tmp_path / "big.fmu", ("a", bytes(600)), ("b", bytes(600))), tmp_path / "out")
+
+
+def test_two_entries_of_one_name_are_refused(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="Duplicate"):
+        fmu = write(tmp_path / "twice.fmu", ("a", b"1"), ("a", b"2"))
+    with pytest.raises(ModelError, match="'a' 2 times"):
+        archive.extract(fmu, tmp_path / "out")
+
+
+def test_what_is_not_an_fmu_is_named(tmp_path: Path) -> None:
+    (tmp_path / "text.fmu").write_text("hello")
+    with pytest.raises(ModelError, match=r"text\.fmu: not a readable FMU"):
+        read_info(tmp_path / "text.fmu")
+    with pytest.raises(ModelError, match=r"none\.fmu: cannot read"):
+        read_info(tmp_path / "none.fmu")
+    with pytest.raises(ModelError, match=r"no modelDescription\.xml"):
+        read_info(write(tmp_path / "zip.fmu", ("a.txt", b"x")))
+
+
+def test_a_damaged_entry_is_named(tmp_path: Path) -> None:
+    data = bytearray(fixtures.path("Lag_2").read_bytes())
+    data[60:120] = bytes(60)
+    (tmp_path / "damaged.fmu").write_bytes(data)
+    with pytest.raises(ModelError, match=r"damaged|not well-formed|does not follow"):
+        read_info(tmp_path / "damaged.fmu")
+
+
+def test_an_unknown_compression_method_is_named(tmp_path: Path) -> None:
+    data = write(tmp_path / "packed.fmu", ("modelDescription.xml", b"<a/>")).read_bytes()
+    for header, position in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
+        at = data.index(header) + position
+        data = data[:at] + b"\x63\x00" + data[at + 2 :]
+    (tmp_path / "packed.fmu").write_bytes(data)
+    with pytest.raises(ModelError, match=r"packed\.fmu: modelDescription\.xml is damaged \(.*compression"):
+        read_info(tmp_path / "packed.fmu")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+@pytest.mark.parametrize("damage", [b"\xff" * 40, b"\0" * 40])
+def test_damage_of_any_compression_is_named(tmp_path: Path, method: int, damage: bytes) -> None:
+    path, content = tmp_path / "packed.fmu", bytes(range(256)) * 20
+    with zipfile.ZipFile(path, "w", method) as packed:
+        packed.writestr("modelDescription.xml", content)
+    data = path.read_bytes()
+    path.write_bytes(data[:60] + damage + data[100:])
+    with pytest.raises(ModelError, match=r"packed\.fmu: modelDescription\.xml is damaged"):
+        archive.read_entry(path, "modelDescription.xml")
+
+
+@pytest.mark.parametrize(("header", "name_at"), [(b"PK\x03\x04", 30), (b"PK\x01\x02", 46)])
+def test_a_name_in_no_encoding_is_damage(tmp_path: Path, header: bytes, name_at: int) -> None:
+    path = write(tmp_path / "named.fmu", ("modelDescription.xmlü", b"<a/>"))
+    data = bytearray(path.read_bytes())
+    end = data.index(header) + name_at + 21
+    data[end - 1 : end + 1] = b"\xff\xff"
+    path.write_bytes(data)
+    with pytest.raises(ModelError, match=r"named\.fmu: .*(damaged|not a readable FMU)"):
+        archive.read_entry(path, "modelDescription.xmlü")
+
+
+def test_platforms_have_one_name_in_all_versions() -> None:
+    names = ["binaries/linux64/a.so", "binaries/x86_64-windows/a.dll", "binaries/win32/a.dll", "sources/a.c"]
+    assert archive.platforms(names) == ("x86-windows", "x86_64-linux", "x86_64-windows")
+
+
+def test_extraction_gives_the_files(tmp_path: Path) -> None:
+    archive.extract(fixtures.path("Lag_2"), tmp_path)
+    assert (tmp_path / "modelDescription.xml").read_text().startswith("<?xml")

@@ -1,0 +1,152 @@
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from falsifier.core.files import bundled
+from falsifier.errors import ModelError
+from falsifier.fmu import read_info
+from falsifier.fmu.description.model_description import Description, parse, read_description
+from tests.fmu import fixtures
+
+ALL = sorted(p.stem for p in fixtures.FOLDER.glob("*.fmu"))
+
+
+def described(text: str) -> Description:
+    return parse(ElementTree.fromstring(text), name="test.fmu")
+
+
+@pytest.mark.parametrize("name", [n for n in ALL if n not in ("Scheduled_3", "Clocked_3")])
+def test_agrees_with_fmpy(name: str) -> None:
+    from fmpy import read_model_description
+
+    path = fixtures.path(name)
+    expected: Any = read_model_description(str(path), validate=True)
+    description = read_description(path)
+    info = description.info
+    assert (info.name, info.fmi_version) == (expected.modelName, expected.fmiVersion)
+    assert description.token == expected.guid
+    default = expected.defaultExperiment
+    assert info.stop_time == float(default.stopTime)
+    assert info.tolerance == (None if default.tolerance is None else float(default.tolerance))
+    assert ("co-simulation" in info.interfaces) == (expected.coSimulation is not None)
+    assert ("model-exchange" in info.interfaces) == (expected.modelExchange is not None)
+    scalars = {v.name: v for v in expected.modelVariables if not v.dimensions}
+    for variable in info.variables:
+        if variable.name not in scalars:
+            continue
+        twin = scalars[variable.name]
+        slot = description.slots[variable.name]
+        assert slot.reference == twin.valueReference
+        assert variable.unit == ("" if twin.unit == "1" else twin.unit or "")
+        assert variable.description == (twin.description or "")
+        # Limits that stand for "none" in some exporters are none here.
+        low = None if twin.min is None else float(twin.min)
+        assert variable.low == (low if low is None or abs(low) < 1e30 else None)
+        if variable.kind == "string":
+            assert variable.start == twin.start
+        elif twin.start is not None and variable.kind != "boolean":
+            assert variable.start == float(twin.start)
+        if variable.causality in ("input", "output"):
+            assert variable.causality == twin.causality
+
+
+def test_facts_of_a_model() -> None:
+    info = read_info(fixtures.path("Lag_2"))
+    assert [v.name for v in info.inputs] == ["u"]
+    assert (info["u"].low, info["u"].high, info["u"].unit) == (-10.0, 10.0, "m")
+    assert (info["y"].display_unit, info["y"].nominal) == ("mm", 5.0)
+    assert [v.name for v in info.variables if v.is_state] == ["x"]
+    assert [v.name for v in info.variables if v.settable] == ["u", "x", "T", "gain"]
+    assert info["x"].description == "lagged input"
+    assert info.step_size == 0.01
+
+
+@pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
+def test_enumerations_tell_their_literals(name: str) -> None:
+    info = read_info(fixtures.path(name))
+    assert info["in_Enumeration"].literals == {"first": 1, "second": 2, "third": 3}
+    assert info["in_Enumeration"].kind == "enumeration"
+
+
+def test_elements_of_arrays_are_variables() -> None:
+    info = read_info(fixtures.path("Arrays_3"))
+    assert [v.name for v in info.inputs] == ["u[1]", "u[2]"]
+    assert [(v.name, v.start) for v in info.parameters][:4] == [
+        ("A[1,1]", 0.0),
+        ("A[1,2]", 1.0),
+        ("A[2,1]", -1.0),
+        ("A[2,2]", 0.0),
+    ]
+    assert [v.name for v in info.variables if v.is_state] == ["x[1]", "x[2]"]
+
+
+ROLES = """
+<fmiModelDescription fmiVersion="2.0" modelName="M" guid="g"><CoSimulation modelIdentifier="M"/>
+<ModelVariables>
+<ScalarVariable name="c" valueReference="0" variability="constant"><Real start="1"/></ScalarVariable>
+<ScalarVariable name="k" valueReference="1" causality="calculatedParameter"><Real/></ScalarVariable>
+<ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+<ScalarVariable name="t" valueReference="3" causality="independent"><Real/></ScalarVariable>
+<ScalarVariable name="s" valueReference="4" causality="parameter"><String start="a"/></ScalarVariable>
+<ScalarVariable name="p" valueReference="5" causality="parameter"><Real start="1"/></ScalarVariable>
+</ModelVariables><ModelStructure/></fmiModelDescription>"""
+
+
+def test_what_cannot_be_set_says_why() -> None:
+    slots = described(ROLES).slots
+    assert "constant" in slots["c"].refusal
+    assert "calculated parameter" in slots["k"].refusal
+    assert "computes its initial value" in slots["y"].refusal
+    assert "time" in slots["t"].refusal
+    assert slots["p"].refusal == ""
+
+
+def test_strings_and_unknown_names_are_refused() -> None:
+    description = described(ROLES)
+    with pytest.raises(ModelError, match="'s' is a string"):
+        description.slot("s")
+    with pytest.raises(ModelError, match="no variable 'q'"):
+        description.slot("q")
+
+
+def test_array_sizes_from_structural_parameters_and_aliases() -> None:
+    description = described(
+        """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="g">
+        <CoSimulation modelIdentifier="M"/><ModelVariables>
+        <UInt64 name="n" valueReference="0" causality="structuralParameter" variability="fixed" start="3"/>
+        <Float64 name="x" valueReference="1" causality="output" initial="exact" start="7">
+          <Dimension valueReference="0"/><Alias name="state"/></Float64>
+        </ModelVariables><ModelStructure/></fmiModelDescription>"""
+    )
+    names = [v.name for v in description.info.variables]
+    assert names == ["n", "x[1]", "x[2]", "x[3]", "state[1]", "state[2]", "state[3]"]
+    assert description.slots["state[2]"].reference == 1
+    assert description.arrays[1] == (7.0, 7.0, 7.0)
+    assert "structural parameter" in description.slots["n"].refusal
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('<fmiModelDescription fmiVersion="4.0"/>', "fmiVersion is '4.0'; export it as FMI"),
+        ('<fmiModelDescription fmiVersion="2.0"/>', "does not follow FMI 2.0"),
+    ],
+)
+def test_wrong_descriptions_are_named(text: str, message: str) -> None:
+    with pytest.raises(ModelError, match=rf"test\.fmu: .*{message}"):
+        described(text)
+
+
+def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
+    copy = tmp_path / "model.fmu"
+    copy.write_bytes(fixtures.path("Lag_2").read_bytes())
+    assert read_info(copy).name == "Lag"
+    copy.write_bytes(fixtures.path("Ball_2").read_bytes())
+    assert read_info(copy).name == "Ball"
+
+
+@pytest.mark.parametrize("name", ["CC", "NN"])
+def test_a_dimensionless_variable_has_no_unit(name: str) -> None:
+    assert "1" not in {v.unit for v in read_info(bundled("fmus") / f"{name}.fmu").variables}

@@ -1,0 +1,288 @@
+"""SSP packages as systems."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.core.signals import Signal
+from falsifier.errors import SpecError
+from falsifier.fmu import System, read_package
+from falsifier.fmu.ssp import reader as ssp
+from tests.fmu import packages
+from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
+from tests.fmu.small_systems import run, sampled_loop
+
+ROOT_PORTS = """<ssd:Connectors>
+  <ssd:Connector name="reference" kind="input"><ssc:Real unit="mm"/></ssd:Connector>
+  <ssd:Connector name="height" kind="output"><ssc:Real unit="m"/></ssd:Connector>
+  <ssd:Connector name="slowness" kind="parameter"><ssc:Real/></ssd:Connector>
+</ssd:Connectors>"""
+PORTS = """
+<ssd:Connection startConnector="reference" endElement="pi" endConnector="r"/>
+<ssd:Connection startElement="plant" startConnector="y" endConnector="height"/>
+<ssd:Connection startConnector="slowness" endElement="plant" endConnector="T"/>"""
+MILLIMETRE = '<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssd:Units>'
+
+
+def local(file: Path) -> System:
+    return replace(read_package(file), isolate=False)
+
+
+@pytest.mark.parametrize("name", ["loop.ssp", "loop.ssd"])
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_components_and_connections_make_a_system(name: str, version: str, tmp_path: Path) -> None:
+    ssd = structure(system(PLANT + PI, FEEDBACK), version=version)
+    model = local(write(tmp_path / name, ssd, "Plant_2", "Gain_2"))
+    assert model.info.connections == (("pi.y", "plant.u"), ("plant.y", "pi.measured"))
+    assert model.info.name == "root" and [v.name for v in model.info.inputs] == ["pi.r"]
+    np.testing.assert_allclose(run(model, "plant.x")["plant.x"], sampled_loop(0), atol=1e-9)
+
+
+def test_ports_of_the_whole_units_and_the_default_experiment(tmp_path: Path) -> None:
+    bound = f"<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>{values('slowness Real 4')}"
+    bound += "</ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"
+    ssd = structure(
+        system(PLANT + PI, FEEDBACK + PORTS, before=ROOT_PORTS + bound),
+        after=MILLIMETRE + '<ssd:DefaultExperiment stopTime="3"/>',
+    )
+    model = local(write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2"))
+    info = model.info
+    assert info.stop_time == 3.0
+    (reference,) = info.inputs
+    assert (reference.name, reference.unit, reference.low, reference.high) == ("reference", "mm", 0.0, 2000.0)
+    assert info["height"].alias_of == "plant.y" and info["plant.T"].start == 4.0
+    signals = {"reference": Signal((0.0,), (1000.0,))}
+    found = run(model, "height", "plant.y", "pi.r", signals=signals, parameters={"plant.T": 2.0})
+    np.testing.assert_allclose(found["height"], sampled_loop(0), atol=1e-9)
+    np.testing.assert_array_equal(found["plant.y"], found["height"])
+    assert set(found["pi.r"]) == {1.0}
+    slow = run(model, "height")["height"]  # the default reference is the controller's 1 m, and T is 4 s
+    assert slow[1] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 / 4.0)))
+    given = run(model, "height", parameters={"reference": 500.0, "plant.T": 2.0})["height"]
+    np.testing.assert_allclose(given, 0.5 * sampled_loop(0), atol=1e-9)
+
+
+def test_nested_systems_are_flattened_and_transformations_add_up(tmp_path: Path) -> None:
+    ports = """<ssd:Connectors>
+      <ssd:Connector name="in" kind="input"><ssc:Real/></ssd:Connector>
+      <ssd:Connector name="out" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors>"""
+    inner = system(
+        PLANT,
+        """<ssd:Connection startElement="plant" startConnector="u" endConnector="in">
+             <ssc:LinearTransformation factor="2" offset="1"/></ssd:Connection>
+           <ssd:Connection startElement="plant" startConnector="y" endConnector="out"/>""",
+        before=ports,
+        name="body",
+    )
+    ssd = structure(
+        system(
+            inner + PI,
+            """<ssd:Connection startElement="pi" startConnector="y" endElement="body" endConnector="in">
+                 <ssc:LinearTransformation factor="10" offset="3"/></ssd:Connection>
+               <ssd:Connection startElement="body" startConnector="out" endElement="pi"
+                               endConnector="measured" suppressUnitConversion="true"/>""",
+        )
+    )
+    model = local(write(tmp_path / "nested.ssp", ssd, "Plant_2", "Gain_2"))
+    assert model.info.components == ("body.plant", "pi")
+    links = {n.target.name: n for n in model.network.links}
+    assert (links["u"].factor, links["u"].offset) == (20.0, 7.0), "2 (10 y + 3) + 1"
+    assert (links["measured"].factor, links["measured"].offset) == (1.0, 0.0)
+    assert any("pi.y -> body.plant.u: * 20 +7, as the package says" in note for note in model.info.notes)
+
+
+def test_a_description_in_the_same_package_is_a_component(tmp_path: Path) -> None:
+    sub = structure(system(PLANT, before="", name="inner"))
+    component = '<ssd:Component name="body" source="Body.ssd" type="application/x-ssp-definition"/>'
+    ssd = structure(system(component + PI))
+    model = read_package(write(tmp_path / "two.ssp", ssd, "Plant_2", "Gain_2", more={"Body.ssd": sub}))
+    assert model.info.components == ("body.plant", "pi")
+
+
+def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None:
+    second = PI.replace('name="pi"', 'name="pj"')
+    port = '<ssd:Connectors><ssd:Connector name="r" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+    wires = "".join(
+        f'<ssd:Connection startConnector="r" endElement="{each}" endConnector="r"/>' for each in ("pi", "pj")
+    )
+    model = local(write(tmp_path / "fan.ssp", structure(system(PI + second, wires, before=port)), "Gain_2"))
+    ramp = Signal((0.0, 1.0), (0.0, 1.0), "linear")
+    found = run(model, "pi.y", "pj.y", signals={"r": ramp})
+    np.testing.assert_array_equal(found["pi.y"], found["pj.y"])
+    np.testing.assert_allclose(found["pi.y"][1:], 2.0 * np.arange(10) / 10, atol=1e-12)
+
+
+WRONG: list[tuple[str, str]] = [
+    ("<ssd", "SystemStructure.ssd: not well-formed XML"),
+    ("<a/>", "SystemStructure.ssd: expected the SSP element SystemStructureDescription, got a"),
+    (structure(system(PLANT), version="3.0"), "SSP version '3.0'; export it as SSP 1.0 or 2.0"),
+    (structure(""), "it has no System"),
+    (structure(system(PLANT.replace("Plant_2", "Gone"))), "the resource 'resources/Gone.fmu' is missing"),
+    (structure(system(PLANT.replace("resources/", "../"))), "'../Plant_2.fmu' is not inside the package"),
+    (structure(system(PLANT.replace("resources/", "file:///"))), "is not inside the package"),
+    (structure(system(PLANT.replace("Plant_2", "Broken"))), "resources/Broken.fmu: "),
+    (structure(system(PLANT + PLANT)), "two elements are named 'plant'"),
+    (
+        structure(system(PLANT.replace('"plant"', '"a.plant"') + system(PLANT, name="a"))),
+        "two elements are named 'a.plant'",
+    ),
+    (structure(system(PLANT.replace('"plant"', '""'))), "has the name '' and the source"),
+    (structure(system(PLANT.replace("resources/Plant_2.fmu", ""))), "neither may be empty"),
+    (structure(system(PLANT.replace("resources/", "http://["))), "is not a path"),
+    (
+        structure(
+            system(
+                PLANT,
+                '<ssd:Connection startConnector="a" endElement="plant" endConnector="u">'
+                '<ssc:LinearTransformation factor="0"/></ssd:Connection>',
+            )
+        ),
+        "a LinearTransformation has the factor 0",
+    ),
+    (
+        structure('<ssd:System name="a"><ssd:Elements>' * 1500 + "</ssd:Elements></ssd:System>" * 1500),
+        "nested more than 400 deep",
+    ),
+    (
+        structure(system(PLANT.replace('"u"', '"v"'))),
+        "the FMU of plant has no variable for the connector plant.v; ",
+    ),
+    (
+        structure(system(PLANT.replace('"u" kind="input"', '"u" kind="output"'))),
+        "the connector plant.u is of kind output, but the FMU's variable has the causality input",
+    ),
+    (
+        structure(system(PLANT.replace('Real unit="m"', "Boolean"))),
+        "the connector plant.u is of type Boolean, but the FMU's variable of type Real; state the FMU's type",
+    ),
+    (
+        structure(system(PLANT.replace('unit="m"', 'unit="kg"'))),
+        "the connector plant.u is in kg, but the FMU's variable in m",
+    ),
+    (
+        structure(
+            system(PLANT + PI, FEEDBACK.replace('"plant" endConnector="u"', '"plant" endConnector="v"'))
+        ),
+        "the connection pi.y - plant.v names the unknown connector 'plant.v'; known: u, y, T",
+    ),
+    (
+        structure(system(PLANT + PI, FEEDBACK.replace('startElement="pi"', 'startElement="po"'))),
+        "the connection po.y - plant.u names the unknown element 'po'; did you mean 'pi'",
+    ),
+    (
+        structure(system(PLANT + PI, FEEDBACK.replace('Connector="measured"', 'Connector="y"'))),
+        "the connection pi.y - plant.y joins two outputs",
+    ),
+    (
+        structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
+        "plant.u is fed by pi.y and by pi.y; remove one of the connections",
+    ),
+    (
+        structure(system(PI.replace("Gain_2", "Gain_2kelvin").replace(' unit="m"', "") + PLANT, FEEDBACK)),
+        "plant.y is in m, pi.measured in K; the package defines no conversion",
+    ),
+    (
+        structure(system(PI.replace("application/x-fmu-sharedlibrary", "application/x-modelica"))),
+        "the component pi is of type application/x-modelica; only FMUs are supported",
+    ),
+    (
+        structure(
+            system(
+                '<ssd:Component name="me" source="SystemStructure.ssd" type="application/x-ssp-definition"/>'
+            )
+        ),
+        "the system contains itself, at me",
+    ),
+    (
+        structure(
+            system(
+                PLANT,
+                before="<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"
+                f"{values('plant.y Real 1')}"
+                "</ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>",
+            )
+        ),
+        "the parameter plant.y cannot be set: the model computes its initial value",
+    ),
+    (
+        structure(system('<ssd:SignalDictionaryReference name="bus" dictionary="d"/>')),
+        "'bus' refers to a signal dictionary, which is not supported",
+    ),
+    (
+        structure(
+            system(
+                PLANT + PI,
+                FEEDBACK.replace(
+                    'endConnector="u"/>', 'endConnector="u"><ssc:IntegerMappingTransformation/>'
+                ).replace(
+                    "IntegerMappingTransformation/>\n", "IntegerMappingTransformation/></ssd:Connection>\n"
+                ),
+            )
+        ),
+        "the element IntegerMappingTransformation is not supported",
+    ),
+    (
+        structure(system(PLANT.replace("<ssd:Component ", '<ssd:Component implementation="Scheduled" '))),
+        "the implementation of plant is 'Scheduled'; expected one of any, CoSimulation, ModelExchange",
+    ),
+    (
+        structure(system(PLANT.replace("<ssd:Component ", '<ssd:Component implementation="ModelExchange" '))),
+        "components.plant.interface: the FMU offers co-simulation, not model-exchange",
+    ),
+]
+
+
+@pytest.mark.parametrize(("ssd", "message"), WRONG)
+def test_a_wrong_package_is_one_clear_line(ssd: str, message: str, tmp_path: Path) -> None:
+    fmus = ("Plant_2", "Gain_2", "Gain_2kelvin")
+    file = write(tmp_path / "wrong.ssp", ssd, *fmus, more={"resources/Broken.fmu": b"no zip"})
+    with pytest.raises(Exception, match="wrong") as wrong:
+        read_package(file)
+    assert message in str(wrong.value) and "\n" not in str(wrong.value)
+    assert str(wrong.value).startswith(str(file))
+    assert getattr(wrong.value, "exit_code", None) == 2
+
+
+def test_descriptions_that_grow_like_powers_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ssp, "_MAX_ELEMENTS", 100)
+
+    def twice(name: str) -> str:
+        each = '<ssd:Component name="{}" source="{}.ssd" type="application/x-ssp-definition"/>'
+        return structure(system(each.format("a", name) + each.format("b", name)))
+
+    more: dict[str, str | bytes] = {f"d{k}.ssd": twice(f"d{k + 1}") for k in range(40)}
+    file = write(tmp_path / "powers.ssp", twice("d0"), more={**more, "d40.ssd": structure(system(""))})
+    with pytest.raises(Exception, match=r"powers\.ssp: the system has more than 100 elements"):
+        read_package(file)
+
+
+def test_an_algebraic_loop_of_a_package_is_refused(tmp_path: Path) -> None:
+    both = PI + PI.replace('name="pi"', 'name="pj"')
+    wires = "".join(
+        f'<ssd:Connection startElement="{a}" startConnector="y" endElement="{b}" endConnector="measured"/>'
+        for a, b in (("pi", "pj"), ("pj", "pi"))
+    )
+    file = write(tmp_path / "loop.ssp", structure(system(both, wires)), "Gain_2")
+    with pytest.raises(Exception, match=r"loop\.ssp: connections: .* algebraic loop"):
+        read_package(file)
+
+
+def test_entities_are_not_expanded(tmp_path: Path) -> None:
+    bomb = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".join(
+        f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+    )
+    text = packages.structure(system(PLANT)).replace("<ssd:SystemS", f"{bomb}]><ssd:SystemS", 1)
+    file = write(tmp_path / "bomb.ssp", text.replace('name="test"', 'name="&i;"'), "Plant_2")
+    with pytest.raises(Exception, match=r"bomb\.ssp: .*declares a document type \(x\)"):
+        read_package(file)
+
+
+@pytest.mark.parametrize("times", ['stopTime="-1"', 'stopTime="0"', 'startTime="5" stopTime="2"'])
+def test_a_default_experiment_that_ends_before_it_starts_is_refused(tmp_path: Path, times: str) -> None:
+    ssd = structure(system(PLANT + PI, FEEDBACK), after=f"<ssd:DefaultExperiment {times}/>")
+    with pytest.raises(SpecError, match=r"DefaultExperiment: the stop time -?\d s must be after the start"):
+        read_package(write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2"))

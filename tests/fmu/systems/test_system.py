@@ -1,0 +1,79 @@
+import pickle
+from pathlib import Path
+
+import pytest
+
+from falsifier.core.model import Experiment
+from falsifier.core.signals import Signal
+from falsifier.errors import ModelError, SpecError
+from falsifier.fmu import Coupling, System
+from falsifier.fmu.isolation import REGISTRY
+from tests.fmu.fixtures import path
+from tests.fmu.small_systems import LOOP, component, loop, run, sampled_loop, system
+
+
+def test_systems_travel_between_processes_and_are_equal_by_content() -> None:
+    model = loop()
+    twin = pickle.loads(pickle.dumps(model))
+    assert twin == model and hash(twin) == hash(model) and twin.key == model.key
+    assert run(twin, "plant.y")["plant.y"].tolist() == run(model, "plant.y")["plant.y"].tolist()
+    for other in (loop(Coupling("jacobi")), loop(pi="Gain_3"), system({"plant": "Plant_2"}, {})):
+        assert other != model and other.key != model.key
+
+
+def test_signals_and_parameters_reach_their_components() -> None:
+    model = loop()
+    found = run(
+        model, "plant.x", signals={"pi.r": Signal((0.0,), (2.0,))}, parameters={"pi.k": 0.0, "plant.x": 3.0}
+    )
+    assert found["plant.x"][-1] == pytest.approx(3.0 * 0.6065306597, rel=1e-6), "exp(-1/2)"
+    assert found.units == {"plant.x": "m"}
+
+
+def test_a_connected_input_cannot_be_driven() -> None:
+    with pytest.raises(ModelError, match=r"'plant\.u' is not an input, .*; the inputs are: pi\.r"):
+        run(loop(), "plant.y", signals={"plant.u": Signal((0.0,), (1.0,))})
+
+
+def test_own_steps_are_whole_multiples_of_the_communication_step() -> None:
+    model = system({"plant": "Plant_2", "pi": component("Gain_2", 0.25)}, LOOP)
+    with pytest.raises(
+        SpecError,
+        match=r"components\.pi\.step: 0\.25 s is not an integer multiple .* 0\.1 s; set step_size = 0\.083",
+    ):
+        run(model, "plant.y")
+    model.check_steps(Experiment(1.0, 0.1, ("plant.y",), step_size=0.05))
+
+
+def test_what_is_not_a_system_is_refused() -> None:
+    with pytest.raises(SpecError, match="components: expected at least one FMU"):
+        System({})
+    with pytest.raises(SpecError, match=r"coupling\.method: expected gauss-seidel or jacobi"):
+        loop(Coupling("both"))  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match=r"nowhere\.fmu: cannot read the FMU"):
+        System({"a": "nowhere.fmu"})
+
+
+def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
+    copy = tmp_path / "model.fmu"
+    copy.write_bytes(path("Plant_2").read_bytes())
+    model = System({"a": copy}, isolate=False, name="changed")
+    copy.write_bytes(path("Gain_2").read_bytes())
+    with pytest.raises(ModelError, match=r"model\.fmu: the file has changed since the model was loaded"):
+        run(model, "a.y")
+
+
+def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named() -> None:
+    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, LOOP, isolate=True)
+    for _ in range(3):
+        found = run(model, "plant.x")["plant.x"]
+        assert found == pytest.approx(sampled_loop(0), abs=1e-9)
+    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.key]
+    assert fmu._worker is not None and fmu._worker.simulations == 3
+    model.load()
+    with pytest.raises(Exception, match=r"process crashed in component bad: signal SIGSEGV") as crash:
+        run(model, "plant.x", parameters={"bad.misdeed": 1})
+    assert getattr(crash.value, "status", "") == "crashed"
+    with pytest.raises(Exception, match=r"^bad: the step returned error at t = 0\.5 s.*the tank is empty"):
+        run(model, "plant.x", parameters={"bad.misdeed": 9})
+    model.close()
