@@ -10,7 +10,7 @@ PIP_INSTALL := install --quiet --disable-pip-version-check --no-compile
 # of processor time instead of 6, and most others three to five times as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test lint types types-linux types-win32 types-darwin compiled pytest test-spawn docs notebooks fmus windows-worker clean
+.PHONY: demo test lint types types-linux types-win32 types-darwin compiled pytest test-spawn docs notebooks fmus worker clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
@@ -60,9 +60,9 @@ notebooks: .venv/test
 fmus: .venv-export/installed
 	$(MAKE) -C modelica PYTHON=$(CURDIR)/.venv-export/bin/python fmus
 
-# Rebuilds the program that runs Windows libraries through Wine, if its sources have changed.
-windows-worker: .venv-export/installed
-	$(MAKE) -C falsifier/fmu/windows_worker ZIG="$(CURDIR)/.venv-export/bin/python -m ziglang"
+# Rebuilds the programs that run FMUs, if their sources have changed.
+worker: .venv-export/installed
+	$(MAKE) -C falsifier/fmu/worker ZIG="$(CURDIR)/.venv-export/bin/python -m ziglang"
 
 # Either of these two is enough. pip compiles no modules: most are never imported, and the others then compile.
 .venv/installed: pyproject.toml constraints.txt | .venv/bin/pip

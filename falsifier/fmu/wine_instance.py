@@ -1,4 +1,4 @@
-"""A Windows library, simulated through Wine; the stepping is in windows_worker/, see wine_process.py."""
+"""A Windows library, simulated through Wine; the stepping is in worker/, see wine_process.py."""
 
 import mmap
 import struct

@@ -24,7 +24,7 @@ from falsifier.fmu.folders import REMOVING
 
 assert sys.platform != "win32"
 
-WORKER = Path(__file__).parent / "windows_worker" / "worker.exe"
+WORKER = Path(__file__).parent / "worker" / "bin" / "x86_64-windows" / "worker.exe"
 
 # What Wine would start besides the worker, or ask the user to install.
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
@@ -45,7 +45,7 @@ _SIGNALS = {
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Outcome of one request; see ``enum where`` and ``struct outcome`` in windows_worker/worker.h.
+    """Outcome of one request; see ``enum where`` and ``struct outcome`` in worker/worker.h.
 
     Attributes:
         where: where the request stopped.

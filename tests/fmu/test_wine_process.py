@@ -11,18 +11,21 @@ from tests import patience
 from tests.fmu.test_wine_instance import needs_wine
 
 
+_FOLDER = wine_process.WORKER.parents[2]
+
+
 def test_the_worker_is_built_from_its_sources() -> None:
-    """`make windows-worker` writes the sums of both."""
-    folder = wine_process.WORKER.parent
-    lines = [line.split() for line in (folder / "SHA256SUMS").read_text().splitlines()]
+    """`make worker` writes the sums of both."""
+    lines = [line.split() for line in (_FOLDER / "SHA256SUMS").read_text().splitlines()]
     sums = {name: digest for digest, name in lines}
-    assert sums.keys() == {path.name for path in folder.iterdir()} - {"SHA256SUMS"}
+    files = {str(path.relative_to(_FOLDER)) for path in _FOLDER.rglob("*") if path.is_file()}
+    assert sums.keys() == files - {"SHA256SUMS"}
     for name, expected in sums.items():
-        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == expected, name
+        assert hashlib.sha256((_FOLDER / name).read_bytes()).hexdigest() == expected, name
 
 
 def test_places_and_requests_are_numbered_as_in_the_worker() -> None:
-    header = (wine_process.WORKER.parent / "worker.h").read_text()
+    header = (_FOLDER / "worker.h").read_text()
     names = [
         line.split("/*")[0] for line in header.partition("enum where {")[2].partition("}")[0].splitlines()
     ]

@@ -1,9 +1,9 @@
-/* Runs the Windows library of one FMU, under Wine or on Windows: windows.py is the other side.
+/* Runs one FMU: the process that may crash, hang or leak memory in place of the one that requests simulations.
  *
  * Requests arrive on standard input: their kind and length (4 bytes each), then what request.c reads. Replies
- * go to the pipe that the first request names: where the request stopped, FMI's status, the simulated time, and
- * a text after its length. Messages of the FMU come before the reply. Standard output and standard error belong
- * to the FMU. Parameters, inputs and outputs of simulations are in a file that both sides map.
+ * go to a pipe of their own: where the request stopped, FMI's status, the simulated time, and a text after its
+ * length. Messages of the FMU come before the reply. Standard output and standard error belong to the FMU.
+ * Parameters, inputs and outputs of simulations are in memory that both sides map.
  *
  * The end of the requests ends the process. */
 
@@ -12,15 +12,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <windows.h>
 
+#include "platform.h"
 #include "worker.h"
 
 enum kind { CONNECT, LOAD, PREPARE, SIMULATE, RESET, TAKE, RESTORE, FORGET, RENEW };
 
 #define MESSAGE_BYTES 4096
 
-static HANDLE requests, replies;
 static struct fmu fmu;
 static struct plan plan;
 static jmp_buf end_of_request;
@@ -47,9 +46,8 @@ static void reply(enum where where, unsigned status, double time, const char *te
     memcpy(message + 16, &size, 4);
     memcpy(message + 20, prefix, before);
     memcpy(message + 20 + before, text, length);
-    DWORD written;
-    if (!WriteFile(replies, message, 20 + size, &written, NULL))
-        ExitProcess(0);
+    if (!send_bytes(message, 20 + size))
+        end_process(0);
 }
 
 void say(unsigned status, const char *text)
@@ -77,31 +75,9 @@ void *need(size_t count, size_t size)
     return memory;
 }
 
-double now(void)
+static void report_crash(unsigned code)
 {
-    static LARGE_INTEGER frequency;
-    LARGE_INTEGER ticks;
-    if (!frequency.QuadPart)
-        QueryPerformanceFrequency(&frequency);
-    QueryPerformanceCounter(&ticks);
-    return (double)ticks.QuadPart / (double)frequency.QuadPart;
-}
-
-static LONG WINAPI report_crash(EXCEPTION_POINTERS *crash)
-{
-    unsigned code = crash->ExceptionRecord->ExceptionCode;
     reply(CRASHED, code, -1.0, "");
-    TerminateProcess(GetCurrentProcess(), code);
-    return EXCEPTION_EXECUTE_HANDLER;
-}
-
-static void connect_replies(struct request *r)
-{
-    wchar_t path[4096];
-    MultiByteToWideChar(CP_UTF8, 0, read_text(r), -1, path, sizeof path / sizeof *path);
-    replies = CreateFileW(path, GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL, OPEN_EXISTING, 0, NULL);
-    if (replies == INVALID_HANDLE_VALUE)
-        ExitProcess(2);
 }
 
 static void load(struct request *r)
@@ -137,7 +113,7 @@ static struct outcome simulate(double time_limit)
     if (o.where != DONE)
         return o;
     failing = "";
-    o = fmu.is_model_exchange ? solve(&fmu, &plan, &first_events, deadline, &reached)
+    o = fmu.is_model_exchange ? solve(&fmu, &first_events, deadline, &reached)
                               : co_simulate(&fmu, &plan, deadline, &reached);
     if (o.where == DONE)
         terminate(&fmu);
@@ -156,7 +132,10 @@ static struct outcome answer(enum kind kind, struct request *r)
 {
     const struct outcome done = {0, DONE}, refused = {0, REFUSED};
     switch (kind) {
-    case CONNECT: connect_replies(r); return done;
+    case CONNECT:
+        if (!connect_replies(read_text(r)))
+            end_process(2);
+        return done;
     case LOAD: load(r); return done;
     case PREPARE: prepare(r); return done;
     case SIMULATE: return simulate(read_number(r));
@@ -169,30 +148,14 @@ static struct outcome answer(enum kind kind, struct request *r)
     give_up("request %d is unknown", (int)kind);
 }
 
-static int receive(void *target, size_t count)
-{
-    for (char *at = target; count;) {
-        DWORD some = 0;
-        if (!ReadFile(requests, at, (DWORD)count, &some, NULL) || !some)
-            return 0;
-        at += some;
-        count -= some;
-    }
-    return 1;
-}
-
 int main(void)
 {
     uint32_t head[2];
-    requests = GetStdHandle(STD_INPUT_HANDLE);
-    SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX | SEM_NOOPENFILEERRORBOX);
-    SetUnhandledExceptionFilter(report_crash);
-    /* What the FMU printed before a crash must not be lost. */
-    setvbuf(stdout, NULL, _IONBF, 0);
-    while (receive(head, sizeof head)) {
+    start_platform(report_crash);
+    while (receive_bytes(head, sizeof head)) {
         char *start = calloc(head[1] + 1, 1);
         struct request r = {start, start + head[1]};
-        if (!start || !receive(r.at, head[1]))
+        if (!start || !receive_bytes(r.at, head[1]))
             break;
         if (setjmp(end_of_request))
             continue;

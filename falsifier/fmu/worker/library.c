@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <windows.h>
 
+#include "platform.h"
 #include "worker.h"
 
 #define MESSAGE_BYTES 4096
@@ -72,7 +72,7 @@ void *fmu_function(const struct fmu *fmu, const char *name)
         snprintf(symbol, sizeof symbol, "%s_fmi%s", fmu->identifier, name);
     else
         snprintf(symbol, sizeof symbol, "fmi%d%s", fmu->major, name);
-    return (void *)(uintptr_t)GetProcAddress(fmu->module, symbol);
+    return find_symbol(fmu->module, symbol);
 }
 
 void *fmu_required(const struct fmu *fmu, const char *name)
@@ -88,21 +88,9 @@ void *fmu_required(const struct fmu *fmu, const char *name)
 
 const char *fmu_load(struct fmu *fmu)
 {
-    static char text[64];
-    wchar_t path[4096];
-    if (!MultiByteToWideChar(CP_UTF8, 0, fmu->library, -1, path, sizeof path / sizeof *path))
-        return "its path is too long";
-    /* The folder of the library is searched for the libraries that it needs. */
-    fmu->module = LoadLibraryExW(path, NULL, LOAD_WITH_ALTERED_SEARCH_PATH);
-    if (fmu->module)
-        return NULL;
-    DWORD code = GetLastError();
-    if (code == ERROR_MOD_NOT_FOUND)
-        return "it needs a library that is neither beside it nor part of Wine";
-    if (code == ERROR_BAD_EXE_FORMAT)
-        return "it is not a 64-bit library, or it is damaged";
-    snprintf(text, sizeof text, "Windows error %lu", code);
-    return text;
+    const char *wrong = NULL;
+    fmu->module = load_library(fmu->library, &wrong);
+    return wrong;
 }
 
 static void *instantiate_1(const struct fmu *fmu)

@@ -7,9 +7,9 @@
 
 #include <math.h>
 #include <string.h>
-#include <windows.h>
 
 #include "model_exchange.h"
+#include "platform.h"
 
 /* Constants of Hairer and Wanner: a problem is stiff after 15 steps with h times the dominant eigenvalue above
  * 3.25 (the method is stable up to 3.3); 6 other steps in a row reset the count. */
@@ -24,29 +24,26 @@
 #define STEPS_PER_CLOCK_CHECK 100
 /* Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7). */
 #define ABSOLUTE_SHARE 0.01
-#define PAGE 4096
-
-static struct solver solver;
 
 static const struct outcome done = {0, DONE};
 
 /* Numbers that the FMU writes end where accessible memory ends: an FMU that writes past them crashes there. */
 static double *guarded(size_t count)
 {
-    size_t usable = (count * sizeof(double) + PAGE - 1) / PAGE * PAGE;
-    char *memory = VirtualAlloc(NULL, usable + PAGE, MEM_COMMIT | MEM_RESERVE, PAGE_READWRITE);
-    DWORD before;
+    void *memory = guarded_memory(count * sizeof(double));
     if (!memory)
         give_up("not enough memory for the FMU and what surrounds it");
-    VirtualProtect(memory + usable, PAGE, PAGE_NOACCESS, &before);
-    return (double *)(memory + usable) - count;
+    return memory;
 }
 
 void prepare_solver(struct fmu *fmu, struct plan *plan)
 {
-    struct solver *s = &solver;
     get_sizes(fmu);
-    int is_known = s->fmu && s->n == fmu->states && s->indicators == fmu->indicators;
+    int is_known =
+        fmu->solver && fmu->solver->n == fmu->states && fmu->solver->indicators == fmu->indicators;
+    if (!is_known)
+        fmu->solver = need(1, sizeof *fmu->solver);
+    struct solver *s = fmu->solver;
     s->fmu = fmu;
     s->plan = plan;
     s->n = fmu->states;
@@ -325,15 +322,14 @@ static struct outcome advance(struct solver *s)
 
 /* Solve the differential equation up to the stop time. */
 struct outcome solve(
-    struct fmu *fmu, struct plan *plan, const struct event_info_1 *first_events, double deadline, double *reached)
+    struct fmu *fmu, const struct event_info_1 *first_events, double deadline, double *reached)
 {
-    struct solver *s = &solver;
-    (void)fmu;
+    struct solver *s = fmu->solver;
     struct outcome o = begin(s, first_events);
-    for (size_t k = 1; o.where == DONE && s->column < plan->samples; k++) {
+    for (size_t k = 1; o.where == DONE && s->column < s->plan->samples; k++) {
         o = advance(s);
         int is_late = k % STEPS_PER_CLOCK_CHECK == 0 && now() > deadline;
-        if (is_late && o.where == DONE && s->column < plan->samples)
+        if (is_late && o.where == DONE && s->column < s->plan->samples)
             o = (struct outcome){0, TIMEOUT};
     }
     *reached = s->time;

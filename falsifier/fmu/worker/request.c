@@ -4,8 +4,8 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <windows.h>
 
+#include "platform.h"
 #include "worker.h"
 
 static void *read_bytes(struct request *r, size_t count)
@@ -98,31 +98,14 @@ static void read_inputs(
         inputs->rows[j] = (const struct piece *)(table + read_size(r) * 5 * pieces);
 }
 
-/* Map the file that is shared with the process that requests simulations. */
-static double *map_room(const char *path)
-{
-    static void *last;
-    wchar_t wide[4096];
-    if (last)
-        UnmapViewOfFile(last);
-    last = NULL;
-    MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, sizeof wide / sizeof *wide);
-    HANDLE file = CreateFileW(wide, GENERIC_READ | GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL,
-                              OPEN_EXISTING, 0, NULL);
-    HANDLE mapping = CreateFileMappingW(file, NULL, PAGE_READWRITE, 0, 0, NULL);
-    last = mapping ? MapViewOfFile(mapping, FILE_MAP_WRITE, 0, 0, 0) : NULL;
-    if (!last)
-        give_up("%s cannot be mapped (Windows error %lu)", path, GetLastError());
-    CloseHandle(mapping);
-    CloseHandle(file);
-    return last;
-}
-
 /* Read a plan; its shared memory is laid out as Room is: parameters, inputs, outputs. */
 void read_plan(struct request *r, const struct fmu *fmu, struct plan *plan)
 {
     memset(plan, 0, sizeof *plan);
-    double *room = map_room(read_text(r));
+    const char *place = read_text(r);
+    double *room = map_room(place);
+    if (!room)
+        give_up("the memory of a simulation cannot be mapped%s%s", *place ? ": " : "", place);
     plan->samples = read_size(r);
     plan->every = read_size(r);
     size_t pieces = read_size(r);

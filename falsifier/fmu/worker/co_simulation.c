@@ -2,25 +2,18 @@
 
 #include <math.h>
 
+#include "platform.h"
 #include "worker.h"
 
 /* Early returns at one time, or rounds of one event iteration, after which the FMU is considered stuck. */
 #define MOST_ROUNDS 1000
 #define STEPS_PER_CLOCK_CHECK 100
 
-typedef unsigned (*mode)(void *);
-typedef unsigned (*update_3)(void *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, double *);
 typedef unsigned (*step_1)(void *, double, double, char);
 typedef unsigned (*step_2)(void *, double, double, int);
 typedef unsigned (*step_3)(void *, double, double, uint8_t, uint8_t *, uint8_t *, uint8_t *, double *);
 
 static const struct outcome done = {0, DONE};
-
-static struct {
-    void *do_step;
-    mode enter_event_mode, enter_step_mode;
-    update_3 update;
-} f;
 
 /* Iterate events in FMI 3's event mode until nothing changes any more. */
 static struct outcome settle(struct fmu *fmu)
@@ -28,7 +21,7 @@ static struct outcome settle(struct fmu *fmu)
     for (int round = 0; round < MOST_ROUNDS; round++) {
         uint8_t again = 0, end = 0, nominals = 0, states = 0, defined = 0;
         double next_time = 0.0;
-        unsigned status = f.update(fmu->instance, &again, &end, &nominals, &states, &defined, &next_time);
+        unsigned status = fmu->step.update(fmu->instance, &again, &end, &nominals, &states, &defined, &next_time);
         if (status > 1)
             return (struct outcome){status, EVENT};
         if (end)
@@ -42,7 +35,7 @@ static struct outcome settle(struct fmu *fmu)
 /* Enter event mode, set inputs, update the discrete states, return to step mode. */
 static struct outcome handle_event(struct fmu *fmu, const struct ports *ports)
 {
-    unsigned status = f.enter_event_mode(fmu->instance);
+    unsigned status = fmu->step.enter_event_mode(fmu->instance);
     if (status > 1)
         return (struct outcome){status, EVENT};
     status = ports ? exchange_values(fmu, ports) : 0;
@@ -51,7 +44,7 @@ static struct outcome handle_event(struct fmu *fmu, const struct ports *ports)
     struct outcome o = settle(fmu);
     if (o.where != DONE)
         return o;
-    status = f.enter_step_mode(fmu->instance);
+    status = fmu->step.enter_step_mode(fmu->instance);
     return (struct outcome){status, status > 1 ? EVENT : DONE};
 }
 
@@ -63,7 +56,7 @@ static struct outcome advance_3(struct fmu *fmu, double start, double end, int *
     for (;;) {
         uint8_t event = 0, terminate = 0, early = 0;
         double reached = end;
-        unsigned status = ((step_3)f.do_step)(
+        unsigned status = ((step_3)fmu->step.do_step)(
             fmu->instance, time, end - time, 1, &event, &terminate, &early, &reached);
         *ends = 0;
         if (status > 1)
@@ -111,23 +104,23 @@ static struct outcome step(struct fmu *fmu, double start, double end, int *ends)
         return advance_3(fmu, start, end, ends);
     *ends = 0;
     unsigned status = fmu->major == 2
-                          ? ((step_2)f.do_step)(fmu->instance, start, end - start, 1)
-                          : ((step_1)f.do_step)(fmu->instance, start, end - start, 1);
+                          ? ((step_2)fmu->step.do_step)(fmu->instance, start, end - start, 1)
+                          : ((step_1)fmu->step.do_step)(fmu->instance, start, end - start, 1);
     return (struct outcome){status, status > 1 ? STEPPING : DONE};
 }
 
 static struct outcome begin(struct fmu *fmu, struct plan *plan)
 {
-    f.do_step = fmu_required(fmu, "DoStep");
+    fmu->step.do_step = fmu_required(fmu, "DoStep");
     struct outcome o = done;
     if (fmu->event_mode) {
-        f.enter_event_mode = (mode)fmu_required(fmu, "EnterEventMode");
-        f.enter_step_mode = (mode)fmu_required(fmu, "EnterStepMode");
-        f.update = (update_3)fmu_required(fmu, "UpdateDiscreteStates");
+        fmu->step.enter_event_mode = (without_arguments)fmu_required(fmu, "EnterEventMode");
+        fmu->step.enter_step_mode = (without_arguments)fmu_required(fmu, "EnterStepMode");
+        fmu->step.update = (update_discrete_states_3)fmu_required(fmu, "UpdateDiscreteStates");
         /* Leave the event mode in which initialisation ends. */
         o = settle(fmu);
         if (o.where == DONE) {
-            unsigned status = f.enter_step_mode(fmu->instance);
+            unsigned status = fmu->step.enter_step_mode(fmu->instance);
             o = (struct outcome){status, status > 1 ? EVENT : DONE};
         }
     }

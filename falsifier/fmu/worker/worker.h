@@ -1,7 +1,7 @@
 /* What the parts of the worker share: the FMU, the plan of its simulations, and the outcome of each request.
  *
- * The worker runs FMUs' Windows libraries; see main.c. Stepping and solver do the same operations in the same
- * order as the Python modules of the same names, so that both give the same trajectories. */
+ * The worker is the process that an FMU runs in; see main.c. Whatever belongs to one FMU is in its struct fmu,
+ * because a system has several in one process. */
 
 #ifndef WORKER_H
 #define WORKER_H
@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Where a simulation stopped. The first eight are those of stepping.py, the others are named in windows.py. */
+/* Where a simulation stopped. The first eight are those of loop_numbers.py, the others are in wine_instance.py. */
 enum where {
     DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL,
     CALLING = 20,   /* a function at the start of the simulation; the text names it */
@@ -28,11 +28,25 @@ struct outcome {
     enum where where;
 };
 
+typedef unsigned (*without_arguments)(void *);
+typedef unsigned (*update_discrete_states_3)(
+    void *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, double *);
+
+/* What co-simulation calls in every step; the last three only of FMI 3 with event mode. */
+struct step_functions {
+    void *do_step;
+    without_arguments enter_event_mode, enter_step_mode;
+    update_discrete_states_3 update;
+};
+
+/* One FMU: what the request says of it, its library, and its instance with what surrounds it. */
 struct fmu {
     int major, is_model_exchange, logging, event_mode;
     size_t states, indicators;
     char *library, *identifier, *name, *token, *resources;
     void *module, *instance, *state;
+    struct step_functions step;
+    struct solver *solver; /* model exchange: see model_exchange.h */
 };
 
 /* One get or set call. */
@@ -125,7 +139,7 @@ struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, 
 /* solver.c */
 void prepare_solver(struct fmu *fmu, struct plan *plan);
 struct outcome solve(
-    struct fmu *fmu, struct plan *plan, const struct event_info_1 *first_events, double deadline, double *reached);
+    struct fmu *fmu, const struct event_info_1 *first_events, double deadline, double *reached);
 
 /* request.c */
 struct request {
@@ -140,7 +154,6 @@ double read_number(struct request *request);
 void give_up(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
 void say(unsigned status, const char *text); /* passes a message of the FMU on */
 void *need(size_t count, size_t size);       /* zeroed memory */
-double now(void);                            /* in s */
 
 extern const char *failing; /* the text of the next outcome */
 

@@ -7,9 +7,23 @@
 
 #define STAGES 7
 
+typedef unsigned (*set_time)(void *, double);
+typedef unsigned (*set_vector)(void *, const double *, size_t);
+typedef unsigned (*get_vector)(void *, double *, size_t);
+
+/* What is called in every step; completed_step and update have other arguments in each version of FMI. */
+struct continuous_functions {
+    set_time set_time;
+    set_vector set_states;
+    get_vector get_states, get_derivatives, get_indicators;
+    void *completed_step, *update;
+    without_arguments enter_event_mode, enter_continuous_time_mode;
+};
+
 struct solver {
     struct fmu *fmu;
     struct plan *plan;
+    struct continuous_functions f;
     size_t n, indicators;
     double *weights; /* absolute tolerance of each state */
 
@@ -32,7 +46,7 @@ struct trial {
 };
 
 /* continuous.c */
-void find_functions(const struct solver *s);
+void find_functions(struct solver *s);
 void get_sizes(struct fmu *fmu);
 unsigned get_nominals(const struct solver *s, double *nominals);
 unsigned get_states(const struct solver *s);

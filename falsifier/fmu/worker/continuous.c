@@ -10,10 +10,6 @@
 /* Maximum number of states, and of event indicators: an FMU may report anything. */
 #define MOST_VALUES 100000
 
-typedef unsigned (*mode)(void *);
-typedef unsigned (*set_time)(void *, double);
-typedef unsigned (*set_vector)(void *, const double *, size_t);
-typedef unsigned (*get_vector)(void *, double *, size_t);
 typedef unsigned (*get_size)(void *, size_t *);
 typedef unsigned (*completed_1)(void *, char *);
 typedef unsigned (*completed_2)(void *, int, int *, int *);
@@ -27,35 +23,27 @@ struct event_info_2 {
 
 typedef unsigned (*update_1)(void *, char, struct event_info_1 *);
 typedef unsigned (*update_2)(void *, struct event_info_2 *);
-typedef unsigned (*update_3)(void *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, double *);
-
-static struct {
-    set_time set_time;
-    set_vector set_states;
-    get_vector get_states, get_derivatives, get_indicators;
-    void *completed_step, *update;
-    mode enter_event_mode, enter_continuous_time_mode;
-} f;
 
 /* Look up what is called in every step. */
-void find_functions(const struct solver *s)
+void find_functions(struct solver *s)
 {
     const struct fmu *fmu = s->fmu;
-    f.set_time = (set_time)fmu_required(fmu, "SetTime");
-    f.completed_step = fmu_required(fmu, "CompletedIntegratorStep");
+    struct continuous_functions *f = &s->f;
+    f->set_time = (set_time)fmu_required(fmu, "SetTime");
+    f->completed_step = fmu_required(fmu, "CompletedIntegratorStep");
     if (s->n) {
-        f.set_states = (set_vector)fmu_required(fmu, "SetContinuousStates");
-        f.get_states = (get_vector)fmu_required(fmu, "GetContinuousStates");
-        f.get_derivatives = (get_vector)fmu_required(
+        f->set_states = (set_vector)fmu_required(fmu, "SetContinuousStates");
+        f->get_states = (get_vector)fmu_required(fmu, "GetContinuousStates");
+        f->get_derivatives = (get_vector)fmu_required(
             fmu, fmu->major == 3 ? "GetContinuousStateDerivatives" : "GetDerivatives");
     }
     if (s->indicators)
-        f.get_indicators = (get_vector)fmu_required(fmu, "GetEventIndicators");
+        f->get_indicators = (get_vector)fmu_required(fmu, "GetEventIndicators");
     const char *updates[] = {"EventUpdate", "NewDiscreteStates", "UpdateDiscreteStates"};
-    f.update = fmu_required(fmu, updates[fmu->major - 1]);
+    f->update = fmu_required(fmu, updates[fmu->major - 1]);
     if (fmu->major > 1) {
-        f.enter_event_mode = (mode)fmu_required(fmu, "EnterEventMode");
-        f.enter_continuous_time_mode = (mode)fmu_required(fmu, "EnterContinuousTimeMode");
+        f->enter_event_mode = (without_arguments)fmu_required(fmu, "EnterEventMode");
+        f->enter_continuous_time_mode = (without_arguments)fmu_required(fmu, "EnterContinuousTimeMode");
     }
 }
 
@@ -88,7 +76,7 @@ unsigned get_nominals(const struct solver *s, double *nominals)
 
 unsigned get_states(const struct solver *s)
 {
-    return s->n ? f.get_states(s->fmu->instance, s->x, s->n) : 0;
+    return s->n ? s->f.get_states(s->fmu->instance, s->x, s->n) : 0;
 }
 
 static void put_current(const struct inputs *inputs, double time)
@@ -101,15 +89,15 @@ static void put_current(const struct inputs *inputs, double time)
 unsigned derive(const struct solver *s, double time, const double *x, double *derivatives)
 {
     void *instance = s->fmu->instance;
-    unsigned status = f.set_time(instance, time);
+    unsigned status = s->f.set_time(instance, time);
     if (status <= 1 && s->n)
-        status = f.set_states(instance, x, s->n);
+        status = s->f.set_states(instance, x, s->n);
     if (status <= 1 && s->plan->inputs.ports.count) {
         put_current(&s->plan->inputs, time);
         status = exchange_values(s->fmu, &s->plan->inputs.ports);
     }
     if (status <= 1 && s->n) {
-        status = f.get_derivatives(instance, derivatives, s->n);
+        status = s->f.get_derivatives(instance, derivatives, s->n);
         /* Treat a step into a region where the model is undefined like fmi2Discard: retry a shorter one. */
         for (size_t i = 0; i < s->n; i++)
             if (!isfinite(derivatives[i]))
@@ -121,7 +109,7 @@ unsigned derive(const struct solver *s, double time, const double *x, double *de
 /* Get the event indicators at the FMU's current time and state. */
 unsigned get_indicators(const struct solver *s, double *z)
 {
-    return s->indicators ? f.get_indicators(s->fmu->instance, z, s->indicators) : 0;
+    return s->indicators ? s->f.get_indicators(s->fmu->instance, z, s->indicators) : 0;
 }
 
 /* Report an accepted step to the FMU. */
@@ -132,13 +120,13 @@ unsigned complete_step(const struct solver *s, int *wants_event, int *ends)
     *wants_event = *ends = 0;
     if (s->fmu->major == 1) {
         char event = 0;
-        status = ((completed_1)f.completed_step)(instance, &event);
+        status = ((completed_1)s->f.completed_step)(instance, &event);
         *wants_event = event != 0;
     } else if (s->fmu->major == 2) {
-        status = ((completed_2)f.completed_step)(instance, 1, wants_event, ends);
+        status = ((completed_2)s->f.completed_step)(instance, 1, wants_event, ends);
     } else {
         uint8_t event = 0, terminate = 0;
-        status = ((completed_3)f.completed_step)(instance, 1, &event, &terminate);
+        status = ((completed_3)s->f.completed_step)(instance, 1, &event, &terminate);
         *wants_event = event != 0;
         *ends = terminate != 0;
     }
@@ -158,19 +146,19 @@ static unsigned update(struct solver *s, struct update *u)
     double next_time = 0.0;
     if (s->fmu->major == 1) {
         struct event_info_1 i = {0};
-        status = ((update_1)f.update)(instance, 0, &i);
+        status = ((update_1)s->f.update)(instance, 0, &i);
         *u = (struct update){!i.converged, i.terminate != 0, i.states_changed != 0};
         defined = i.has_next_time != 0;
         next_time = i.next_time;
     } else if (s->fmu->major == 2) {
         struct event_info_2 i = {0};
-        status = ((update_2)f.update)(instance, &i);
+        status = ((update_2)s->f.update)(instance, &i);
         *u = (struct update){i.again != 0, i.terminate != 0, i.states_changed != 0};
         defined = i.has_next_time != 0;
         next_time = i.next_time;
     } else {
         uint8_t again = 0, terminate = 0, nominals = 0, states = 0, has_next_time = 0;
-        status = ((update_3)f.update)(
+        status = ((update_discrete_states_3)s->f.update)(
             instance, &again, &terminate, &nominals, &states, &has_next_time, &next_time);
         *u = (struct update){again != 0, terminate != 0, states != 0};
         defined = has_next_time != 0;
@@ -194,7 +182,7 @@ struct outcome settle_events(struct solver *s)
             return (struct outcome){status, TERMINATED};
         any_change = any_change || u.states_changed;
     }
-    unsigned status = s->fmu->major > 1 ? f.enter_continuous_time_mode(s->fmu->instance) : 0;
+    unsigned status = s->fmu->major > 1 ? s->f.enter_continuous_time_mode(s->fmu->instance) : 0;
     if (status <= 1 && any_change)
         status = get_states(s);
     if (status > 1)
@@ -226,7 +214,7 @@ static unsigned set_event_inputs(struct solver *s)
 /* Handle an event at the current time and state. */
 struct outcome handle_event(struct solver *s)
 {
-    unsigned status = s->fmu->major > 1 ? f.enter_event_mode(s->fmu->instance) : 0;
+    unsigned status = s->fmu->major > 1 ? s->f.enter_event_mode(s->fmu->instance) : 0;
     if (status > 1)
         return (struct outcome){status, EVENT};
     status = set_event_inputs(s);

@@ -1,0 +1,28 @@
+/* What the operating systems do differently: platform_posix.c and platform_windows.c. */
+
+#ifndef PLATFORM_H
+#define PLATFORM_H
+
+#include <stddef.h>
+
+/* Prepare the process; report is called, where the system cannot tell it, with the number of what crashed it. */
+void start_platform(void (*report)(unsigned code));
+void end_process(int code) __attribute__((noreturn));
+double now(void); /* in s, from some start */
+
+/* The connection: requests and replies. */
+int connect_replies(const char *place); /* where they go, if not to a descriptor that the process got */
+int receive_bytes(void *target, size_t count); /* returns 0 at the end of the requests */
+int send_bytes(const void *source, size_t count); /* returns 0 if nobody reads them */
+
+/* Map the memory of simulations in place of what was mapped before; NULL if that fails. */
+double *map_room(const char *place);
+
+/* Zeroed memory that ends where accessible memory ends; NULL if there is not enough. */
+void *guarded_memory(size_t bytes);
+
+/* Load a library with those beside it; says what is wrong if that fails. */
+void *load_library(const char *path, const char **wrong);
+void *find_symbol(void *library, const char *name);
+
+#endif

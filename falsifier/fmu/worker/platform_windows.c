@@ -1,0 +1,135 @@
+/* Windows, also as Wine offers it. Requests come from standard input, replies go to a named pipe or file. */
+
+#include <stdio.h>
+#include <windows.h>
+
+#include "platform.h"
+
+#define LONGEST_PATH 4096
+
+static HANDLE requests, replies;
+static void (*report_crash)(unsigned code);
+
+static LONG WINAPI on_crash(EXCEPTION_POINTERS *crash)
+{
+    unsigned code = crash->ExceptionRecord->ExceptionCode;
+    report_crash(code);
+    TerminateProcess(GetCurrentProcess(), code);
+    return EXCEPTION_EXECUTE_HANDLER;
+}
+
+void start_platform(void (*report)(unsigned code))
+{
+    requests = GetStdHandle(STD_INPUT_HANDLE);
+    report_crash = report;
+    SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX | SEM_NOOPENFILEERRORBOX);
+    SetUnhandledExceptionFilter(on_crash);
+    /* What the FMU printed before a crash must not be lost. */
+    setvbuf(stdout, NULL, _IONBF, 0);
+}
+
+void end_process(int code)
+{
+    ExitProcess((UINT)code);
+}
+
+double now(void)
+{
+    static LARGE_INTEGER frequency;
+    LARGE_INTEGER ticks;
+    if (!frequency.QuadPart)
+        QueryPerformanceFrequency(&frequency);
+    QueryPerformanceCounter(&ticks);
+    return (double)ticks.QuadPart / (double)frequency.QuadPart;
+}
+
+static int widen(const char *path, wchar_t wide[LONGEST_PATH])
+{
+    return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, LONGEST_PATH);
+}
+
+int connect_replies(const char *place)
+{
+    wchar_t path[LONGEST_PATH];
+    if (!widen(place, path))
+        return 0;
+    replies = CreateFileW(path, GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL, OPEN_EXISTING, 0, NULL);
+    return replies != INVALID_HANDLE_VALUE;
+}
+
+int receive_bytes(void *target, size_t count)
+{
+    for (char *at = target; count;) {
+        DWORD some = 0;
+        if (!ReadFile(requests, at, (DWORD)count, &some, NULL) || !some)
+            return 0;
+        at += some;
+        count -= some;
+    }
+    return 1;
+}
+
+int send_bytes(const void *source, size_t count)
+{
+    DWORD written;
+    return WriteFile(replies, source, (DWORD)count, &written, NULL) != 0;
+}
+
+double *map_room(const char *place)
+{
+    static void *last;
+    wchar_t path[LONGEST_PATH];
+    if (last)
+        UnmapViewOfFile(last);
+    last = NULL;
+    if (!widen(place, path))
+        return NULL;
+    HANDLE file = CreateFileW(path, GENERIC_READ | GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL,
+                              OPEN_EXISTING, 0, NULL);
+    HANDLE mapping = CreateFileMappingW(file, NULL, PAGE_READWRITE, 0, 0, NULL);
+    last = mapping ? MapViewOfFile(mapping, FILE_MAP_WRITE, 0, 0, 0) : NULL;
+    if (mapping)
+        CloseHandle(mapping);
+    if (file != INVALID_HANDLE_VALUE)
+        CloseHandle(file);
+    return last;
+}
+
+void *guarded_memory(size_t bytes)
+{
+    SYSTEM_INFO system;
+    GetSystemInfo(&system);
+    size_t page = system.dwPageSize, usable = (bytes + page - 1) / page * page;
+    char *memory = VirtualAlloc(NULL, usable + page, MEM_COMMIT | MEM_RESERVE, PAGE_READWRITE);
+    DWORD before;
+    if (!memory)
+        return NULL;
+    VirtualProtect(memory + usable, page, PAGE_NOACCESS, &before);
+    return memory + usable - bytes;
+}
+
+void *load_library(const char *path, const char **wrong)
+{
+    static char text[64];
+    wchar_t wide[LONGEST_PATH];
+    if (!widen(path, wide)) {
+        *wrong = "its path is too long";
+        return NULL;
+    }
+    /* The folder of the library is searched for the libraries that it needs. */
+    void *library = LoadLibraryExW(wide, NULL, LOAD_WITH_ALTERED_SEARCH_PATH);
+    DWORD code = GetLastError();
+    snprintf(text, sizeof text, "Windows error %lu", code);
+    if (!library && code == ERROR_MOD_NOT_FOUND)
+        *wrong = "it needs a library that is neither beside it nor part of Wine";
+    else if (!library && code == ERROR_BAD_EXE_FORMAT)
+        *wrong = "it is not a 64-bit library, or it is damaged";
+    else if (!library)
+        *wrong = text;
+    return library;
+}
+
+void *find_symbol(void *library, const char *name)
+{
+    return (void *)(uintptr_t)GetProcAddress(library, name);
+}
