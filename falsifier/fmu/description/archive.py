@@ -27,6 +27,10 @@ _MAX_TEXT_BYTES = 128 << 20
 # dense.
 _MAX_COMPRESSION = 300
 _DENSE_FROM_BYTES = 256 << 20
+# What a method may add to data that it cannot compress.
+_MAX_OVERHEAD, _MAX_EXPANSION = 1024, 1.01
+# Limits of usual file systems in bytes; the second one leaves room for the folder that is unpacked to.
+_MAX_NAME_BYTES, _MAX_PATH_BYTES = 255, 2048
 
 _SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows", "cygwin": "windows"}
 _MACHINES = {
@@ -53,6 +57,13 @@ _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 # What reading an entry of a damaged archive raises. RuntimeError stands for entries that are encrypted or
 # compressed by an unknown method, OSError also for damaged bzip2 data, ValueError for names in no encoding.
 UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
+_FORBIDDEN_KINDS = {
+    stat.S_IFLNK: "symbolic link",
+    stat.S_IFIFO: "named pipe",
+    stat.S_IFSOCK: "socket",
+    stat.S_IFCHR: "device",
+    stat.S_IFBLK: "device",
+}
 _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
@@ -179,14 +190,20 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
             f"{_MAX_BYTES >> 30} GiB are allowed"
         )
     # Some tools list folders several times, which does no harm.
-    for name, count in Counter(entry.filename for entry in entries if not entry.is_dir()).items():
+    files = Counter(entry.filename for entry in entries if not entry.is_dir())
+    for name, count in files.items():
         if count > 1:
             raise ModelError(f"{path}: rejected because it contains {name!r} {count} times")
     for entry in entries:
+        _check_name(path, entry)
         _check_entry(path, entry)
+    folders = {str(folder) for entry in entries for folder in PurePosixPath(entry.filename).parents}
+    folders |= {entry.filename.rstrip("/") for entry in entries if entry.is_dir()}
+    for name in sorted(folders & files.keys()):
+        raise ModelError(f"{path}: rejected because its entry {name!r} is both a file and a folder")
 
 
-def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
+def _check_name(path: Path, entry: zipfile.ZipInfo) -> None:
     # zipfile truncates names at NUL and converts backslashes on Windows only: check the name as it was
     # written.
     written = entry.orig_filename.replace("\\", "/")
@@ -200,8 +217,27 @@ def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
             f"{path}: rejected because its entry {entry.orig_filename!r} would be written outside the folder "
             "that it is unpacked to"
         )
-    if stat.S_ISLNK(entry.external_attr >> 16):
-        raise ModelError(f"{path}: rejected because its entry {entry.filename!r} is a symbolic link")
+    if any(ord(character) < 32 or ord(character) == 127 for character in written):
+        raise ModelError(
+            f"{path}: rejected because its entry {written!r} has a control character in its name"
+        )
+    longest = max(len(part.encode("utf-8", "replace")) for part in written.split("/"))
+    if longest > _MAX_NAME_BYTES or len(written.encode("utf-8", "replace")) > _MAX_PATH_BYTES:
+        raise ModelError(
+            f"{path}: rejected because its entry {written[:60]!r}... has too long a name for file "
+            f"systems (at most {_MAX_NAME_BYTES} bytes per name, {_MAX_PATH_BYTES} per path)"
+        )
+
+
+def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
+    mode = entry.external_attr >> 16
+    kind = _FORBIDDEN_KINDS.get(stat.S_IFMT(mode))
+    if kind is not None:
+        raise ModelError(f"{path}: rejected because its entry {entry.filename!r} is a {kind}")
+    if mode & (stat.S_ISUID | stat.S_ISGID):
+        raise ModelError(
+            f"{path}: rejected because its entry {entry.filename!r} asks for its owner's rights (setuid)"
+        )
     if entry.flag_bits & 0x1:
         raise ModelError(f"{path}: its entry {entry.filename!r} is encrypted; save it without a password")
     dense = entry.file_size > _MAX_COMPRESSION * max(entry.compress_size, 1)
@@ -209,4 +245,9 @@ def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
         raise ModelError(
             f"{path}: rejected because its entry {entry.filename!r} grows from {entry.compress_size} to "
             f"{entry.file_size} bytes, like a zip bomb"
+        )
+    if entry.compress_size > _MAX_EXPANSION * entry.file_size + _MAX_OVERHEAD:
+        raise ModelError(
+            f"{path}: rejected because its entry {entry.filename!r} declares {entry.file_size} bytes, but "
+            f"{entry.compress_size} are stored; export the model again"
         )

@@ -27,11 +27,56 @@ def test_entries_that_leave_the_folder_are_refused(tmp_path: Path, name: str) ->
     assert not list(tmp_path.rglob("evil.txt"))
 
 
-def test_symbolic_links_are_refused(tmp_path: Path) -> None:
-    link = zipfile.ZipInfo("resources/passwd")
-    link.external_attr = (stat.S_IFLNK | 0o777) << 16
-    with pytest.raises(ModelError, match="'resources/passwd' is a symbolic link"):
-        archive.extract(write(tmp_path / "link.fmu", (link, b"/etc/passwd")), tmp_path / "out")
+@pytest.mark.parametrize(
+    ("mode", "what"),
+    [
+        (stat.S_IFLNK | 0o777, "is a symbolic link"),
+        (stat.S_IFIFO | 0o666, "is a named pipe"),
+        (stat.S_IFSOCK | 0o666, "is a socket"),
+        (stat.S_IFCHR | 0o666, "is a device"),
+        (stat.S_IFREG | stat.S_ISUID | 0o755, "setuid"),
+    ],
+)
+def test_only_plain_files_are_accepted(tmp_path: Path, mode: int, what: str) -> None:
+    special = zipfile.ZipInfo("resources/passwd")
+    special.external_attr = mode << 16
+    with pytest.raises(ModelError, match=f"'resources/passwd'.*{what}"):
+        archive.extract(write(tmp_path / "special.fmu", (special, b"/etc/passwd")), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("names", [("a", "a/b"), ("a/b", "a"), ("a/", "a"), ("x/y", "x/y/z")])
+def test_a_file_and_a_folder_of_one_name_are_refused(tmp_path: Path, names: tuple[str, str]) -> None:
+    fmu = write(tmp_path / "both.fmu", *((name, b"") for name in names))
+    with pytest.raises(ModelError, match="both a file and a folder"):
+        archive.extract(fmu, tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\x1b[31m", "a\x7f"])
+def test_control_characters_in_names_are_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ModelError, match="control character"):
+        archive.extract(write(tmp_path / "named.fmu", (name, b"x")), tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["a" * 256, "ü" * 128, "a/" * 1025 + "b"])
+def test_names_that_are_too_long_are_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ModelError, match="too long"):
+        archive.extract(write(tmp_path / "named.fmu", (name, b"x")), tmp_path / "out")
+
+
+def test_an_entry_with_more_data_than_it_declares_is_refused(tmp_path: Path) -> None:
+    """Data after the declared size would never be checked."""
+    path = tmp_path / "hiding.fmu"
+    content = bytes(range(256)) * 4096
+    with zipfile.ZipFile(path, "w") as target:
+        target.writestr("sources/a.c", content)
+    data = path.read_bytes()
+    for header, at in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
+        begin = data.index(header) + at
+        data = data[:begin] + (1).to_bytes(4, "little") + data[begin + 4 :]
+    path.write_bytes(data)
+    with pytest.raises(ModelError, match="declares 1 bytes, but 1048576 are stored"):
+        archive.extract(path, tmp_path / "out")
 
 
 def test_a_bomb_is_refused_before_anything_is_written(tmp_path: Path) -> None:
