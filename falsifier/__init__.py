@@ -81,7 +81,7 @@ if TYPE_CHECKING:
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
     from falsifier.search import events
-    from falsifier.search.assurance import Assurance, Splitting, Tail, assess
+    from falsifier.search.assurance import Assurance, Searched, Splitting, assess
     from falsifier.search.budget import Budget, Spent
     from falsifier.search.coverage import Coverage, coverage
     from falsifier.search.events import Event, Listener
@@ -146,13 +146,13 @@ _EXPORTS = {
     "RobustnessMap": "falsifier.counterexamples.robustness_map",
     "ScriptedChat": "falsifier.llm.scripted",
     "SearchSpace": "falsifier.core.space",
+    "Searched": "falsifier.search.assurance",
     "Shrunk": "falsifier.counterexamples.shrink",
     "Signal": "falsifier.core.signals",
     "Spent": "falsifier.search.budget",
     "Splitting": "falsifier.search.assurance",
     "StoredCounterexample": "falsifier.counterexamples.store",
     "System": "falsifier.fmu",
-    "Tail": "falsifier.search.assurance",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
@@ -245,13 +245,13 @@ __all__ = [
     "RobustnessMap",
     "ScriptedChat",
     "SearchSpace",
+    "Searched",
     "Shrunk",
     "Signal",
     "Spent",
     "Splitting",
     "StoredCounterexample",
     "System",
-    "Tail",
     "Trajectory",
     "Variable",
     "Verdict",

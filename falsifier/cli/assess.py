@@ -21,13 +21,13 @@ from falsifier.cli.output import conclude
 from falsifier.cli.streams import INTERRUPTED
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
-from falsifier.counterexamples.known_inputs import judged_candidates
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
-from falsifier.search.journal import holds_run
+from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.search.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
@@ -70,9 +70,9 @@ def assess(
     """Bound the probability of a violation by simulating at random.
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), an FMU with --stl, or the
-    directory of a run, whose search space is drawn from and whose smallest robustness is stated beside the
+    directory of a run, whose search space is drawn from and whose findings are stated beside the
     bound. Every control point and every parameter is drawn uniformly from its range, as by the engine
-    uniform. The upper bound is exact (Clopper and Pearson); extreme value theory and splitting add estimates.
+    uniform. The upper bound is exact (Clopper and Pearson); splitting adds an estimate.
 
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the draws so far count.
@@ -83,7 +83,7 @@ def assess(
         if not quiet and count % _SAID_EVERY == 0:
             warn(f"simulation {count} of at most {budget}")
 
-    problem, optimum = _loaded(options, requirement)
+    problem, searched = _loaded(options, requirement)
     try:
         found = assess_problem(
             problem,
@@ -91,7 +91,7 @@ def assess(
             seed=seed,
             confidence=confidence,
             splitting=splitting,
-            optimum=optimum,
+            searched=searched,
             progress=said,
         )
     finally:
@@ -164,18 +164,19 @@ def margin(
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
 
 
-def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, float | None]:
-    """Load the problem of a target or a run; of a run, return the smallest robustness that it found, too.
+def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
+    """Load the problem of a target or a run; of a run, return what it evaluated, too.
 
     Raises:
-        click.UsageError: if options change the problem of a run, or a requirement is chosen from no run.
+        click.UsageError: if options change the problem of a run, a requirement is chosen from no run, or none
+            of a run that searched several.
         SpecError: if the run's problem was made in Python.
     """
     place = Path(options["target"])
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
             raise click.UsageError("--requirement chooses from a run directory; TARGET is none")
-        return load_source(problem_source(options)), None
+        return load_source(problem_source(options)), []
     unset = {"target": None, "parameterization": DEFAULT_PARAMETERIZATION}
     changed = [
         name for name, value in options.items() if name != "target" and value and value != unset.get(name)
@@ -186,14 +187,15 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
         raise click.UsageError(f"{place}: a run is assessed as it was searched; drop {what}")
     described = read_manifest(place)
     if requirement is None and described.shared:
-        first, *others = described.names
-        warn(f"{first} is assessed; --requirement NAME chooses another one: {', '.join(others)}")
+        raise click.UsageError(
+            f"{place}: this run searched {', '.join(described.names)}; choose one with --requirement NAME"
+        )
     described = described.of(requirement or described.requirement.name)
     source = described.request.source
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python: call assess() there")
-    found = [robustness for robustness, _ in judged_candidates(place, described.requirement.name)]
-    return load_source(source), min(found, default=None)
+    evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
+    return load_source(source), list(evaluations.values())
 
 
 def _between(text: str) -> tuple[float, float]:

@@ -196,9 +196,8 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "upper_bound": found.bound,
         "interval": found.interval,
         "smallest": evaluation_json(found.smallest),
-        "tail": found.tail and asdict(found.tail),
         "estimate": found.splitting and asdict(found.splitting),
-        "optimum": found.optimum,
+        "searched": found.searched and asdict(found.searched),
         "findings": [asdict(finding) for finding in found.findings],
         "interrupted": found.interrupted,
     }

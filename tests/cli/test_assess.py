@@ -50,14 +50,15 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
     done = falsifier("assess", "r", "--budget", "20", "--json", cwd=tmp_path)
     assert done.code == 0, done.err
     assert done.json["requirement"] == "NEVER" and done.json["drawn"] == 20
-    assert 0.99 < done.json["optimum"] < 1.01
+    assert done.json["searched"]["simulations"] == 5 and 0.99 < done.json["searched"]["smallest"] < 1.01
     refused = falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path)
     assert refused.code == 2 and "drop --stl" in refused.err
 
 
-def test_a_run_of_several_requirements_says_which_one_is_assessed(tmp_path: Path) -> None:
+def test_a_run_of_several_requirements_asks_which_one_is_assessed(tmp_path: Path) -> None:
     problems = [f"python:tests.problems:{name}" for name in ("impossible", "hard")]
     falsify(problems, "corners", budget=5, directory=tmp_path / "r")
-    done = falsifier("assess", "r", "--budget", "20", "--quiet", cwd=tmp_path)
-    assert "NEVER is assessed; --requirement NAME chooses another one: HARD" in done.err
-    assert done.out.startswith("NEVER: ")
+    asked = falsifier("assess", "r", "--budget", "20", "--quiet", cwd=tmp_path)
+    assert asked.code == 2 and "NEVER, HARD; choose one with --requirement NAME" in asked.err
+    done = falsifier("assess", "r", "--requirement", "HARD", "--budget", "20", "--quiet", cwd=tmp_path)
+    assert done.out.startswith("HARD: ") and "The search found a violation in" in done.out

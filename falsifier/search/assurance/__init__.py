@@ -1,7 +1,6 @@
 """What simulations that were drawn at random say about the probability of a violation."""
 
-from falsifier.search.assurance.assess import Assurance, assess
+from falsifier.search.assurance.assess import Assurance, Searched, assess
 from falsifier.search.assurance.splitting import Splitting
-from falsifier.search.assurance.tail import Tail
 
-__all__ = ["Assurance", "Splitting", "Tail", "assess"]
+__all__ = ["Assurance", "Searched", "Splitting", "assess"]

@@ -1,6 +1,11 @@
-"""What a search that found nothing cannot say: how probable a violation is, at most."""
+"""What a search that found nothing cannot say: how probable a violation is, at most.
 
-from collections.abc import Callable
+The bounds are those of Clopper and Pearson, The use of confidence or fiducial limits illustrated in the case
+of the binomial, Biometrika 26 (1934) 404-413. They hold for every system and every number of draws. Nothing
+is extrapolated from the draws: a narrow region of violations leaves no trace in the robustness beside it.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
@@ -9,20 +14,35 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted, margin_words
 from falsifier.engines.box import UnitBox
 from falsifier.engines.uniform import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem, check_limits
-from falsifier.search.assurance.bounds import interval, upper_bound
-from falsifier.search.assurance.distribution import distribution_text
 from falsifier.search.assurance.splitting import Splitting, least_budget, split
-from falsifier.search.assurance.tail import Tail, tail
 from falsifier.search.findings import Finding
 from falsifier.search.vacuity import Vacuity
 
 Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """What a search of the same space found, to be stated beside the bound.
+
+    Attributes:
+        simulations: number of simulations of the search.
+        smallest: smallest robustness that it found; None if every simulation failed.
+        violation: in how many simulations it found the first violation, as simulated; None without one.
+        drawable: whether the inputs of that violation are among those that are drawn.
+    """
+
+    simulations: int
+    smallest: float | None
+    violation: int | None = None
+    drawable: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +57,11 @@ class Assurance:
         violations: how many of them violate the requirement, as simulated, without confirmation.
         failures: how many of them failed; the bounds count them as violations where that is worse.
         bound: upper confidence bound on the probability of a violation, exact.
-        interval: exact two-sided confidence interval of that probability; None without violations.
+        interval: exact two-sided confidence interval of that probability; from 0 without violations.
         smallest: the drawn evaluation with the smallest robustness, without its trajectory.
-        tail: estimate of the probability by extreme value theory; None if the draws do not allow one.
         splitting: estimate of the probability by splitting; None if it was not asked for.
-        optimum: smallest robustness that a search found; None if none was given.
-        findings: what no simulation tested, as of a search; empty with violations.
+        searched: what a search found; None if none was given.
+        findings: what no simulation tested; empty with violations.
         interrupted: whether the user stopped it; everything refers to what was drawn by then.
     """
 
@@ -53,11 +72,10 @@ class Assurance:
     violations: int
     failures: int
     bound: float
-    interval: tuple[float, float] | None
+    interval: tuple[float, float]
     smallest: Evaluation
-    tail: Tail | None
     splitting: Splitting | None
-    optimum: float | None = None
+    searched: Searched | None = None
     findings: tuple[Finding, ...] = ()
     interrupted: bool = False
 
@@ -69,7 +87,7 @@ class Assurance:
             f"{self.violations} of {counted(self.drawn, 'random simulation')} violate the requirement.",
             f"With {share} confidence, the probability of a violation is at most {self.bound:.3g}.",
         ]
-        if self.interval is not None:
+        if self.violations:
             low, high = self.interval
             lines.append(f"With {share} confidence, it is between {low:.3g} and {high:.3g}.")
         if self.failures:
@@ -81,16 +99,34 @@ class Assurance:
         lines += [f"Note: {finding.text}" for finding in self.findings]
         smallest = _robustness(self.smallest)
         lines.append(f"The smallest robustness of these was {smallest:+.6g} ({margin_words(smallest)}).")
-        if self.optimum is not None:
-            lines.append(_optimum_text(self.optimum, _robustness(self.smallest)))
-        if self.tail is not None:
-            lines.append(_tail_text(self.tail, share))
+        if self.searched is not None:
+            lines.append(self._searched_text(self.searched))
         if self.splitting is not None:
             lines.append(_splitting_text(self.splitting, share))
-        lines.append(f"Probability means a share of what was drawn: {self.distribution}.")
+        lines.append(
+            "Probability of what: of inputs drawn uniformly from the search space with this "
+            f"parameterization, not of inputs in operation: {self.distribution}."
+        )
         if self.interrupted:
             lines.append("Stopped by the user: more simulations would give a lower bound.")
         return "\n".join(lines)
+
+    def _searched_text(self, searched: Searched) -> str:
+        if searched.violation is None:
+            effort = f"A search of {counted(searched.simulations, 'simulation')}"
+            if searched.smallest is None:
+                return f"{effort} has no verdict: all of them failed."
+            nearer = "came nearer" if searched.smallest < _robustness(self.smallest) else "came no nearer"
+            return f"{effort} {nearer}: its smallest robustness was {searched.smallest:+.6g}."
+        found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
+        if not searched.drawable:
+            return f"{found}, with control points that are not drawn here: the bound says nothing about it."
+        if self.violations:
+            return f"{found}."
+        return (
+            f"{found}; none of {counted(self.drawn, 'draw')} did: the probability is below {self.bound:.3g}, "
+            "not zero."
+        )
 
 
 def assess(
@@ -100,13 +136,14 @@ def assess(
     seed: int = 0,
     confidence: float = 0.95,
     splitting: int | None = None,
-    optimum: float | None = None,
+    searched: Sequence[Evaluation] = (),
     progress: Progress | None = None,
 ) -> Assurance:
     """Bound the probability of a violation by random simulations.
 
     The bound is exact whatever the system is, as long as inputs are drawn as stated. The estimate by
-    splitting is not: it is for probabilities too small to be seen in the draws.
+    splitting is not: it is for probabilities too small to be seen in the draws, and for violations to which
+    the robustness leads.
 
     Args:
         problem: what to simulate; inputs are drawn as the engine ``uniform`` does.
@@ -115,7 +152,8 @@ def assess(
         confidence: confidence of the bound and the intervals, between 0 and 1.
         splitting: how many simulations of the budget are for splitting; default: half, if that is enough for
             an estimate, otherwise none.
-        optimum: smallest robustness that a search of the same space found, to be stated beside the bound.
+        searched: evaluations of a search of the same space, in order, to be stated beside the bound, such as
+            those of a Result.
         progress: called with the number of simulations so far.
 
     Returns:
@@ -144,8 +182,7 @@ def assess(
             raise KeyboardInterrupt
         raise SimulationError(f"{problem.name}: every simulation failed; the last error: {drawn[-1].reason}")
     violations, failures = sum(e.violated for e in drawn), len(drawn) - len(judged)
-    low, _ = interval(violations, len(drawn), confidence)
-    _, high = interval(violations + failures, len(drawn), confidence)
+    each = (1.0 + confidence) / 2.0
     divided: Splitting | None = None
     if rest and not interrupted:
         try:
@@ -154,17 +191,19 @@ def assess(
             interrupted = True
     return Assurance(
         problem=problem,
-        distribution=distribution_text(problem.space),
+        distribution=_distribution_text(problem.space),
         confidence=confidence,
         drawn=len(drawn),
         violations=violations,
         failures=failures,
         bound=upper_bound(violations + failures, len(drawn), confidence),
-        interval=(low, high) if violations else None,
+        interval=(
+            lower_bound(violations, len(drawn), each),
+            upper_bound(violations + failures, len(drawn), each),
+        ),
         smallest=min(judged, key=_robustness),
-        tail=tail([_robustness(e) for e in judged], confidence=confidence, seed=seed),
         splitting=divided,
-        optimum=optimum,
+        searched=_told(searched, problem.space),
         findings=() if violations else count.vacuity.findings(),
         interrupted=interrupted,
     )
@@ -228,34 +267,65 @@ def _robustness(evaluation: Evaluation) -> float:
     return inf if evaluation.robustness is None else evaluation.robustness
 
 
-def _optimum_text(optimum: float, smallest: float) -> str:
-    if optimum < 0:
-        return f"A search found a violation, with robustness {optimum:+.6g}."
-    nearer = "which came nearer" if optimum < smallest else "which came no nearer"
-    return f"A search, {nearer}, found {optimum:+.6g}."
+def upper_bound(happened: int, trials: int, confidence: float) -> float:
+    """Return the bound below which the probability lies with at least this confidence.
+
+    >>> round(upper_bound(0, 300, 0.95), 5)
+    0.00994
+    """
+    from scipy.special import betaincinv
+
+    return 1.0 if happened >= trials else float(betaincinv(happened + 1, trials - happened, confidence))
 
 
-def _tail_text(found: Tail, share: str) -> str:
-    if found.is_poor:
-        return (
-            f"Extreme value theory gives no estimate: its distribution does not fit the {found.points} "
-            f"smallest values (p = {found.fit:.2g})."
-        )
-    effort = f"extreme value theory, the {found.points} smallest values; fit p = {found.fit:.2g}"
-    return (
-        f"Estimate, not a bound ({effort}): probability {found.probability:.2g}, {share} confidence interval "
-        f"{found.low:.2g} to {found.high:.2g}."
-    )
+def lower_bound(happened: int, trials: int, confidence: float) -> float:
+    """Return the bound above which the probability lies with at least this confidence."""
+    return 1.0 - upper_bound(trials - happened, trials, confidence)
+
+
+def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | None:
+    if not evaluations:
+        return None
+    smallest = min((e.robustness for e in evaluations if e.robustness is not None), default=None)
+    for number, evaluation in enumerate(evaluations, start=1):
+        if evaluation.violated:
+            drawable = UnitBox(space).represents(evaluation.candidate)
+            return Searched(len(evaluations), smallest, number, drawable)
+    return Searched(len(evaluations), smallest)
 
 
 def _splitting_text(found: Splitting, share: str) -> str:
     effort = f"multilevel splitting, {counted(found.simulations, 'simulation')}"
     if found.probability is None:
-        return (
-            f"Estimate, not a bound ({effort}): it reached a robustness of {found.reached:+.6g} and no "
-            f"violation; smaller values have a probability below {found.high:.2g}."
-        )
+        return f"No estimate ({effort}): it ended before a violation, which says nothing; the bound holds."
     return (
         f"Estimate, not a bound ({effort}): probability {found.probability:.2g}, {share} confidence interval "
-        f"{found.low:.2g} to {found.high:.2g}."
+        f"{found.low:.2g} to {found.high:.2g} if a falling robustness leads to all violations."
     )
+
+
+def _distribution_text(space: SearchSpace) -> str:
+    """Describe what the engine ``uniform`` draws from: each control point and parameter on its own."""
+    parts = [_input_text(r, space) for r in space.inputs]
+    parts += [f"{p.name} uniform in {_range_text(p)}" for p in space.parameters]
+    text = f"{'; '.join(parts)}; all numbers independent of each other"
+    if any(r.free is not None for r in space.inputs):
+        text += "; signals with other control points, which a search may try, are not drawn"
+    return text
+
+
+def _input_text(r: InputRange, space: SearchSpace) -> str:
+    if r.control_points == 1:
+        return f"{r.name} constant, uniform in {_range_text(r)}"
+    spacing = space.fixed_times(r)[1]
+    held = f", held for {r.hold:g} s" if r.hold is not None else ""
+    return (
+        f"{r.name} with {r.control_points} control points {spacing:.4g} s apart, {r.interpolation}{held}, "
+        f"each uniform in {_range_text(r)}"
+    )
+
+
+def _range_text(r: InputRange | ParameterRange) -> str:
+    unit = f" {r.unit}" if r.unit else ""
+    rounded = "" if r.kind == "real" else ", rounded to an allowed number"
+    return f"[{r.low:g}, {r.high:g}]{unit}{rounded}"

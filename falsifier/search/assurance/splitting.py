@@ -12,7 +12,7 @@ MCMC methods for functions, Statistical Science 28 (2013) 424-446.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import exp, hypot, inf, log, log1p, sqrt
+from math import exp, hypot, log, log1p, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +35,15 @@ _LONGEST, _SHORTEST = 1.0, 0.02
 
 @dataclass(frozen=True, slots=True)
 class Splitting:
-    """An estimate of a small probability; an estimate, not a bound.
+    """An estimate of a small probability, not a bound: it misses violations to which no slope leads.
+
+    If the budget ended before all costs were negative, there is no estimate: that a population stopped at
+    some cost says nothing about the probability of violations beside its slope.
 
     Attributes:
-        probability: estimated probability; None if the budget ended before the costs were negative.
-        low: lower end of the confidence interval; 0 if the budget ended before.
-        high: upper end of the confidence interval.
-        reached: the cost below which the last population was when it ended.
+        probability: estimated probability; None if the budget ended before.
+        low: lower end of the confidence interval; 0 without an estimate.
+        high: upper end of the confidence interval; 1 without an estimate.
         simulations: number of costs that were calculated.
         points: number of points in each population.
     """
@@ -49,18 +51,16 @@ class Splitting:
     probability: float | None
     low: float
     high: float
-    reached: float
     simulations: int
     points: int
 
 
 @dataclass(frozen=True, slots=True)
 class _Population:
-    """One population at its end: logarithm of the probability, its variance, and the level reached."""
+    """One population at its end: logarithm of the probability, and its variance."""
 
     logarithm: float
     variance: float
-    reached: float
     simulations: int
     complete: bool
 
@@ -87,17 +87,12 @@ def split(cost: Cost, dimension: int, *, budget: int, seed: int, confidence: flo
         _population(cost, dimension, points, each, np.random.default_rng([seed, i]))
         for i in range(_POPULATIONS)
     ]
+    simulations = sum(p.simulations for p in ended)
+    if not all(p.complete for p in ended):
+        return Splitting(None, 0.0, 1.0, simulations, points)
     middle = log(sum(exp(p.logarithm) for p in ended) / len(ended))
     error = _error(ended, confidence)
-    is_complete = all(p.complete for p in ended)
-    return Splitting(
-        probability=exp(middle) if is_complete else None,
-        low=exp(middle - error) if is_complete else 0.0,
-        high=min(1.0, exp(middle + error)),
-        reached=max(p.reached for p in ended),
-        simulations=sum(p.simulations for p in ended),
-        points=points,
-    )
+    return Splitting(exp(middle), exp(middle - error), min(1.0, exp(middle + error)), simulations, points)
 
 
 def _error(ended: list[_Population], confidence: float) -> float:
@@ -106,12 +101,12 @@ def _error(ended: list[_Population], confidence: float) -> float:
     The theory assumes copies that are independent after their moves; four populations alone say little about
     their spread. Either alone gives intervals that hold too rarely (bench/assurance.py).
     """
-    from scipy.stats import norm, t
+    from scipy.special import ndtri, stdtrit
 
-    count, tail = len(ended), (1 + confidence) / 2
+    count, each = len(ended), (1 + confidence) / 2
     theory = sqrt(sum(p.variance for p in ended)) / count
     seen = float(np.std([p.logarithm for p in ended], ddof=1)) / sqrt(count)
-    return hypot(float(norm.ppf(tail)) * theory, float(t.ppf(tail, count - 1)) * seen)
+    return hypot(float(ndtri(each)) * theory, float(stdtrit(count - 1, each)) * seen)
 
 
 def _population(
@@ -128,7 +123,7 @@ def _population(
         last = np.flatnonzero(costs >= level)
         others = np.flatnonzero(costs < level)
         if not others.size or simulations + last.size * _MOVES > budget:
-            return _Population(logarithm, variance, level, simulations, complete=False)
+            return _Population(logarithm, variance, simulations, complete=False)
         logarithm += log1p(-last.size / points)
         variance += last.size / (points * others.size)
         for i in last:
@@ -142,4 +137,4 @@ def _population(
                 length = min(length * _LONGER, _LONGEST) if new < level else max(length * _SHORTER, _SHORTEST)
             states[i], costs[i] = state, value
         simulations += last.size * _MOVES
-    return _Population(logarithm, variance, level if level > -inf else 0.0, simulations, complete=True)
+    return _Population(logarithm, variance, simulations, complete=True)

@@ -1,13 +1,19 @@
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import SimulationError, SpecError
-from falsifier.search.assurance import assess
-from falsifier.search.assurance.bounds import interval, upper_bound
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.search.assurance import Searched, assess
+from falsifier.search.assurance.assess import lower_bound, upper_bound
 from falsifier.search.run import falsify
-from falsifier.testing import BIAS, Array, lag_problem
+from falsifier.testing import BIAS, FREE, START, Array, lag_problem
 from tests.problems import mostly_broken, never
 
 
@@ -27,13 +33,14 @@ def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
     expected = sum(e.candidate.parameters["bias"] > 0.8 for e in same)
     assert (found.drawn, found.violations) == (60, expected) and expected > 0
     assert found.bound == upper_bound(expected, 60, 0.95)
-    assert found.interval == interval(expected, 60, 0.95)
+    assert found.interval == (lower_bound(expected, 60, 0.975), upper_bound(expected, 60, 0.975))
     assert found.smallest.robustness == pytest.approx(0.8 - max(e.candidate.parameters["bias"] for e in same))
 
 
 def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
     found = assess(system(2.0), budget=100, confidence=0.99)
-    assert found.interval is None and found.splitting is None
+    assert found.interval == (0.0, upper_bound(0, 100, 0.995)) and found.splitting is None
+    assert "between" not in found.text
     assert found.bound == pytest.approx(1 - 0.01 ** (1 / 100))
     for part in (
         "0 of 100 random simulations violate",
@@ -121,17 +128,66 @@ def test_what_was_drawn_when_the_user_stopped_counts() -> None:
         assess(system(5.0), budget=50, progress=lambda count: stop(7))
 
 
-def test_what_a_search_found_is_stated_beside_the_bound() -> None:
-    found = assess(system(5.0), budget=10, optimum=0.25)
-    assert "A search, which came nearer, found +0.25." in found.text
-    assert (
-        "A search found a violation, with robustness -0.5."
-        in assess(system(5.0), budget=5, optimum=-0.5).text
-    )
+def test_a_search_that_found_nothing_is_stated_beside_the_bound() -> None:
+    searched = falsify(system(5.0), "corners", budget=4).evaluations
+    found = assess(system(5.0), budget=10, searched=searched)
+    assert found.searched is not None
+    assert (found.searched.violation, found.searched.smallest) == (None, 4.0)
+    assert "A search of 4 simulations came nearer: its smallest robustness was +4" in found.text
 
 
-def test_a_tail_is_estimated_from_enough_draws() -> None:
-    assert assess(system(5.0), budget=20).tail is None
-    found = assess(system(1.001), budget=200)
-    assert found.tail is not None and found.tail.points == 20
-    assert "xtreme value theory" in found.text
+def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero() -> None:
+    searched = falsify(system(0.9999), "corners", budget=10).evaluations
+    found = assess(system(0.9999), budget=100, searched=searched)
+    assert found.violations == 0
+    number = len(searched)
+    assert found.searched == Searched(number, searched[-1].robustness, number)
+    assert f"The search found a violation in {number} simulation" in found.text
+    assert "none of 100 draws did: the probability is below 0.0295, not zero." in found.text
+
+
+def test_a_violation_with_signals_that_are_not_drawn_says_nothing_of_the_draws() -> None:
+    problem = lag_problem(free=FREE)
+    edge = Candidate({"u": Signal((0.0, 0.1), (0.9, 1.0))})
+    assert evaluate(problem, edge).violated
+    found = assess(problem, budget=5, searched=[evaluate(problem, edge)])
+    assert found.searched is not None and not found.searched.drawable
+    assert "control points that are not drawn" in found.text and "not zero" not in found.text
+
+
+def test_what_a_probability_is_of_is_said() -> None:
+    problem = lag_problem(points=5, parameters=[START], free=FREE)
+    text = assess(problem, budget=3).text
+    for part in (
+        "inputs drawn uniformly from the search space with this parameterization, not of inputs in operation",
+        "u with 5 control points 2.5 s apart, linear, each uniform in [-1, 1] V",
+        "x0 uniform in [-1, 1]",
+        "other control points, which a search may try, are not drawn",
+    ):
+        assert part in text
+    gear = InputRange("u", 1, 4, kind="integer", interpolation="constant")
+    held = InputRange("v", 0, 1, control_points=3, hold=0.5, interpolation="pchip")
+    problem = replace(lag_problem(inputs=2, limit=4), space=SearchSpace((gear, held), (), 10.0))
+    text = assess(problem, budget=3).text
+    assert "u constant, uniform in [1, 4], rounded to an allowed number" in text
+    assert "v with 3 control points 5 s apart, pchip, held for 0.5 s" in text and "not drawn" not in text
+
+
+def test_at_a_bound_so_few_or_so_many_are_just_as_improbable_as_stated() -> None:
+    for happened, trials in ((0, 10), (3, 100), (99, 100)):
+        assert binom.cdf(happened, trials, upper_bound(happened, trials, 0.95)) == pytest.approx(0.05)
+    assert binom.sf(3 - 1, 100, lower_bound(3, 100, 0.9)) == pytest.approx(0.1)
+    assert upper_bound(0, 1000, 0.95) == pytest.approx(3 / 1000, rel=5e-3)
+    assert (lower_bound(0, 1000, 0.95), upper_bound(7, 7, 0.95)) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("probability", [1e-4, 1e-2, 0.3])
+def test_bounds_hold_at_least_as_often_as_stated(probability: float) -> None:
+    """Exactly, over all outcomes, with the probability of each."""
+    trials = 300
+    outcomes = range(trials + 1)
+    weights = binom.pmf(np.arange(trials + 1), trials, probability)
+    above = [upper_bound(k, trials, 0.95) >= probability for k in outcomes]
+    within = [lower_bound(k, trials, 0.975) <= probability <= upper_bound(k, trials, 0.975) for k in outcomes]
+    assert weights[above].sum() >= 0.95
+    assert weights[within].sum() >= 0.95
