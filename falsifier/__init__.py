@@ -91,7 +91,7 @@ if TYPE_CHECKING:
     from falsifier.search.request import LLMSettings
     from falsifier.search.result import Result
     from falsifier.search.run import falsify, resume
-    from falsifier.stl import Diagnosis, Formula, Monitor, Verdict, parse
+    from falsifier.stl import Breach, Diagnosis, Formula, Monitor, Verdict, parse
     from falsifier.views import plotting
     from falsifier.views.plotting import Figure as Figure
     from falsifier.views.plotting import plot
@@ -100,6 +100,7 @@ if TYPE_CHECKING:
 _EXPORTS = {
     "AsksLLM": "falsifier.engines.protocol",
     "Assurance": "falsifier.search.assurance",
+    "Breach": "falsifier.stl",
     "Budget": "falsifier.search.budget",
     "CampaignRequest": "falsifier.campaigns",
     "Candidate": "falsifier.core.candidate",
@@ -201,6 +202,7 @@ __all__ = [
     "VARIANTS",
     "AsksLLM",
     "Assurance",
+    "Breach",
     "Budget",
     "CampaignRequest",
     "Candidate",

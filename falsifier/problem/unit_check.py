@@ -1,18 +1,16 @@
 """Units in formulas: what is compared or added should have the same one."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from falsifier.core.model import Model, ModelInfo
 from falsifier.fmu import FmuModel
 from falsifier.fmu.description import Units, conversion, is_known, read_structure
 from falsifier.stl import Formula
-from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
+from falsifier.stl.expression import Arithmetic, Call, Expression, Number, unit_of
 from falsifier.stl.formula import Predicate
 
-# Units of plain numbers, which fit any other.
-_PLAIN = ("1", "-")
-# Functions whose value has the unit of their operands.
-_KEEPING = ("abs", "min", "max")
+# Units of signals by name.
+Known = Mapping[str, str]
 
 
 def defined_units(model: Model) -> Units:
@@ -33,37 +31,23 @@ def unit_conflicts(formula: Formula, info: ModelInfo, units: Units) -> Iterator[
         info: units of the signals.
         units: what the model says of its units, beside the usual ones.
     """
+    known = {name: info[name].unit for name in formula.signals if name in info}
     for predicate in formula.predicates:
         for part in (*predicate.left.walk(), *predicate.right.walk()):
-            yield from ((predicate, text) for text in _conflict(part, info, units))
-        yield from ((predicate, text) for text in _compared(predicate.left, predicate.right, info, units))
+            yield from ((predicate, text) for text in _conflict(part, known, units))
+        yield from ((predicate, text) for text in _compared(predicate.left, predicate.right, known, units))
 
 
-def unit_of(expression: Expression, info: ModelInfo) -> str:
-    """Return the unit of an expression; empty if it is not known."""
-    match expression:
-        case Name(name):
-            unit = info[name].unit if name in info else ""
-            return "" if unit in _PLAIN else unit
-        case Negative(operand):
-            return unit_of(operand, info)
-        case Arithmetic("+" | "-", left, right):
-            return unit_of(left, info) or unit_of(right, info)
-        case Call(function, operands) if function in _KEEPING:
-            return next((unit for unit in (unit_of(o, info) for o in operands) if unit), "")
-    return ""
-
-
-def _conflict(part: Expression, info: ModelInfo, units: Units) -> Iterator[str]:
+def _conflict(part: Expression, known: Known, units: Units) -> Iterator[str]:
     if isinstance(part, Arithmetic) and part.operator in "+-":
-        yield from _compared(part.left, part.right, info, units)
+        yield from _compared(part.left, part.right, known, units)
     if isinstance(part, Call) and part.function in ("min", "max"):
         for other in part.operands[1:]:
-            yield from _compared(part.operands[0], other, info, units)
+            yield from _compared(part.operands[0], other, known, units)
 
 
-def _compared(left: Expression, right: Expression, info: ModelInfo, units: Units) -> Iterator[str]:
-    one, other = unit_of(left, info), unit_of(right, info)
+def _compared(left: Expression, right: Expression, known: Known, units: Units) -> Iterator[str]:
+    one, other = unit_of(left, known), unit_of(right, known)
     if not one or not other or one == other or isinstance(left, Number) or isinstance(right, Number):
         return
     if not is_known(one, units) or not is_known(other, units):

@@ -12,6 +12,7 @@ from falsifier.evaluation.evaluate import Status
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding, FindingKind
 from falsifier.search.moves import Proposer
+from falsifier.stl import Breach
 from falsifier.stl.verdict import Verdict
 
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
@@ -45,6 +46,7 @@ class VerdictRecord(_Record):
     critical_time: float
     predicate: str
     values: dict[str, float]
+    breach: Breach | None = Field(None, description="What broke; null if nothing did.")
 
     @classmethod
     def of(cls, verdict: Verdict | None) -> "VerdictRecord | None":
@@ -56,12 +58,13 @@ class VerdictRecord(_Record):
             critical_time=verdict.critical_time,
             predicate=verdict.predicate,
             values=dict(verdict.values),
+            breach=verdict.breach,
         )
 
     @property
     def verdict(self) -> Verdict:
         """The verdict that was recorded."""
-        return Verdict(self.robustness, self.critical_time, self.predicate, self.values)
+        return Verdict(self.robustness, self.critical_time, self.predicate, self.values, self.breach)
 
 
 class EvaluatedRecord(_Record):

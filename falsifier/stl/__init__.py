@@ -5,6 +5,7 @@
 (('speed',), 20.0)
 """
 
+from falsifier.stl.breach import Breach
 from falsifier.stl.diagnosis import Diagnosis
 from falsifier.stl.formula import Formula
 from falsifier.stl.monitor import Monitor
@@ -12,4 +13,4 @@ from falsifier.stl.parser import parse
 from falsifier.stl.verdict import Verdict
 from falsifier.stl.words import in_words
 
-__all__ = ["Diagnosis", "Formula", "Monitor", "Verdict", "in_words", "parse"]
+__all__ = ["Breach", "Diagnosis", "Formula", "Monitor", "Verdict", "in_words", "parse"]

@@ -1,6 +1,6 @@
 """Why a robustness value is what it is, in words and as data for plots."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, log10
 
@@ -72,10 +72,10 @@ class Vacuity:
     def text(self) -> str:
         """The finding in words."""
         over = _moment(self.window)
-        never, near = "not", f"it was false by {_n(-self.margin)}"
+        never, near = "not", f"it was false by {number(-self.margin)}"
         if self.window[0] < self.window[1]:
             never = "never"
-            near = f"it came closest at {_s(self.nearest)}, false by {_n(-self.margin)}"
+            near = f"it came closest at {seconds(self.nearest)}, false by {number(-self.margin)}"
         if self.only:
             why = f"its condition was {never} true"
             return f"Vacuous: {self.implication} held {over} only because {why}; {near}."
@@ -185,14 +185,14 @@ def _words(
 ) -> str:
     match formula:
         case Always():
-            return f"G {_over(window)} was lowest at {_s(time)}"
+            return f"G {_over(window)} was lowest at {seconds(time)}"
         case Eventually():
-            return f"F {_over(window)} was highest at {_s(time)}"
+            return f"F {_over(window)} was highest at {seconds(time)}"
         case Until(left, _):
             side = "left" if decider is left else "right"
-            return f"U {_over(window)} was decided by its {side} side at {_s(time)}"
+            return f"U {_over(window)} was decided by its {side} side at {seconds(time)}"
         case Next():
-            return f"the next recorded time is {_s(time)}"
+            return f"the next recorded time is {seconds(time)}"
         case Not():
             return f"'not' {'holds' if value >= 0 else 'fails'}"
         case Implies(left, _):
@@ -212,12 +212,12 @@ def _plain(
     start, end = window or (0.0, 0.0)
     match formula:
         case Always():
-            return f"from {_n(start)} to {_s(end)}, the worst moment is {_s(time)}"
+            return f"from {number(start)} to {seconds(end)}, the worst moment is {seconds(time)}"
         case Eventually():
-            return f"from {_n(start)} to {_s(end)}, the best moment is {_s(time)}"
+            return f"from {number(start)} to {seconds(end)}, the best moment is {seconds(time)}"
         case Until(left, _):
             what = "what must hold until then" if decider is left else "what must happen"
-            return f"from {_n(start)} to {_s(end)}, {what} decided at {_s(time)}"
+            return f"from {number(start)} to {seconds(end)}, {what} decided at {seconds(time)}"
         case Implies(left, _):
             if decider is left:
                 return "the condition (the part after 'if') decided"
@@ -227,7 +227,7 @@ def _plain(
 
 def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:
     """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
-    left, right = (_valued(side, values, value) for side in (predicate.left, predicate.right))
+    left, right = (valued(side, values, value) for side in (predicate.left, predicate.right))
     if value == 0:
         return f"{left} equals {right}"
     if predicate.operator in ("==", "!="):
@@ -235,31 +235,34 @@ def _comparison(predicate: Predicate, value: float, values: dict[str, float]) ->
     else:
         is_left_larger = (value > 0) == (predicate.operator in (">", ">="))
         relation = "exceeds" if is_left_larger else "is below"
-    return f"{left} {relation} {right} by {_n(abs(value))}"
+    return f"{left} {relation} {right} by {number(abs(value))}"
 
 
-def _valued(side: Expression, values: dict[str, float], margin: float) -> str:
+def valued(side: Expression, values: Mapping[str, float], margin: float, unit: str = "") -> str:
+    """State the value of one side of a comparison, with enough digits to tell it from the other side."""
     if isinstance(side, Number):
         return str(side)
     value = float(side.evaluate(values))
     # So many digits that both sides read as different.
     ratio = abs(value / margin) if margin else 0.0
     digits = log10(ratio) + 2 if 0.0 < ratio < inf else 0.0
-    return f"{side} = {value:.{int(np.clip(digits, _DIGITS, _MOST_DIGITS))}g}"
+    return f"{side} = {value:.{int(np.clip(digits, _DIGITS, _MOST_DIGITS))}g}{unit and f' {unit}'}"
 
 
 def _over(window: tuple[float, float] | None) -> str:
     start, end = window or (0.0, 0.0)
-    return f"over [{_n(start)}, {_n(end)}] s"
+    return f"over [{number(start)}, {number(end)}] s"
 
 
 def _moment(window: tuple[float, float]) -> str:
-    return f"at {_s(window[0])}" if window[0] == window[1] else _over(window)
+    return f"at {seconds(window[0])}" if window[0] == window[1] else _over(window)
 
 
-def _s(time: float) -> str:
-    return f"{_n(time)} s"
+def seconds(time: float) -> str:
+    """A time with its unit."""
+    return f"{number(time)} s"
 
 
-def _n(value: float) -> str:
+def number(value: float) -> str:
+    """A number with the usual digits."""
     return f"{value:.{_DIGITS}g}"

@@ -171,6 +171,24 @@ class Call(Expression):
         return result
 
 
+# Units of plain numbers, which fit any other, and functions whose value has the unit of their operands.
+_PLAIN_UNITS, _KEEPING = ("1", "-"), ("abs", "min", "max")
+
+
+def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
+    """Return the unit of an expression, given those of the signals; empty if it is not known."""
+    match expression:
+        case Name(name):
+            unit = units.get(name, "")
+            return "" if unit in _PLAIN_UNITS else unit
+        case Arithmetic("*" | "/" | "^") | Number():
+            return ""
+        case Call(function) if function not in _KEEPING:
+            return ""
+    found = {unit_of(operand, units) for operand in expression.operands} - {""}
+    return found.pop() if len(found) == 1 else ""
+
+
 def embraced(part: Any, binding: int) -> str:
     """Return the text of a part, in parentheses if its precedence is lower than ``binding``."""
     return str(part) if part.binding >= binding else f"({part})"

@@ -263,6 +263,20 @@ def is_flag(predicate: Predicate) -> bool:
     return predicate.operator == ">=" and isinstance(predicate.left, Name) and predicate.right == Number(0.5)
 
 
+OPPOSITE: dict[Comparison, Comparison] = {
+    "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
+}  # fmt: skip
+
+
+def negated(formula: Formula) -> Formula:
+    """Return what holds if a formula does not: the opposite comparison where there is one."""
+    if isinstance(formula, Not):
+        return formula.operand
+    if isinstance(formula, Predicate) and not is_flag(formula):
+        return Predicate(OPPOSITE[formula.operator], formula.left, formula.right)
+    return Not(formula)
+
+
 def _end(window: Window | None) -> float:
     return window.end if window else 0.0
 

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 from falsifier.stl.expression import Expression, Number
 from falsifier.stl.formula import (
+    OPPOSITE,
     Always,
     And,
     Comparison,
@@ -19,7 +20,6 @@ from falsifier.stl.formula import (
 )
 
 _MIRRORED: dict[Comparison, Comparison] = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
-_OPPOSITE: dict[Comparison, Comparison] = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 
 @lru_cache(maxsize=10_000)  # the same parts are compared again and again
@@ -79,8 +79,8 @@ def _plain(formula: Formula) -> Formula:
     match formula:
         case Not(Not(operand)):
             return _plain(operand)
-        case Not(Predicate(operator, left, right)) if operator in _OPPOSITE:
-            return Predicate(_OPPOSITE[operator], left, right)
+        case Not(Predicate(operator, left, right)) if operator in _MIRRORED:
+            return Predicate(OPPOSITE[operator], left, right)
         case Not(Always(operand, window)):
             return Eventually(Not(operand), window)
         case Not(Eventually(operand, window)):

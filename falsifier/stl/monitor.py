@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
+from falsifier.stl.breach import find_breach
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.diagnosis import Diagnosis, diagnose
 from falsifier.stl.evaluator import fill, fill_many
@@ -67,6 +68,8 @@ class Monitor:
         """
         buffer = fill(self._program, trajectory, self._take_buffer())
         path = path_to_decider(self._program.root, buffer)
+        robustness = path[0].value
+        breach = find_breach(self._program.root, buffer, trajectory) if robustness < 0 else None
         self._spare.append(buffer)
         decider, sample = path[-1].part, path[-1].sample
         time = trajectory.times.item(sample)
@@ -74,7 +77,7 @@ class Monitor:
         for name, value in values.items():
             if not isfinite(value):
                 raise MonitorError(f"signal {name!r} is {value} at {time:g} s")
-        return Verdict(path[0].value, time, decider.text, values)
+        return Verdict(robustness, time, decider.text, values, breach)
 
     def diagnose(self, trajectory: Trajectory) -> Diagnosis:
         """Return the path from the formula to the deciding predicate, and the vacuous implications.

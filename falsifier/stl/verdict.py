@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from falsifier.stl.breach import Breach
+
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
@@ -13,12 +15,14 @@ class Verdict:
         critical_time: time in s that decided the value.
         predicate: text of the deciding predicate.
         values: signal values at the critical time, by name.
+        breach: what broke; None if nothing did.
     """
 
     robustness: float
     critical_time: float
     predicate: str
     values: Mapping[str, float] = field(default_factory=dict)
+    breach: Breach | None = None
 
     @property
     def violated(self) -> bool:

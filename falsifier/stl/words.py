@@ -2,6 +2,7 @@
 
 from falsifier.stl.expression import Arithmetic, Call, Number
 from falsifier.stl.formula import (
+    OPPOSITE,
     Always,
     And,
     Comparison,
@@ -26,9 +27,6 @@ _IS: dict[Comparison, str] = {
     "==": "equals",
     "!=": "differs from",
 }
-_OPPOSITE: dict[Comparison, Comparison] = {
-    "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
-}  # fmt: skip
 _MIRRORED: dict[Comparison, Comparison] = {
     "<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!=",
 }  # fmt: skip
@@ -117,7 +115,7 @@ def _predicate(predicate: Predicate) -> str:
 def _negated(predicate: Predicate) -> str:
     if is_flag(predicate):
         return f"{predicate.left} is false"
-    return _predicate(Predicate(_OPPOSITE[predicate.operator], predicate.left, predicate.right))
+    return _predicate(Predicate(OPPOSITE[predicate.operator], predicate.left, predicate.right))
 
 
 def _throughout(window: Window | None, *, later: bool) -> str:

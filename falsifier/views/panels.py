@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Formula
-from falsifier.stl.expression import Expression, Number
+from falsifier.stl.expression import Expression, Number, unit_of
 from falsifier.stl.formula import Always, Eventually, Predicate, Until
 from falsifier.stl.verdict import Verdict
 
@@ -175,9 +175,9 @@ def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) 
         for p, (begin, finish) in judged
     )
     decided = verdict is not None and any(str(p) == verdict.predicate for p, _ in judged)
-    units = {trajectory.units.get(name, "") for name in expression.signals} - {""}
+    unit = unit_of(expression, trajectory.units)
     return Panel(
-        f"{expression} [{units.pop()}]" if len(units) == 1 else str(expression),
+        f"{expression} [{unit}]" if unit else str(expression),
         trajectory.times,
         _evaluated(expression, trajectory),
         bounds,

@@ -3,7 +3,7 @@ import pytest
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import FmuModel
 from falsifier.fmu.description.units import Unit
-from falsifier.problem.unit_check import defined_units, unit_conflicts, unit_of
+from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.problem.support import AT
@@ -61,14 +61,6 @@ def test_units_that_do_not_fit_are_named(text: str, message: str) -> None:
 )
 def test_what_may_fit_is_no_conflict(text: str) -> None:
     assert not list(unit_conflicts(parse(text), INFO, UNITS))
-
-
-def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
-    units = {
-        text: unit_of(parse(f"{text} <= 0").predicates[0].left, INFO)
-        for text in ("abs(s - t)", "3 + v", "s*t")
-    }
-    assert units == {"abs(s - t)": "m", "3 + v": "km/h", "s*t": ""}
 
 
 def test_fmus_define_units_and_other_models_do_not() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Diagnosis, Monitor, parse
-from falsifier.stl.diagnosis import _valued
+from falsifier.stl.diagnosis import valued
 from falsifier.stl.expression import Name
 from tests.stl.randoms import STEP, random_case
 
@@ -138,4 +138,4 @@ def test_numbers_that_differ_read_as_different() -> None:
 
 @pytest.mark.parametrize(("value", "margin"), [(3.0, inf), (inf, inf), (inf, 1.0), (3.0, nan), (0.0, 1.0)])
 def test_values_that_are_not_finite_are_told_too(value: float, margin: float) -> None:
-    assert _valued(Name("x"), {"x": value}, margin) == f"x = {value:g}"
+    assert valued(Name("x"), {"x": value}, margin) == f"x = {value:g}"

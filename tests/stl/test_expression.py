@@ -14,6 +14,7 @@ from falsifier.stl.expression import (
     Number,
     Operator,
     number_text,
+    unit_of,
 )
 
 X, Y = Name("x"), Name("wheel speed")
@@ -90,3 +91,14 @@ def test_equal_expressions_are_equal_keys_and_travel() -> None:
 def test_numbers_read_back_exactly(value: float) -> None:
     assert float(number_text(value)) == value
     assert not number_text(value).endswith(".0")
+
+
+def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
+    units = {"x": "m", "wheel speed": "km/h", "n": "1"}
+    expressions = {
+        "m": Call("abs", (Arithmetic("-", X, Number(2.0)),)),
+        "km/h": Negative(Arithmetic("+", Number(3.0), Y)),
+        "": Arithmetic("*", X, X),
+    }
+    assert {unit: unit_of(e, units) for unit, e in expressions.items()} == {u: u for u in expressions}
+    assert unit_of(Name("n"), units) == ""

@@ -1,0 +1,414 @@
+"""What broke on a trajectory that violates a formula: what did not hold, when, and how far off it was.
+
+Robustness is a minimum of maxima, so its critical time is where the verdict was nearest to changing. Of an
+implication that is often the condition, which held. What a reader looks for is the consequence, while the
+condition held; of ``or``, every alternative; of F and U, what was not reached within the window.
+
+Negations are carried down instead of rewriting the formula: a demand is a part that had to be true, or false.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.stl.diagnosis import number, seconds, valued
+from falsifier.stl.expression import Expression, Number, unit_of
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    is_flag,
+    negated,
+)
+from falsifier.stl.names import name_text
+from falsifier.stl.program import Part
+
+Floats = NDArray[np.float64]
+Truths = NDArray[np.bool_]
+Span = tuple[int, int]
+
+# Maximum number of signals whose values are told of a condition.
+_MOST_SIGNALS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Shortfall:
+    """A comparison that had to hold and did not.
+
+    Attributes:
+        part: the comparison, as it had to hold.
+        quantity: what it compares, the side that is not a plain number.
+        value: its value at ``time``.
+        limit: value of the other side at ``time``.
+        unit: unit of both; empty if unknown.
+        start: start of the violating interval in s; of what was never reached, of its window.
+        end: end of that interval in s.
+        time: when it was farthest from holding, in s; of what was never reached, when it was nearest.
+        never: whether it had to hold at some time of the interval only, and never did.
+        reading: the value in words.
+        sought: what held at no time of a window, if this is what it lacked where it came nearest, in words.
+        context: what made it necessary, such as conditions that held, in words.
+    """
+
+    part: str
+    quantity: str
+    value: float
+    limit: float
+    unit: str
+    start: float
+    end: float
+    time: float
+    never: bool
+    reading: str
+    sought: str = ""
+    context: tuple[str, ...] = ()
+
+    @property
+    def what(self) -> str:
+        """The comparison, the interval and the value, without the context."""
+        over, sought = _over(self.start, self.end), self.sought and f"{self.sought}, but there "
+        at = "" if self.start == self.end else f" at {seconds(self.time)}"
+        if self.never and at:
+            nearest = f"; nearest was {self.reading}{at}" if " = " in self.reading else ""
+            return f"{sought}{self.part} held at no time {over}{nearest}"
+        return f"{sought}{self.part} was violated {over}: {self.reading}{at}"
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """Why a formula is violated.
+
+    Attributes:
+        shortfalls: what did not hold; several if each would have been enough, in the order of the formula.
+    """
+
+    shortfalls: tuple[Shortfall, ...]
+
+    @property
+    def main(self) -> Shortfall:
+        """The first shortfall."""
+        return self.shortfalls[0]
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What broke, one shortfall each, then what made it necessary."""
+        count = len(self.shortfalls)
+        numbers = [f"alternative {k} of {count}: " if count > 1 else "" for k in range(1, count + 1)]
+        shared = [text for text in self.main.context if all(text in s.context for s in self.shortfalls)]
+        own = ["".join(f"; {text}" for text in s.context if text not in shared) for s in self.shortfalls]
+        return (*(f"{n}{s.what}{o}" for n, s, o in zip(numbers, self.shortfalls, own, strict=True)), *shared)
+
+    @property
+    def text(self) -> str:
+        """The lines as one sentence, without a full stop."""
+        return "; ".join(self.lines)
+
+
+def find_breach(root: Part, buffer: Floats, trajectory: Trajectory) -> Breach:
+    """Return what broke on a trajectory that violates a formula.
+
+    Args:
+        root: the compiled formula; its value at time 0 is negative.
+        buffer: values of all its parts.
+        trajectory: the trajectory on which it was evaluated.
+    """
+    whole = _Demand(root, wanted=True)
+    return Breach(tuple(_Search(buffer, trajectory).at(whole, _Place(0))))
+
+
+class _Demand(NamedTuple):
+    """A part of a formula that had to be true, or false."""
+
+    part: Part
+    wanted: bool
+
+    @property
+    def formula(self) -> Formula:
+        return self.part.formula
+
+    @property
+    def text(self) -> str:
+        formula = self.formula
+        if isinstance(formula, Predicate) and is_flag(formula):
+            return f"{'' if self.wanted else 'not '}{formula.left}"
+        return self.part.text if self.wanted else str(negated(formula))
+
+    @property
+    def opposite(self) -> "_Demand":
+        return _Demand(self.part, not self.wanted)
+
+    @property
+    def operands(self) -> list["_Demand"]:
+        """The operands, with what is demanded of them; of a chain of one connective all at once."""
+        found = [_Demand(child, self.wanted) for child in self.part.children]
+        if isinstance(self.formula, Implies):
+            return [found[0].opposite, found[1]]
+        if isinstance(self.formula, Not):
+            return [found[0].opposite]
+        if isinstance(self.formula, And | Or):
+            kind = type(self.formula)
+            parts = (child.operands if type(child.formula) is kind else [child] for child in found)
+            return [child.plain for children in parts for child in children]
+        return found
+
+    @property
+    def plain(self) -> "_Demand":
+        """The same without negations in front."""
+        return self.operands[0].plain if isinstance(self.formula, Not) else self
+
+    @property
+    def is_throughout(self) -> bool:
+        return isinstance(self.formula, Always if self.wanted else Eventually)
+
+    @property
+    def is_sometime(self) -> bool:
+        return isinstance(self.formula, Eventually if self.wanted else Always)
+
+    @property
+    def is_choice(self) -> bool:
+        """Whether one of the operands would have been enough."""
+        return isinstance(self.formula, Or | Implies) if self.wanted else isinstance(self.formula, And)
+
+    def margins(self, buffer: Floats, span: Span) -> Floats:
+        """By how much it is met at the samples of a span."""
+        values = self.part.over(buffer, *span)
+        return values if self.wanted else -values
+
+    def met(self, buffer: Floats, span: Span) -> Truths:
+        """At which samples of a span it is met."""
+        true: Truths = self.part.over(buffer, *span) >= 0
+        return true if self.wanted else ~true
+
+
+@dataclass(frozen=True, slots=True)
+class _Condition:
+    """A demand that was met, and at which sample; None: at that of the shortfall."""
+
+    demand: _Demand
+    sample: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a demand was not met.
+
+    Attributes:
+        sample: the sample.
+        scope: window in which it had to be met throughout; None if at this sample only.
+        guards: demands from the operator of that window down to here.
+        notes: what made it necessary.
+        sought: what held at no time of a window, in words; here it came nearest.
+    """
+
+    sample: int
+    scope: Span | None = None
+    guards: tuple[_Demand, ...] = ()
+    notes: tuple[_Condition | str, ...] = ()
+    sought: str = ""
+
+    def noted(self, *notes: _Condition | str) -> "_Place":
+        return replace(self, notes=(*self.notes, *notes))
+
+    def moved(self, sample: int, scope: Span | None = None) -> "_Place":
+        """Another sample; conditions stay at the one at which they were asked."""
+        return _Place(sample, scope, (), self.settled.notes, self.sought)
+
+    @property
+    def settled(self) -> "_Place":
+        notes = (
+            replace(n, sample=self.sample) if isinstance(n, _Condition) and n.sample is None else n
+            for n in self.notes
+        )
+        return replace(self, notes=tuple(notes))
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Descends from a demand that was not met to the comparisons that broke."""
+
+    buffer: Floats
+    trajectory: Trajectory
+
+    def at(self, demand: _Demand, place: _Place) -> Iterator[Shortfall]:
+        """Why a demand was not met at a sample."""
+        place = replace(place, guards=(*place.guards, demand))
+        here = (place.sample, place.sample)
+        window = demand.part.window_at(place.sample) or here
+        operands = demand.operands
+        match demand.formula:
+            case Predicate():
+                yield self._compared(demand, place)
+            case Not():
+                yield from self.at(operands[0], place)
+            case Next():
+                yield from self.at(operands[0], place.moved(place.sample + 1))
+            case Until() if demand.wanted:
+                yield from self._until(operands[0], operands[1], window, place)
+            case Until():
+                left, right = operands
+                met = self._first(right.opposite, window)
+                yield from self.at(right, place.noted(_Condition(left.opposite)).moved(met))
+            case Implies() if demand.wanted:  # apart from other choices, as the consequence may be negated
+                yield from self.at(operands[1], place.noted(_Condition(operands[0].opposite)))
+            case Iff():
+                yield from self._unequal(demand, place)
+            case _ if demand.is_throughout:
+                yield from self._throughout(operands[0], window, place)
+            case _ if demand.is_sometime:
+                yield from self._never(operands[0], window, place)
+            case _ if demand.is_choice:
+                # "not p or q" is read as "p -> q": what had to be false is a condition that held.
+                refused, choices = ([d for d in operands if d.wanted is w] for w in (False, True))
+                if choices:
+                    place = place.noted(*(_Condition(d.opposite) for d in refused))
+                if len(choices) != 1:  # then all conditions are told of the same sample
+                    place = place.settled
+                for choice in choices or operands:
+                    yield from self.at(choice, place)
+            case _:
+                yield from self.at(min(operands, key=lambda d: d.margins(self.buffer, here)[0]), place)
+
+    def _throughout(self, demand: _Demand, window: Span, place: _Place) -> Iterator[Shortfall]:
+        """Why a demand was not met at every sample of a window."""
+        if isinstance(demand.formula, Not):
+            yield from self._throughout(demand.operands[0], window, place)
+        elif demand.is_throughout:
+            yield from self._throughout(demand.operands[0], _inner(demand.part, window), place)
+        else:
+            sample = window[0] + int(demand.margins(self.buffer, window).argmin())
+            yield from self.at(demand, place.moved(sample, window))
+
+    def _never(self, demand: _Demand, window: Span, place: _Place) -> Iterator[Shortfall]:
+        """Why a demand was met at no sample of a window."""
+        if isinstance(demand.formula, Predicate):
+            yield self._compared(demand, place.settled, window)
+        elif isinstance(demand.formula, Not):
+            yield from self._never(demand.operands[0], window, place)
+        elif demand.is_sometime:
+            yield from self._never(demand.operands[0], _inner(demand.part, window), place)
+        elif demand.is_choice:
+            for choice in demand.operands:
+                yield from self._never(choice, window, place)
+        else:
+            best = window[0] + int(demand.margins(self.buffer, window).argmax())
+            if window[0] < window[1] and not place.sought:
+                near = f"it came nearest at {seconds(self._time(best))}"
+                over = _over(*map(self._time, window))
+                place = replace(place, sought=f"{demand.text} held at no time {over}; {near}")
+            yield from self.at(demand, place.moved(best))
+
+    def _until(self, left: _Demand, right: _Demand, window: Span, place: _Place) -> Iterator[Shortfall]:
+        if not right.met(self.buffer, window).any():
+            yield from self._never(right, window, place)
+            return
+        met = self._first(right, window)
+        note = f"it had to hold until {right.text}, which held at {seconds(self._time(met))}"
+        yield from self._throughout(left, (place.sample, met), place.noted(note))
+
+    def _unequal(self, demand: _Demand, place: _Place) -> Iterator[Shortfall]:
+        """Why an equivalence failed, told from a side that held; if none did, from what the left one was."""
+        left, right = (_Demand(child, wanted=True) for child in demand.part.children)
+        is_true = bool(left.met(self.buffer, (place.sample, place.sample))[0])
+        if demand.wanted and not is_true:
+            left, right = right, left
+        held = is_true or demand.wanted
+        yield from self.at(
+            right if held is demand.wanted else right.opposite,
+            place.noted(_Condition(left if held else left.opposite)),
+        )
+
+    def _compared(self, demand: _Demand, place: _Place, window: Span | None = None) -> Shortfall:
+        """The shortfall of a comparison: throughout a stretch, or within a window if that is given."""
+        predicate = demand.formula
+        assert isinstance(predicate, Predicate)
+        first, last = window or self._stretch(place)
+        margins = demand.margins(self.buffer, (first, last))
+        sample = first + int(margins.argmax() if window else margins.argmin())
+        values, units = self._signals(sample), self.trajectory.units
+        quantity, other = compared_sides(predicate)
+        value, limit = (float(side.evaluate(values)) for side in (quantity, other))
+        unit = unit_of(quantity, units) or unit_of(other, units)
+        if is_flag(predicate) and value in (0.0, 1.0):
+            reading = f"{quantity} was {'true' if value else 'false'}"
+        else:
+            reading = valued(quantity, values, value - limit, unit)
+            if not isinstance(other, Number):
+                reading += f", {valued(other, values, value - limit, unit_of(other, units) or unit)}"
+        return Shortfall(
+            part=demand.text,
+            quantity=str(quantity),
+            value=value,
+            limit=limit,
+            unit=unit,
+            start=self._time(first),
+            end=self._time(last),
+            time=self._time(sample),
+            never=window is not None,
+            reading=reading,
+            sought=place.sought,
+            context=tuple(self._told(note, sample) for note in place.notes),
+        )
+
+    def _stretch(self, place: _Place) -> Span:
+        """The samples around one at which all demands down to the comparison were not met."""
+        if place.scope is None:
+            return place.sample, place.sample
+        low, high = place.scope
+        met = np.any([guard.met(self.buffer, place.scope) for guard in place.guards], axis=0)
+        good = np.flatnonzero(met) + low
+        before, after = good[good < place.sample], good[good > place.sample]
+        return int(before.max(initial=low - 1)) + 1, int(after.min(initial=high + 1)) - 1
+
+    def _told(self, note: _Condition | str, sample: int) -> str:
+        if isinstance(note, str):
+            return note
+        at = sample if note.sample is None else note.sample
+        text, time, formula = note.demand.text, seconds(self._time(at)), note.demand.formula
+        names, read = formula.signals, ""
+        if len(names) <= _MOST_SIGNALS and not formula.horizon(self.trajectory.step):
+            values, units = self._signals(at), self.trajectory.units
+            read = ", ".join(
+                f"{name_text(n)} = {number(values[n])}{f' {units[n]}' if n in units else ''}" for n in names
+            )
+        if note.sample is None:
+            return f"while {text} held{f' ({read} at {time})' if read else ''}"
+        return f"after {text} held at {time}{f' ({read})' if read else ''}"
+
+    def _first(self, demand: _Demand, window: Span) -> int:
+        """The first sample of a window at which a demand is met."""
+        return window[0] + int(demand.met(self.buffer, window).argmax())
+
+    def _time(self, sample: int) -> float:
+        return float(self.trajectory.times[sample])
+
+    def _signals(self, sample: int) -> dict[str, float]:
+        return {name: float(column[sample]) for name, column in self.trajectory.columns.items()}
+
+
+def _inner(part: Part, window: Span) -> Span:
+    """The samples at which the operand of a temporal operator counts if it is evaluated over a window."""
+    (first, _), (_, last) = part.window_at(window[0]) or window, part.window_at(window[1]) or window
+    return first, last
+
+
+def compared_sides(predicate: Predicate) -> tuple[Expression, Expression]:
+    """Return the quantity of a comparison, then the side that it is compared with."""
+    if isinstance(predicate.left, Number):
+        return predicate.right, predicate.left
+    return predicate.left, predicate.right
+
+
+def _over(start: float, end: float) -> str:
+    return f"at {seconds(start)}" if start == end else f"from {number(start)} to {seconds(end)}"
