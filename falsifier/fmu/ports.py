@@ -13,26 +13,11 @@ from numpy.typing import NDArray
 
 from falsifier.errors import ModelError
 from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.process.encoding import STORAGE, STORED
 
 Table = NDArray[np.int64]
 # What the compiled loops receive of Ports: integers, because compiled code counts references to arrays.
 Addresses = tuple[int, int, int, int]
-
-# Storage types of values; the position in this tuple is the code that the compiled loops branch on.
-STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
-
-_STORED_3: Mapping[str, str] = {
-    "Float64": "f8",
-    "Float32": "f4",
-    "Boolean": "u1",
-    **{f"Int{b}": f"i{b // 8}" for b in (8, 16, 32, 64)},
-    **{f"UInt{b}": f"u{b // 8}" for b in (8, 16, 32, 64)},
-}
-_STORED: Mapping[int, Mapping[str, str]] = {
-    1: {"Real": "f8", "Integer": "i4", "Boolean": "u1"},
-    2: {"Real": "f8", "Integer": "i4", "Boolean": "i4"},
-    3: _STORED_3,
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +66,7 @@ def make_ports(
     for code in dict.fromkeys(slot.type for slot in slots):
         members = [slot for slot in slots if slot.type == code]
         starts = _starts(members)
-        stored = _STORED[description.major][code]
+        stored = STORED[description.major][code]
         references = np.array(list(starts), dtype=np.uint32)
         values = np.zeros(sum(_sizes(members).values()), dtype=stored)
         # A set call transfers whole arrays: elements that are not searched keep their start values.
@@ -117,19 +102,7 @@ def make_ports(
 
 def bytes_per_value(major: int, code: str) -> int:
     """Return the size of a value of a type in calls of this FMI version."""
-    return np.dtype(_STORED[major][code]).itemsize
-
-
-def fixed_elements(description: Description, inputs: Sequence[str], parameters: Sequence[str]) -> list[int]:
-    """Return the positions of the parameters that are other elements of the inputs' arrays (FMI 3).
-
-    Setting an input sets its whole array, and must not put these back to their start values.
-    """
-    slots = [description.slot(name) for name in inputs]
-    arrays = {slot.reference for slot in slots if slot.size > 1}
-    driven = {(slot.reference, slot.offset) for slot in slots}
-    found = [(k, description.slot(name)) for k, name in enumerate(parameters)]
-    return [k for k, s in found if s.reference in arrays and (s.reference, s.offset) not in driven]
+    return np.dtype(STORED[major][code]).itemsize
 
 
 def _sizes(slots: Sequence[Slot]) -> dict[int, int]:

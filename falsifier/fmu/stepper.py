@@ -15,7 +15,8 @@ from falsifier.fmu.buffers import Room
 from falsifier.fmu.description import Description
 from falsifier.fmu.library import Library, status_name
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.ports import Ports, fixed_elements, make_ports
+from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.process.encoding import fixed_elements
 from falsifier.fmu.strings import set_strings
 
 

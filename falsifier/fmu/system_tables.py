@@ -11,7 +11,8 @@ from falsifier.fmu import coupled_stepping as loops
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.instance import FmuInstance
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.ports import Ports, fixed_elements, make_ports
+from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.process.encoding import fixed_elements
 from falsifier.fmu.saved_state import SavedState
 from falsifier.fmu.stepper import check_range, is_held, write_fixed
 from falsifier.fmu.systems.network import SYSTEM, Link, Member, Network, Place

@@ -1,7 +1,6 @@
 """A Windows library, simulated through Wine; the stepping is in worker/, see wine_process.py."""
 
 import mmap
-import struct
 import sys
 import time
 from collections.abc import Sequence
@@ -17,7 +16,9 @@ from falsifier.fmu.description import Description
 from falsifier.fmu.description.wine import windows_path
 from falsifier.fmu.library import TYPES, LogSink, status_name
 from falsifier.fmu.plan import Plan, solver_tolerance
-from falsifier.fmu.ports import Ports, fixed_elements, make_ports
+from falsifier.fmu.ports import Ports, make_ports
+from falsifier.fmu.process import encoding
+from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.stepper import (
     check_input_range,
     check_range,
@@ -25,11 +26,10 @@ from falsifier.fmu.stepper import (
     loops,
     out_of_time,
     what_stopped,
-    write_fixed,
 )
 
 if sys.platform != "win32":
-    from falsifier.fmu.wine_process import Answer, WineProcess, block, text
+    from falsifier.fmu.wine_process import Answer, WineProcess
 
 assert sys.platform != "win32"
 
@@ -101,58 +101,39 @@ class WineInstance:
         held = [is_held(self._description, self._interface, kinds[name]) for name in plan.inputs]
         self._held_rows = [row for row, is_so in enumerate(held) if is_so]
         self._other_rows = [row for row, is_so in enumerate(held) if not is_so]
-        self._parameters, self._outputs = self._ports(plan.parameters), self._ports(plan.outputs)
-        self._inputs, others = self._input_ports(plan, self._other_rows)
-        self._held_inputs, held_others = self._input_ports(plan, self._held_rows)
-        self._fixed = [(self._inputs, others), (self._held_inputs, held_others)]
-        self._fixed_values = np.full(len(others) + len(held_others), np.nan)
+        self._parameters = self._ports(plan.parameters)
+        self._inputs = self._ports([plan.inputs[row] for row in self._other_rows])
+        self._held_inputs = self._ports([plan.inputs[row] for row in self._held_rows])
         self._send(plan)
 
-    def _ports(self, names: Sequence[str], fixed: Sequence[str] = ()) -> Ports:
+    def _ports(self, names: Sequence[str]) -> Ports:
         codes = {code: position for position, code in enumerate(TYPES[self._description.major], start=1)}
-        return make_ports(self._description, names, codes, fixed)
-
-    def _input_ports(self, plan: Plan, rows: Sequence[int]) -> tuple[Ports, list[int]]:
-        """Return the ports of some inputs, and which parameters are other elements of the same arrays."""
-        names = [plan.inputs[row] for row in rows]
-        fixed = fixed_elements(self._description, names, plan.parameters)
-        return self._ports(names, [plan.parameters[k] for k in fixed]), fixed
+        return make_ports(self._description, names, codes)
 
     def _send(self, plan: Plan) -> None:
         """Tell the worker what the next simulations have in common."""
         parts = [text(windows_path(self._path)), self._numbers(plan)]
         slots = self._description.slots
-        parts += [_integers(slots[name].reference) + text(value) for name, value in plan.strings]
-        parts.append(self._table(self._parameters))
-        parts += [self._table(self._inputs), _integers(*self._other_rows)]
-        parts += [self._table(self._held_inputs), _integers(*self._held_rows)]
-        parts.append(self._table(self._outputs))
+        parts += [integers(slots[name].reference) + text(value) for name, value in plan.strings]
+        parts.append(encoding.ports(self._description, plan.parameters))
+        for rows in (self._other_rows, self._held_rows):
+            names = [plan.inputs[row] for row in rows]
+            parts += [encoding.inputs(self._description, names, plan.parameters), integers(*rows)]
+        parts.append(encoding.ports(self._description, plan.outputs))
         answer = self._wine.request(_PREPARE, b"".join(parts))
         if answer.where != _DONE:
             raise ModelError(f"{self._name}: {answer.text}")
         self._plan = plan
-
-    def _fix(self, plan: Plan) -> None:
-        """Send the worker the fixed elements of partly driven arrays, if it has others."""
-        values = self._room.parameters[[k for _, rows in self._fixed for k in rows]]
-        if np.array_equal(values, self._fixed_values):
-            return
-        for ports, rows in self._fixed:
-            write_fixed(ports, self._room.parameters[rows])
-        self._fixed_values = values
-        self._send(plan)
 
     def simulate(self, deadline: float) -> None:
         """See Instance."""
         plan, room, shared = self._plan, self._room, self._shared
         assert plan is not None, "prepare must be called before simulate"
         self._check_ranges(plan)
-        if self._fixed_values.size:
-            self._fix(plan)
         shared.parameters[:] = room.parameters
         shared.inputs[:] = room.inputs
         remaining = max(deadline - time.perf_counter(), 0.0)
-        self._check(plan, self._wine.request(_SIMULATE, struct.pack("<d", remaining)))
+        self._check(plan, self._wine.request(_SIMULATE, reals(remaining)))
         room.outputs[:] = shared.outputs
 
     def reset(self) -> bool:
@@ -195,30 +176,13 @@ class WineInstance:
         return path
 
     def _numbers(self, plan: Plan) -> bytes:
-        integers = _integers(
+        counts = integers(
             plan.samples, plan.every, plan.pieces, len(plan.parameters), len(plan.inputs),
             plan.tolerance is not None,
         )  # fmt: skip
-        floats = struct.pack(
-            "<4d",
-            plan.stop_time, plan.max_step, plan.tolerance or 0.0,
-            solver_tolerance(plan, self._description.info),
-        )  # fmt: skip
-        return integers + floats + _integers(len(plan.strings))
-
-    def _table(self, ports: Ports) -> bytes:
-        """Return the calls and places of some variables as request.c reads them: offsets for addresses."""
-        codes = TYPES[self._description.major]
-        buffers = list(zip(ports.memory[::2], ports.memory[1::2], strict=True))
-        parts = [_integers(len(buffers))]
-        for (position, *_), (references, values) in zip(ports.calls.tolist(), buffers, strict=True):
-            parts += [text(codes[position - 1]), block(references.tobytes()), _integers(values.size)]
-            parts.append(block(values.tobytes()))
-        parts.append(_integers(len(ports.places)))
-        for storage, address, sign, is_boolean in ports.places.tolist():
-            call, offset = _position(buffers, address)
-            parts.append(_integers(storage, call, offset) + struct.pack("<dQ", sign, is_boolean))
-        return b"".join(parts)
+        tolerance = solver_tolerance(plan, self._description.info)
+        floats = reals(plan.stop_time, plan.max_step, plan.tolerance or 0.0, tolerance)
+        return counts + floats + integers(len(plan.strings))
 
     def _check_ranges(self, plan: Plan) -> None:
         room = self._room
@@ -259,7 +223,7 @@ def _fmu(description: Description, folder: Path, interface: Interface, *, loggin
         3: windows_path(folder / "resources") + "\\",
     }[description.major]
     events = description.major == 3 and interface == "co-simulation" and description.event_mode
-    numbers = _integers(
+    numbers = integers(
         description.major, interface == "model-exchange", logging, events, description.states,
         description.indicators,
     )  # fmt: skip
@@ -268,15 +232,3 @@ def _fmu(description: Description, folder: Path, interface: Interface, *, loggin
         resources,
     )  # fmt: skip
     return numbers + b"".join(map(text, words))
-
-
-def _position(buffers: Sequence[tuple[np.ndarray, np.ndarray]], address: int) -> tuple[int, int]:
-    """Return which buffer of values contains an address, and the offset in it."""
-    for position, (_, values) in enumerate(buffers):
-        if 0 <= address - values.ctypes.data < values.nbytes:
-            return position, address - values.ctypes.data
-    raise AssertionError("each place is in a buffer")
-
-
-def _integers(*numbers: int) -> bytes:
-    return struct.pack(f"<{len(numbers)}q", *numbers)

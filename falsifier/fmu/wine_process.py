@@ -21,6 +21,7 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.environment import worker_environment
 from falsifier.fmu.folders import REMOVING
+from falsifier.fmu.process.encoding import text
 
 assert sys.platform != "win32"
 
@@ -165,16 +166,6 @@ class WineProcess:
             if found is not None:
                 linux.end_by(found)
             os._exit(code & 0xFF)
-
-
-def text(words: str) -> bytes:
-    """Return a text as it is in requests."""
-    return block(words.encode() + b"\0")
-
-
-def block(data: bytes) -> bytes:
-    """Return bytes as they are in requests: after their number, padded to a multiple of 8."""
-    return struct.pack("<Q", len(data)) + data + bytes(-len(data) % 8)
 
 
 def _make_prefix(prefix: Path) -> None:

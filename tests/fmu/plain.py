@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from falsifier.fmu.ports import STORAGE, Addresses
+from falsifier.fmu.ports import Addresses
+from falsifier.fmu.process.encoding import STORAGE
 
 DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK = range(7)
 STATUS, WHERE, STEP = range(3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from falsifier.fmu import loop_numbers, loops
-from falsifier.fmu.ports import STORAGE
+from falsifier.fmu.process.encoding import STORAGE
 from tests.fmu import plain
 
 Status = Callable[..., int]

@@ -1,5 +1,4 @@
 import hashlib
-import struct
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,6 @@ from falsifier.fmu import folders, wine_process
 from falsifier.fmu.description import wine
 from tests import patience
 from tests.fmu.test_wine_instance import needs_wine
-
 
 _FOLDER = wine_process.WORKER.parents[2]
 
@@ -43,11 +41,6 @@ def test_places_and_requests_are_numbered_as_in_the_worker() -> None:
     assert words[8:] == [
         "CALLING = 20", "WRITING", "TEXT", "TIMEOUT", "IMPOSSIBLE", "REFUSED", "MESSAGE", "CRASHED",
     ]  # fmt: skip
-
-
-def test_texts_are_padded() -> None:
-    assert wine_process.text("ä") == struct.pack("<Q", 3) + "ä\0".encode() + bytes(5)
-    assert wine_process.block(bytes(8)) == struct.pack("<Q", 8) + bytes(8)
 
 
 def test_wine_gets_no_keys_and_no_screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

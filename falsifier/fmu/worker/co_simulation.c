@@ -32,8 +32,8 @@ static struct outcome settle(struct fmu *fmu)
     return (struct outcome){0, STUCK};
 }
 
-/* Enter event mode, set inputs, update the discrete states, return to step mode. */
-static struct outcome handle_event(struct fmu *fmu, const struct ports *ports)
+/* Enter event mode, set inputs if there are any, update the discrete states, return to step mode. */
+struct outcome change_at_event(struct fmu *fmu, const struct ports *ports)
 {
     unsigned status = fmu->step.enter_event_mode(fmu->instance);
     if (status > 1)
@@ -65,7 +65,7 @@ static struct outcome advance_3(struct fmu *fmu, double start, double end, int *
         double before = time;
         time = early ? reached : end;
         if (event && fmu->event_mode && !*ends) {
-            struct outcome o = handle_event(fmu, NULL);
+            struct outcome o = change_at_event(fmu, NULL);
             if (o.where == TERMINATED) {
                 *ends = 1;
                 return (struct outcome){o.status, time >= end ? DONE : TERMINATED};
@@ -94,11 +94,12 @@ static struct outcome set_inputs(struct fmu *fmu, struct plan *plan, double time
     }
     /* Initialisation has already set the values at time 0. */
     if (plan->held.ports.count && put_inputs(&plan->held, time) && is_initialised)
-        return handle_event(fmu, &plan->held.ports);
+        return change_at_event(fmu, &plan->held.ports);
     return done;
 }
 
-static struct outcome step(struct fmu *fmu, double start, double end, int *ends)
+/* Do one communication step; ends says whether the FMU ends the simulation. */
+struct outcome do_step(struct fmu *fmu, double start, double end, int *ends)
 {
     if (fmu->major == 3)
         return advance_3(fmu, start, end, ends);
@@ -109,21 +110,30 @@ static struct outcome step(struct fmu *fmu, double start, double end, int *ends)
     return (struct outcome){status, status > 1 ? STEPPING : DONE};
 }
 
-static struct outcome begin(struct fmu *fmu, struct plan *plan)
+/* Look up what is called in every step. */
+void find_step_functions(struct fmu *fmu)
 {
     fmu->step.do_step = fmu_required(fmu, "DoStep");
-    struct outcome o = done;
     if (fmu->event_mode) {
         fmu->step.enter_event_mode = (without_arguments)fmu_required(fmu, "EnterEventMode");
         fmu->step.enter_step_mode = (without_arguments)fmu_required(fmu, "EnterStepMode");
         fmu->step.update = (update_discrete_states_3)fmu_required(fmu, "UpdateDiscreteStates");
-        /* Leave the event mode in which initialisation ends. */
-        o = settle(fmu);
-        if (o.where == DONE) {
-            unsigned status = fmu->step.enter_step_mode(fmu->instance);
-            o = (struct outcome){status, status > 1 ? EVENT : DONE};
-        }
     }
+}
+
+/* Leave the event mode in which initialisation ends, if it does. */
+struct outcome begin_steps(struct fmu *fmu)
+{
+    struct outcome o = fmu->event_mode ? settle(fmu) : done;
+    if (o.where != DONE || !fmu->event_mode)
+        return o;
+    unsigned status = fmu->step.enter_step_mode(fmu->instance);
+    return (struct outcome){status, status > 1 ? EVENT : DONE};
+}
+
+static struct outcome begin(struct fmu *fmu, struct plan *plan)
+{
+    struct outcome o = begin_steps(fmu);
     if (o.where != DONE)
         return o;
     unsigned status = read_row(fmu, plan, 0);
@@ -139,6 +149,7 @@ struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, 
     size_t steps = (plan->samples - 1) * plan->every;
     double size = plan->stop_time / (double)steps;
     *reached = 0.0;
+    find_step_functions(fmu);
     struct outcome o = begin(fmu, plan);
     for (size_t k = 0; k < steps && o.where == DONE;) {
         double start = (double)k * size;
@@ -146,7 +157,7 @@ struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, 
         int ends = 0;
         o = set_inputs(fmu, plan, start, k > 0);
         if (o.where == DONE)
-            o = step(fmu, start, end, &ends);
+            o = do_step(fmu, start, end, &ends);
         if (o.where != DONE)
             break;
         *reached = (double)++k * size;

@@ -14,8 +14,6 @@ typedef unsigned (*setup_2)(void *, int, double, double, int, double);
 typedef unsigned (*enter_3)(void *, uint8_t, double, double, uint8_t, double);
 typedef unsigned (*string_2)(void *, const uint32_t *, size_t, char *const *);
 typedef unsigned (*string_3)(void *, const uint32_t *, size_t, char *const *, size_t);
-typedef unsigned (*get_state)(void *, void **);
-typedef unsigned (*set_state)(void *, void *);
 
 static const struct outcome done = {0, DONE};
 
@@ -48,9 +46,17 @@ static struct outcome set_strings(struct fmu *fmu, const struct plan *plan)
     return done;
 }
 
+static void write_fixed(const struct inputs *inputs, const double *parameters)
+{
+    for (size_t k = 0; k < inputs->fixed_count; k++)
+        put(&inputs->fixed[k], parameters[inputs->fixed_rows[k]]);
+}
+
 static struct outcome set_parameters(struct fmu *fmu, const struct plan *plan)
 {
     struct outcome o = set_strings(fmu, plan);
+    write_fixed(&plan->inputs, plan->parameter_values);
+    write_fixed(&plan->held, plan->parameter_values);
     if (o.where != DONE || !plan->parameters.count)
         return o;
     unsigned status = write_row(fmu, &plan->parameters, plan->parameter_values);
@@ -72,7 +78,8 @@ static struct outcome set_inputs(struct fmu *fmu, struct plan *plan)
     return done;
 }
 
-static struct outcome enter(struct fmu *fmu, struct plan *plan)
+/* Set the parameters and enter initialisation mode (FMI 2 and 3). */
+struct outcome enter_initialisation(struct fmu *fmu, struct plan *plan)
 {
     struct outcome o = set_parameters(fmu, plan);
     if (o.where != DONE)
@@ -86,6 +93,11 @@ static struct outcome enter(struct fmu *fmu, struct plan *plan)
     o = called("SetupExperiment",
                f(fmu->instance, plan->has_tolerance, plan->tolerance, 0.0, 1, plan->stop_time));
     return o.where == DONE ? call(fmu, "EnterInitializationMode") : o;
+}
+
+struct outcome leave_initialisation(struct fmu *fmu)
+{
+    return call(fmu, "ExitInitializationMode");
 }
 
 static struct outcome initialise_first_version(
@@ -113,10 +125,10 @@ struct outcome initialise(struct fmu *fmu, struct plan *plan, struct event_info_
 {
     if (fmu->major == 1)
         return initialise_first_version(fmu, plan, first_events);
-    struct outcome o = enter(fmu, plan);
+    struct outcome o = enter_initialisation(fmu, plan);
     if (o.where == DONE)
         o = set_inputs(fmu, plan);
-    return o.where == DONE ? call(fmu, "ExitInitializationMode") : o;
+    return o.where == DONE ? leave_initialisation(fmu) : o;
 }
 
 /* End the simulation; a bad status is ignored, because the trajectory is complete. */
@@ -142,24 +154,31 @@ static void *state_function(const struct fmu *fmu, const char *verb)
     return fmu->major == 1 ? NULL : fmu_function(fmu, name);
 }
 
+/* Look up what saves states; returns whether the library has all of it. */
+int find_saving(struct fmu *fmu)
+{
+    struct saving *f = &fmu->saving;
+    f->get = (get_state)state_function(fmu, "Get");
+    f->set = (set_state)state_function(fmu, "Set");
+    f->release = (get_state)state_function(fmu, "Free");
+    return f->get && f->set && f->release;
+}
+
 /* Save the current state; returns whether it worked. */
 int take_state(struct fmu *fmu)
 {
-    get_state get = (get_state)state_function(fmu, "Get");
-    if (!get || !state_function(fmu, "Set") || !state_function(fmu, "Free"))
-        return 0;
-    return get(fmu->instance, &fmu->state) <= 1 && fmu->state;
+    return find_saving(fmu) && fmu->saving.get(fmu->instance, &fmu->state) <= 1 && fmu->state;
 }
 
 int restore_state(struct fmu *fmu)
 {
-    return fmu->state && ((set_state)state_function(fmu, "Set"))(fmu->instance, fmu->state) <= 1;
+    return fmu->state && fmu->saving.set(fmu->instance, fmu->state) <= 1;
 }
 
 /* Free the saved state; required before its instance is freed. */
 void forget_state(struct fmu *fmu)
 {
     if (fmu->state)
-        ((get_state)state_function(fmu, "Free"))(fmu->instance, &fmu->state);
+        fmu->saving.release(fmu->instance, &fmu->state);
     fmu->state = NULL;
 }

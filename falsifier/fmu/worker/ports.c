@@ -7,6 +7,7 @@
 typedef unsigned (*values_2)(void *, const uint32_t *, size_t, void *);
 typedef unsigned (*values_3)(void *, const uint32_t *, size_t, void *, size_t);
 
+/* The number at a variable's location. */
 static double fetch(const struct place *place)
 {
     double value;
@@ -68,14 +69,20 @@ unsigned exchange_values(const struct fmu *fmu, const struct ports *ports)
     return worst;
 }
 
+/* Get all variables; the distance between two numbers is stride. */
+unsigned read_values(const struct fmu *fmu, const struct ports *ports, double *numbers, size_t stride)
+{
+    unsigned status = exchange_values(fmu, ports);
+    if (status <= 1)
+        for (size_t j = 0; j < ports->count; j++)
+            numbers[j * stride] = fetch(&ports->places[j]);
+    return status;
+}
+
 /* Record all outputs. */
 unsigned read_row(const struct fmu *fmu, const struct plan *plan, size_t column)
 {
-    unsigned status = exchange_values(fmu, &plan->outputs);
-    if (status <= 1)
-        for (size_t j = 0; j < plan->outputs.count; j++)
-            plan->recorded[j * plan->samples + column] = fetch(&plan->outputs.places[j]);
-    return status;
+    return read_values(fmu, &plan->outputs, plan->recorded + column, plan->samples);
 }
 
 unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers)
@@ -97,12 +104,16 @@ double start_of(const struct inputs *inputs, size_t j, size_t piece)
     return piece < inputs->pieces ? inputs->rows[j][piece].start : INFINITY;
 }
 
-/* An input at a time within one of its pieces or at its end. */
-double value_at(const struct inputs *inputs, size_t j, size_t piece, double time)
+/* The value of a piece at a time within it or at its end. */
+double piece_at(const struct piece *p, double time)
 {
-    const struct piece *p = &inputs->rows[j][piece];
     double dt = time - p->start;
     return ((p->c[3] * dt + p->c[2]) * dt + p->c[1]) * dt + p->c[0];
+}
+
+double value_at(const struct inputs *inputs, size_t j, size_t piece, double time)
+{
+    return piece_at(&inputs->rows[j][piece], time);
 }
 
 /* Write the values of all inputs at a time to their buffers. */

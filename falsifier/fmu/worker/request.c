@@ -18,7 +18,7 @@ static void *read_bytes(struct request *r, size_t count)
     return at;
 }
 
-static size_t read_size(struct request *r)
+size_t read_size(struct request *r)
 {
     return (size_t) * (uint64_t *)read_bytes(r, 8);
 }
@@ -56,7 +56,17 @@ void read_fmu(struct request *r, struct fmu *fmu)
     fmu->resources = read_text(r);
 }
 
-static void read_ports(struct request *r, const struct fmu *fmu, const char *verb, struct ports *ports)
+static void read_place(struct request *r, const struct ports *ports, struct place *place)
+{
+    place->storage = (int)read_size(r);
+    const struct call *c = &ports->calls[read_size(r)];
+    place->address = (char *)c->values + read_size(r);
+    place->sign = read_number(r);
+    place->is_boolean = (int)read_size(r);
+}
+
+/* The functions of an FMU that another process has loaded are NULL here. */
+void read_ports(struct request *r, const struct fmu *fmu, const char *verb, struct ports *ports)
 {
     ports->call_count = read_size(r);
     ports->calls = need(ports->call_count, sizeof *ports->calls);
@@ -66,8 +76,8 @@ static void read_ports(struct request *r, const struct fmu *fmu, const char *ver
         const char *code = read_text(r);
         size_t bytes;
         snprintf(name, sizeof name, "%s%s", verb, code);
-        c->function = fmu_function(fmu, name);
-        if (!c->function)
+        c->function = fmu->module ? fmu_function(fmu, name) : NULL;
+        if (fmu->module && !c->function)
             give_up("the library does not export the function for values of type %s", code);
         c->references = read_block(r, &bytes);
         c->count = bytes / sizeof *c->references;
@@ -76,36 +86,60 @@ static void read_ports(struct request *r, const struct fmu *fmu, const char *ver
     }
     ports->count = read_size(r);
     ports->places = need(ports->count, sizeof *ports->places);
-    for (size_t j = 0; j < ports->count; j++) {
-        struct place *p = &ports->places[j];
-        p->storage = (int)read_size(r);
-        const struct call *c = &ports->calls[read_size(r)];
-        p->address = (char *)c->values + read_size(r);
-        p->sign = read_number(r);
-        p->is_boolean = (int)read_size(r);
-    }
+    for (size_t j = 0; j < ports->count; j++)
+        read_place(r, ports, &ports->places[j]);
 }
 
-static void read_inputs(
-    struct request *r, const struct fmu *fmu, size_t pieces, const double *table, struct inputs *inputs)
+void read_inputs(struct request *r, const struct fmu *fmu, size_t pieces, struct inputs *inputs)
 {
     read_ports(r, fmu, "Set", &inputs->ports);
     inputs->pieces = pieces;
     inputs->rows = need(inputs->ports.count, sizeof *inputs->rows);
     inputs->current = need(inputs->ports.count, sizeof *inputs->current);
     inputs->values = need(inputs->ports.count, sizeof *inputs->values);
+    inputs->fixed_count = read_size(r);
+    inputs->fixed = need(inputs->fixed_count, sizeof *inputs->fixed);
+    inputs->fixed_rows = need(inputs->fixed_count, sizeof *inputs->fixed_rows);
+    for (size_t k = 0; k < inputs->fixed_count; k++) {
+        read_place(r, &inputs->ports, &inputs->fixed[k]);
+        inputs->fixed_rows[k] = read_size(r);
+    }
+}
+
+/* Inputs that follow signals: rows of the table of pieces. */
+static void read_driven(
+    struct request *r, const struct fmu *fmu, size_t pieces, const double *table, struct inputs *inputs)
+{
+    read_inputs(r, fmu, pieces, inputs);
     for (size_t j = 0; j < inputs->ports.count; j++)
         inputs->rows[j] = (const struct piece *)(table + read_size(r) * 5 * pieces);
+}
+
+void read_strings(struct request *r, struct plan *plan)
+{
+    plan->strings_count = read_size(r);
+    plan->strings = need(plan->strings_count, sizeof *plan->strings);
+    for (size_t k = 0; k < plan->strings_count; k++) {
+        plan->strings[k].reference = (uint32_t)read_size(r);
+        plan->strings[k].text = read_text(r);
+    }
+}
+
+/* Map the memory of simulations. */
+double *read_room(struct request *r)
+{
+    const char *place = read_text(r);
+    double *room = map_room(place);
+    if (!room)
+        give_up("the memory of a simulation cannot be mapped%s%s", *place ? ": " : "", place);
+    return room;
 }
 
 /* Read a plan; its shared memory is laid out as Room is: parameters, inputs, outputs. */
 void read_plan(struct request *r, const struct fmu *fmu, struct plan *plan)
 {
     memset(plan, 0, sizeof *plan);
-    const char *place = read_text(r);
-    double *room = map_room(place);
-    if (!room)
-        give_up("the memory of a simulation cannot be mapped%s%s", *place ? ": " : "", place);
+    double *room = read_room(r);
     plan->samples = read_size(r);
     plan->every = read_size(r);
     size_t pieces = read_size(r);
@@ -115,16 +149,11 @@ void read_plan(struct request *r, const struct fmu *fmu, struct plan *plan)
     plan->max_step = read_number(r);
     plan->tolerance = read_number(r);
     plan->solver_tolerance = read_number(r);
-    plan->strings_count = read_size(r);
-    plan->strings = need(plan->strings_count, sizeof *plan->strings);
-    for (size_t k = 0; k < plan->strings_count; k++) {
-        plan->strings[k].reference = (uint32_t)read_size(r);
-        plan->strings[k].text = read_text(r);
-    }
+    read_strings(r, plan);
     plan->parameter_values = room;
     plan->recorded = room + parameters + inputs * 5 * pieces;
     read_ports(r, fmu, "Set", &plan->parameters);
-    read_inputs(r, fmu, pieces, room + parameters, &plan->inputs);
-    read_inputs(r, fmu, pieces, room + parameters, &plan->held);
+    read_driven(r, fmu, pieces, room + parameters, &plan->inputs);
+    read_driven(r, fmu, pieces, room + parameters, &plan->held);
     read_ports(r, fmu, "Get", &plan->outputs);
 }

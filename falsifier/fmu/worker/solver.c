@@ -73,6 +73,10 @@ static struct outcome checked(unsigned status)
 
 static struct outcome start(struct solver *s)
 {
+    struct inputs *both[] = {&s->plan->inputs, &s->plan->held};
+    for (int k = 0; k < 2; k++)
+        for (size_t j = 0; j < both[k]->ports.count; j++)
+            both[k]->current[j] = 0;
     s->time = 0.0;
     s->next_step = s->plan->max_step;
     s->next_event = INFINITY;
@@ -93,8 +97,9 @@ static struct outcome start(struct solver *s)
 }
 
 /* Get from initialisation to continuous time, handling the events at time 0. */
-static struct outcome begin(struct solver *s, const struct event_info_1 *first)
+struct outcome begin_solving(struct fmu *fmu, const struct event_info_1 *first)
 {
+    struct solver *s = fmu->solver;
     struct outcome o = start(s);
     if (o.where != DONE)
         return o;
@@ -112,7 +117,7 @@ static struct outcome begin(struct solver *s, const struct event_info_1 *first)
         if (o.where == DONE)
             o = refresh(s);
     }
-    return o.where == DONE ? checked(read_row(s->fmu, s->plan, 0)) : o;
+    return o;
 }
 
 static struct trial try_step(struct solver *s, double h)
@@ -283,12 +288,18 @@ static struct outcome step_towards(struct solver *s, double target, int *wants_e
     return (struct outcome){status, ends ? TERMINATED : DONE};
 }
 
-/* Do at most one step, handle the events at its end and record the outputs. */
-static struct outcome advance(struct solver *s)
+/* Handle an event, unless there were too many since the last output. */
+static struct outcome pass_event(struct solver *s)
 {
-    struct plan *plan = s->plan;
-    double grid_time = plan->stop_time * (double)s->column / (double)(plan->samples - 1);
-    double target = fmax(fmin(grid_time, fmin(next_break(s), s->next_event)), s->time);
+    if (++s->events > MOST_EVENTS)
+        return (struct outcome){0, STUCK};
+    return handle_event(s);
+}
+
+/* Do at most one step towards a time limit, and handle the events at its end. */
+static struct outcome proceed(struct solver *s, double limit)
+{
+    double target = fmax(fmin(limit, fmin(next_break(s), s->next_event)), s->time);
     int wants_event = 0;
     if (target - s->time > rounding(target)) {
         struct outcome o = step_towards(s, target, &wants_event);
@@ -298,17 +309,22 @@ static struct outcome advance(struct solver *s)
         s->time = target;
     }
     int jumps = enter_pieces(s);
-    if (wants_event || jumps || s->next_event <= s->time + rounding(s->time)) {
-        if (++s->events > MOST_EVENTS)
-            return (struct outcome){0, STUCK};
-        struct outcome o = handle_event(s);
-        if (o.where != DONE) {
-            /* A model that terminates at the stop time has finished: only the last sample is left. */
-            int is_last = s->column == plan->samples - 1 && plan->stop_time - s->time <= rounding(s->time);
-            if (o.where != TERMINATED || !is_last)
-                return o;
-            s->next_event = INFINITY;
-        }
+    int is_event = wants_event || jumps || s->next_event <= s->time + rounding(s->time);
+    return is_event ? pass_event(s) : done;
+}
+
+/* Proceed towards the next point of the output grid and record the outputs there. */
+static struct outcome advance(struct solver *s)
+{
+    struct plan *plan = s->plan;
+    double grid_time = plan->stop_time * (double)s->column / (double)(plan->samples - 1);
+    struct outcome o = proceed(s, grid_time);
+    if (o.where != DONE) {
+        /* A model that terminates at the stop time has finished: only the last sample is left. */
+        int is_last = s->column == plan->samples - 1 && plan->stop_time - s->time <= rounding(s->time);
+        if (o.where != TERMINATED || !is_last)
+            return o;
+        s->next_event = INFINITY;
     }
     if (grid_time <= s->time + rounding(s->time)) {
         unsigned status = read_row(s->fmu, plan, s->column);
@@ -320,12 +336,65 @@ static struct outcome advance(struct solver *s)
     return done;
 }
 
+/* Integrate a component of a system over a step of its own, perhaps after an event at its start. */
+struct outcome solve_step(struct fmu *fmu, double start, double end, int has_event, int *ends)
+{
+    struct solver *s = fmu->solver;
+    s->time = start;
+    s->events = 0;
+    struct outcome o = has_event ? pass_event(s) : done;
+    while (o.where == DONE && end - s->time > rounding(end))
+        o = proceed(s, end);
+    *ends = o.where == TERMINATED;
+    if (*ends && end - s->time <= rounding(end))
+        o.where = DONE;
+    return o;
+}
+
+/* Copy what changes in a step to memory behind the structure, or back; the rest follows from it. */
+static size_t move(const struct solver *s, char *kept, int is_kept)
+{
+    const struct inputs *plain = &s->plan->inputs, *held = &s->plan->held;
+    const struct { void *at; size_t count; } vectors[] = {
+        {s->x, s->n}, {s->stages[0], s->n}, {s->z, s->indicators},
+        {plain->current, plain->ports.count}, {held->current, held->ports.count},
+    };
+    size_t total = 0;
+    for (size_t k = 0; k < sizeof vectors / sizeof *vectors; k++) {
+        size_t bytes = vectors[k].count * sizeof(double);
+        if (kept && bytes)
+            memcpy(is_kept ? kept + total : vectors[k].at, is_kept ? vectors[k].at : kept + total, bytes);
+        total += bytes;
+    }
+    return total;
+}
+
+/* Keep what a step changes, in new memory if there is none yet; bring_back_solver undoes the step. */
+void *keep_solver(const struct fmu *fmu, void *kept)
+{
+    const struct solver *s = fmu->solver;
+    struct solver *copy = kept ? kept : need(1, sizeof *copy + move(s, NULL, 1));
+    *copy = *s;
+    move(s, (char *)(copy + 1), 1);
+    return copy;
+}
+
+void bring_back_solver(struct fmu *fmu, void *kept)
+{
+    struct solver *s = fmu->solver;
+    *s = *(const struct solver *)kept;
+    move(s, (char *)kept + sizeof *s, 0);
+    s->jacobian_known = 0;
+}
+
 /* Solve the differential equation up to the stop time. */
 struct outcome solve(
     struct fmu *fmu, const struct event_info_1 *first_events, double deadline, double *reached)
 {
     struct solver *s = fmu->solver;
-    struct outcome o = begin(s, first_events);
+    struct outcome o = begin_solving(fmu, first_events);
+    if (o.where == DONE)
+        o = checked(read_row(fmu, s->plan, 0));
     for (size_t k = 1; o.where == DONE && s->column < s->plan->samples; k++) {
         o = advance(s);
         int is_late = k % STEPS_PER_CLOCK_CHECK == 0 && now() > deadline;

@@ -39,6 +39,15 @@ struct step_functions {
     update_discrete_states_3 update;
 };
 
+typedef unsigned (*get_state)(void *, void **);
+typedef unsigned (*set_state)(void *, void *);
+
+/* What saves, restores and frees states (FMI 2 and 3). */
+struct saving {
+    get_state get, release;
+    set_state set;
+};
+
 /* One FMU: what the request says of it, its library, and its instance with what surrounds it. */
 struct fmu {
     int major, is_model_exchange, logging, event_mode;
@@ -46,6 +55,7 @@ struct fmu {
     char *library, *identifier, *name, *token, *resources;
     void *module, *instance, *state;
     struct step_functions step;
+    struct saving saving;
     struct solver *solver; /* model exchange: see model_exchange.h */
 };
 
@@ -77,9 +87,12 @@ struct piece {
     double start, c[4];
 };
 
-/* Variables that are set during the simulation. */
+/* Variables that are set during the simulation. Setting an element of an array sets the whole array: the fixed
+ * elements keep the values of these parameters. */
 struct inputs {
     struct ports ports;
+    struct place *fixed;
+    size_t *fixed_rows, fixed_count;
     const struct piece **rows;
     size_t pieces;
     size_t *current; /* the piece that each one is in */
@@ -117,27 +130,40 @@ void *fmu_required(const struct fmu *fmu, const char *name); /* ends the request
 
 /* ports.c */
 unsigned exchange_values(const struct fmu *fmu, const struct ports *ports);
+unsigned read_values(const struct fmu *fmu, const struct ports *ports, double *numbers, size_t stride);
 unsigned read_row(const struct fmu *fmu, const struct plan *plan, size_t column);
 unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers);
 void put(const struct place *place, double number);
 double rounding(double time);
 double start_of(const struct inputs *inputs, size_t j, size_t piece);
+double piece_at(const struct piece *piece, double time);
 double value_at(const struct inputs *inputs, size_t j, size_t piece, double time);
 int put_inputs(struct inputs *inputs, double time); /* returns whether any has changed */
 
 /* lifecycle.c */
 struct outcome initialise(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events);
+struct outcome enter_initialisation(struct fmu *fmu, struct plan *plan);
+struct outcome leave_initialisation(struct fmu *fmu);
 void terminate(struct fmu *fmu);
 int reset(struct fmu *fmu);
+int find_saving(struct fmu *fmu); /* returns whether the library has all functions for states */
 int take_state(struct fmu *fmu);
 int restore_state(struct fmu *fmu);
 void forget_state(struct fmu *fmu);
 
 /* co_simulation.c */
+void find_step_functions(struct fmu *fmu);
+struct outcome begin_steps(struct fmu *fmu); /* after the initialisation */
+struct outcome change_at_event(struct fmu *fmu, const struct ports *ports);
+struct outcome do_step(struct fmu *fmu, double start, double end, int *ends);
 struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, double *reached);
 
 /* solver.c */
 void prepare_solver(struct fmu *fmu, struct plan *plan);
+struct outcome begin_solving(struct fmu *fmu, const struct event_info_1 *first_events);
+struct outcome solve_step(struct fmu *fmu, double start, double end, int has_event, int *ends);
+void *keep_solver(const struct fmu *fmu, void *kept); /* what changes in a step; new memory if kept is NULL */
+void bring_back_solver(struct fmu *fmu, void *kept);
 struct outcome solve(
     struct fmu *fmu, const struct event_info_1 *first_events, double deadline, double *reached);
 
@@ -145,10 +171,15 @@ struct outcome solve(
 struct request {
     char *at, *end;
 };
+size_t read_size(struct request *request);
 void read_fmu(struct request *request, struct fmu *fmu);
 void read_plan(struct request *request, const struct fmu *fmu, struct plan *plan);
 char *read_text(struct request *request);
 double read_number(struct request *request);
+double *read_room(struct request *request);
+void read_strings(struct request *request, struct plan *plan);
+void read_ports(struct request *request, const struct fmu *fmu, const char *verb, struct ports *ports);
+void read_inputs(struct request *request, const struct fmu *fmu, size_t pieces, struct inputs *inputs);
 
 /* main.c */
 void give_up(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));

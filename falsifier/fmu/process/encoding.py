@@ -1,0 +1,111 @@
+"""What the worker is told, in bytes: numbers of 8 bytes, and blocks of bytes after their number.
+
+``falsifier/fmu/worker/request.c`` is the other side.
+"""
+
+import struct
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.fmu.description import Description
+
+# Storage types of values; their position is the number that request.c reads.
+STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
+_STORED_3: Mapping[str, str] = {
+    "Float64": "f8",
+    "Float32": "f4",
+    "Boolean": "u1",
+    **{f"Int{b}": f"i{b // 8}" for b in (8, 16, 32, 64)},
+    **{f"UInt{b}": f"u{b // 8}" for b in (8, 16, 32, 64)},
+}
+STORED: Mapping[int, Mapping[str, str]] = {
+    1: {"Real": "f8", "Integer": "i4", "Boolean": "u1"},
+    2: {"Real": "f8", "Integer": "i4", "Boolean": "i4"},
+    3: _STORED_3,
+}
+
+
+def integers(*numbers: int) -> bytes:
+    """Return integers as they are in requests."""
+    return struct.pack(f"<{len(numbers)}q", *numbers)
+
+
+def reals(*numbers: float) -> bytes:
+    """Return real numbers as they are in requests."""
+    return struct.pack(f"<{len(numbers)}d", *numbers)
+
+
+def text(words: str) -> bytes:
+    """Return a text as it is in requests."""
+    return block(words.encode() + b"\0")
+
+
+def block(data: bytes) -> bytes:
+    """Return bytes as they are in requests: after their number, padded to a multiple of 8."""
+    return struct.pack("<Q", len(data)) + data + bytes(-len(data) % 8)
+
+
+def ports(description: Description, names: Sequence[str]) -> bytes:
+    """Return the calls that get or set these variables, and where each value is in their buffers."""
+    return _Table(description, names, ()).encoded
+
+
+def inputs(description: Description, names: Sequence[str], parameters: Sequence[str]) -> bytes:
+    """Return the same for inputs, and which parameters are fixed elements of their arrays (FMI 3).
+
+    Setting an input sets its whole array, and must not put the other elements back to their start values.
+    """
+    fixed = fixed_elements(description, names, parameters)
+    table = _Table(description, names, [parameters[k] for k in fixed])
+    others = [place + integers(k) for place, k in zip(table.fixed, fixed, strict=True)]
+    return table.encoded + integers(len(others)) + b"".join(others)
+
+
+def fixed_elements(description: Description, names: Sequence[str], parameters: Sequence[str]) -> list[int]:
+    """Return the positions of the parameters that are other elements of the inputs' arrays (FMI 3)."""
+    slots = [description.slot(name) for name in names]
+    arrays = {slot.reference for slot in slots if slot.size > 1}
+    driven = {(slot.reference, slot.offset) for slot in slots}
+    found = [(k, description.slot(name)) for k, name in enumerate(parameters)]
+    return [k for k, s in found if s.reference in arrays and (s.reference, s.offset) not in driven]
+
+
+class _Table:
+    """Calls and places of some variables, and of fixed elements of their arrays."""
+
+    def __init__(self, description: Description, names: Sequence[str], fixed: Sequence[str]) -> None:
+        slots = [description.slot(name) for name in (*names, *fixed)]
+        codes = list(dict.fromkeys(slot.type for slot in slots))
+        calls, starts = [], []
+        for code in codes:
+            members = {slot.reference: slot.size for slot in slots if slot.type == code}
+            values, begins = _buffer(description, code, members)
+            references = np.array(list(members), dtype=np.uint32)
+            calls.append(text(code) + block(references.tobytes()) + integers(values.size))
+            calls.append(block(values.tobytes()))
+            starts.append(begins)
+        places = []
+        for slot in slots:
+            call, stored = codes.index(slot.type), STORED[description.major][slot.type]
+            offset = np.dtype(stored).itemsize * (starts[call][slot.reference] + slot.offset)
+            sign = -1.0 if slot.negated else 1.0
+            head = integers(STORAGE.index(stored), call, offset)
+            places.append(head + reals(sign) + integers(slot.type == "Boolean"))
+        own, self.fixed = places[: len(names)], places[len(names) :]
+        self.encoded = integers(len(codes)) + b"".join(calls) + integers(len(own)) + b"".join(own)
+
+
+def _buffer(
+    description: Description, code: str, sizes: Mapping[int, int]
+) -> tuple[NDArray[np.generic], dict[int, int]]:
+    """Return the values of one call, and where those of each value reference begin."""
+    begins = dict(zip(sizes, np.cumsum([0, *sizes.values()]).tolist(), strict=False))
+    values = np.zeros(sum(sizes.values()), dtype=STORED[description.major][code])
+    # A set call transfers whole arrays: elements that are not searched keep their start values.
+    for reference, start in begins.items():
+        if reference in description.arrays:
+            numbers = description.arrays[reference]
+            values[start : start + len(numbers)] = numbers
+    return values, begins
