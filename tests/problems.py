@@ -67,6 +67,11 @@ def hard() -> Problem:
     return lag_problem("G[0,10] (x <= 0.6)", name="HARD")
 
 
+def conditional() -> Problem:
+    """Violated by an input just above 0.9; then the robustness is decided by that condition."""
+    return lag_problem("G[0,10] (u >= 0.9 -> x <= 0.5)", name="COND")
+
+
 def impossible() -> Problem:
     """Never falsified."""
     return lag_problem("G[0,10] (x <= 2)", name="NEVER")

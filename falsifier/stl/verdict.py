@@ -25,6 +25,11 @@ class Verdict:
     breach: Breach | None = None
 
     @property
+    def moment(self) -> float:
+        """Time in s to look at: when what broke was farthest off; without a violation, the critical time."""
+        return self.breach.main.time if self.breach else self.critical_time
+
+    @property
     def violated(self) -> bool:
         """Whether the robustness is below 0; exactly 0 is not a violation."""
         return self.robustness < 0

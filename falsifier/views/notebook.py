@@ -130,6 +130,7 @@ def _verdict_facts(verdict: Verdict) -> list[Fact]:
     sign = "violated" if verdict.violated else "satisfied"
     values = ", ".join(f"{name} = {value:g}" for name, value in verdict.values.items())
     return [
+        *([("what broke", verdict.breach.text)] if verdict.breach else []),
         ("robustness", f"{verdict.robustness:+.6g} ({sign})"),
         ("critical time", f"{verdict.critical_time:g} s"),
         ("decided by", el("code", verdict.predicate)),

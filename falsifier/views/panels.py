@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Formula
-from falsifier.stl.expression import Expression, Number, unit_of
+from falsifier.stl.breach import compared_sides
+from falsifier.stl.expression import Expression, unit_of
 from falsifier.stl.formula import Always, Eventually, Predicate, Until
 from falsifier.stl.verdict import Verdict
 
@@ -73,7 +74,9 @@ class Panel:
         times: in s, shape (n,).
         values: values at these times, shape (n,).
         bounds: what it is compared with; empty for inputs.
-        critical: critical time in s if this quantity decided the verdict, otherwise None.
+        critical: time in s to mark if this quantity broke, or if nothing broke and it decided the verdict.
+        decided: critical time in s if this quantity decided the verdict, but another one broke.
+        broken: intervals in s over which a comparison of it did not hold.
         points: control points (time, value) of an input.
         limits: range of an input.
         steps: whether values are held until the next sample.
@@ -87,6 +90,8 @@ class Panel:
     values: Array
     bounds: tuple[Bound, ...] = ()
     critical: float | None = None
+    decided: float | None = None
+    broken: tuple[tuple[float, float], ...] = ()
     points: tuple[tuple[float, float], ...] = ()
     limits: tuple[float, float] | None = None
     steps: bool = False
@@ -116,7 +121,7 @@ def panels(
         labels: names of the numbers of signals that are not real, by signal.
         components: names of the components of a system.
     """
-    quantities = [(_sides(judged[0][0])[0], judged) for judged in _compared(formula).values()]
+    quantities = [(compared_sides(judged[0][0])[0], judged) for judged in _compared(formula).values()]
     drawn = [
         replace(_quantity(trajectory, judged, verdict), component=_owner(quantity.signals, components))
         for quantity, judged in quantities
@@ -163,25 +168,31 @@ def _compared(formula: Formula) -> dict[str, _Judged]:
     """Predicates with their windows by compared quantity, in order of first appearance."""
     found: dict[str, _Judged] = {}
     for predicate, window in judged_windows(formula):
-        found.setdefault(str(_sides(predicate)[0]), []).append((predicate, window))
+        found.setdefault(str(compared_sides(predicate)[0]), []).append((predicate, window))
     return found
 
 
 def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) -> Panel:
-    expression = _sides(judged[0][0])[0]
+    expression = compared_sides(judged[0][0])[0]
     end = float(trajectory.times[-1])
     bounds = tuple(
-        Bound(str(p), begin, min(finish, end), _evaluated(_sides(p)[1], trajectory))
+        Bound(str(p), begin, min(finish, end), _evaluated(compared_sides(p)[1], trajectory))
         for p, (begin, finish) in judged
     )
-    decided = verdict is not None and any(str(p) == verdict.predicate for p, _ in judged)
+    decided = (
+        verdict.critical_time if verdict and any(str(p) == verdict.predicate for p, _ in judged) else None
+    )
+    shortfalls = verdict.breach.shortfalls if verdict and verdict.breach else ()
+    own = [shortfall for shortfall in shortfalls if shortfall.quantity == str(expression)]
     unit = unit_of(expression, trajectory.units)
     return Panel(
         f"{expression} [{unit}]" if unit else str(expression),
         trajectory.times,
         _evaluated(expression, trajectory),
         bounds,
-        critical=verdict.critical_time if verdict is not None and decided else None,
+        critical=own[0].time if own else None if shortfalls else decided,
+        decided=decided if shortfalls and not own else None,
+        broken=tuple((shortfall.start, shortfall.end) for shortfall in own),
     )
 
 
@@ -208,10 +219,3 @@ def _evaluated(expression: Expression, trajectory: Trajectory) -> Array:
 
 def _drawable(values: ArrayLike) -> Array:
     return np.clip(np.asarray(values, dtype=np.float64), -_LARGEST_DRAWN, _LARGEST_DRAWN)
-
-
-def _sides(predicate: Predicate) -> tuple[Expression, Expression]:
-    """The quantity, then the side that it is compared with."""
-    if isinstance(predicate.left, Number):
-        return predicate.right, predicate.left
-    return predicate.left, predicate.right

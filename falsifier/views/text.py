@@ -17,6 +17,7 @@ from falsifier.search.budget import Spent
 from falsifier.search.levels import Outcome, outcomes
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
+from falsifier.stl import Verdict
 
 
 def result_text(result: Result) -> str:
@@ -77,6 +78,10 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{_untested(result)}{robustness}{where}"
         )
+        if result.counterexample is not None:
+            lines += [
+                f"{'':{width}}  {line}" for line in broken_lines(result.counterexample.evaluation.verdict)
+            ]
         lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
         lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
@@ -153,6 +158,7 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
     verdict = evaluation.verdict
     lines = []
     if verdict is not None:
+        lines += [f"  {'' if k else 'what broke':<14} {text}" for k, text in enumerate(broken_lines(verdict))]
         info = problem.info
         values = ", ".join(
             f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
@@ -167,6 +173,11 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
     return lines
 
 
+def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
+    """Say what broke, and what made it necessary; nothing of what is not violated."""
+    return verdict.breach.lines if verdict is not None and verdict.breach is not None else ()
+
+
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     """Convert an evaluation to a value that can be dumped as JSON."""
     verdict = evaluation.verdict
@@ -176,6 +187,9 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "critical_time": verdict and verdict.critical_time,
         "predicate": verdict and verdict.predicate,
         "values": dict(verdict.values) if verdict else None,
+        "breach": asdict(verdict.breach) | {"text": verdict.breach.text}
+        if verdict and verdict.breach
+        else None,
         "switches": {name: signal.switches for name, signal in evaluation.candidate.signals.items()},
         "shortest_dwell": {
             name: signal.shortest_dwell for name, signal in evaluation.candidate.signals.items()

@@ -60,6 +60,18 @@ def test_the_critical_time_is_marked_on_what_decided_only() -> None:
     assert second.critical == 0.0, "u is nearest to its bound at the start"
 
 
+def test_what_broke_is_marked_over_its_interval_and_what_decided_apart() -> None:
+    broken, last = drawn("G[0,10] (x <= 0.6 or u <= 0.99)")[:2]
+    assert (broken.title, last.title) == ("x [m]", "u [V]")
+    ((start, end),) = broken.broken
+    assert 0.0 < start < end < 4.0 and broken.critical == end
+    assert broken.decided is None and last.broken == broken.broken, "both alternatives failed"
+    condition, consequence = drawn("G[0,10] (u >= 0.99 -> x <= 0.6)")[:2]
+    assert (condition.critical, condition.broken) == (None, ())
+    assert condition.decided == start
+    assert (consequence.critical, consequence.broken) == (end, ((start, end),))
+
+
 def test_an_input_is_drawn_with_its_control_points_and_its_range() -> None:
     panel = drawn("G[0,10] (x <= 0.9)")[-1]
     assert (panel.points, panel.limits, panel.steps) == (((0.0, 1.0), (4.0, 0.0)), (-1.0, 1.0), True)

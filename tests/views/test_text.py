@@ -21,12 +21,18 @@ from falsifier.views.text import (
     results_text,
     seconds_text,
 )
-from tests.problems import easy, hard, impossible, unusable
+from tests.problems import conditional, easy, hard, impossible, unusable
 
 
 @pytest.fixture(scope="module")
 def found() -> Result:
     return falsify(easy(), "corners", budget=10)
+
+
+@pytest.fixture(scope="module")
+def premise() -> Result:
+    """A violation whose robustness is decided by its condition, which held."""
+    return falsify(conditional(), start_from=[conditional().space.decode([0.95] * 4)], budget=1)
 
 
 def test_a_counterexample_is_told_with_its_verdict_inputs_and_reason(found: Result) -> None:
@@ -107,12 +113,33 @@ def test_fragile_and_unconfirmed_violations_are_listed(found: Result) -> None:
 
 def test_several_results_are_a_line_each_with_notes_below(tmp_path: Path) -> None:
     results = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path)
-    never, note, hard_line, last = results_text(results).splitlines()
+    never, note, hard_line, broken, last = results_text(results).splitlines()
     assert never.startswith("NEVER  not falsified after 5")
     assert note.strip().startswith("note: Faster inputs were not tried")
     assert hard_line.startswith("HARD   falsified after")
     assert str(tmp_path / "counterexample-HARD.png") in hard_line
+    assert broken.strip().startswith("x <= 0.6 was violated from ")
     assert last.startswith("1 of 2 falsified")
+
+
+def test_what_broke_comes_before_what_decided(premise: Result) -> None:
+    lines = result_text(premise).splitlines()
+    told = [line.strip() for line in lines if "broke" in line or line.startswith(" " * 17)]
+    assert told[0].startswith("what broke     x <= 0.5 was violated from 0.8 to 10 s: x = 0.94")
+    assert told[1].startswith("while u >= 0.9 held (u = 0.95 V at 10 s)")
+    order = [next(k for k, line in enumerate(lines) if text in line) for text in ("what broke", "decided by")]
+    assert order == sorted(order)
+    assert "decided by u >= 0.9" in lines[order[1]]
+    told_json = result_json(premise)["counterexample"]
+    assert told_json["predicate"] == "u >= 0.9"
+    assert told_json["breach"]["text"] == "; ".join(line.removeprefix("what broke").strip() for line in told)
+    assert told_json["breach"]["shortfalls"][0]["part"] == "x <= 0.5"
+
+
+def test_of_what_is_not_violated_nothing_broke() -> None:
+    result = falsify(impossible(), "uniform", budget=1)
+    assert "what broke" not in result_text(result)
+    assert result_json(result)["best"]["breach"] is None
 
 
 def test_the_time_of_several_is_that_of_the_whole_run(found: Result) -> None:

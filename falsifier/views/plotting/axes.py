@@ -1,5 +1,6 @@
 """New axes, the figure that axes belong to, and text on it; without pyplot, which keeps global state."""
 
+import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
 
 # Maximum number of characters of a title or label.
 _LONGEST_CAPTION = 120
+# Maximum number of lines of a text that is wrapped.
+_MOST_LINES = 4
 # Maximum number of names beside an axis; of more, only numbers are shown.
 _MOST_TICKS = 12
 
@@ -21,6 +24,13 @@ def caption(text: str) -> str:
     line = one_line(text)
     shown = line if len(line) <= _LONGEST_CAPTION else f"{line[:_LONGEST_CAPTION]} ..."
     return shown.replace("$", r"\$")
+
+
+def wrapped(text: str, width: int) -> str:
+    """Return a text for a picture, on as many lines of so many characters as it needs, within limits."""
+    kept = one_line(text).replace(" = ", "\u00a0=\u00a0")  # not separated by the end of a line
+    lines = textwrap.wrap(kept, width, max_lines=_MOST_LINES, placeholder=" ...")
+    return "\n".join(lines).replace("\u00a0", " ").replace("$", r"\$")
 
 
 def whole_ticks(axis: "Axis", labels: Mapping[int, str]) -> None:

@@ -14,7 +14,7 @@ from falsifier.search.parts import labels_of
 from falsifier.search.result import Result
 from falsifier.stl.verdict import Verdict
 from falsifier.views.panels import Bound, Panel, panels
-from falsifier.views.plotting.axes import caption, figure_of, own_axes, whole_ticks
+from falsifier.views.plotting.axes import caption, figure_of, own_axes, whole_ticks, wrapped
 from falsifier.views.plotting.trajectory import plot_trajectory
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 _OUTPUT, _INPUT, _BOUND, _CRITICAL, _WINDOW = "#1f5fa8", "#2f7d4f", "#b3261e", "#b3261e", "#8a8a8a"
 # Of a simulation that does not violate: not the colour of an alarm.
 _NEAREST = "#b35900"
-_PANEL_HEIGHT = 1.9
+# In inches; and the number of characters of a title's line.
+_PANEL_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 0.18, 110
 # A margin below this share of a panel's height is enlarged, with this share of the simulated time around it.
 _HIDDEN, _ENLARGED = 0.02, 0.1
 # There, the margin should be at least this share of what the quantity does, over at least so many samples.
@@ -81,7 +82,9 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         problem.info.components,
     )
     colour = _decided_colour(verdict)
-    figure = Figure(figsize=(9, 1.2 + _PANEL_HEIGHT * len(drawn)), layout="constrained")
+    title = _title(problem, evaluation, verdict)
+    height = _PANEL_HEIGHT * len(drawn) + _LINE_HEIGHT * (title.count("\n") + 1)
+    figure = Figure(figsize=(9, 0.8 + height), layout="constrained")
     axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
     group = ""
     for ax, panel in zip(axes, drawn, strict=True):
@@ -89,25 +92,32 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         if panel.component != group:
             group = panel.component
             ax.set_title(caption(group), loc="left", fontsize=9, weight="bold")
-        if panel.critical is not None and _is_hidden(ax, verdict):
+        if panel.critical == verdict.moment and _is_hidden(ax, verdict):
             _plot_inset(ax, panel, verdict, _enlarged(panel, verdict))
-        ax.axvline(verdict.critical_time, color=colour, linewidth=0.8, linestyle=":")
+        ax.axvline(verdict.moment, color=colour, linewidth=0.8, linestyle=":")
     axes[-1].set_xlabel("time [s]")
-    parameters = "".join(f", {name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
-    formula = caption(str(problem.requirement.formula))
-    figure.suptitle(
-        f"{caption(problem.name)}: {_decided(verdict)}{caption(parameters)}\n{formula}", fontsize=11
-    )
+    figure.suptitle(title, fontsize=10)
     return figure
 
 
-def _decided(verdict: Verdict) -> str:
-    outcome = "violated" if verdict.robustness < 0 else "not violated"
-    return f"{outcome}, robustness {verdict.robustness:+.5g}, decided at t = {verdict.critical_time:.5g} s"
+def _title(problem: Problem, evaluation: Evaluation, verdict: Verdict) -> str:
+    """What broke, what decided, the formula and the values of parameters, all in full."""
+    parameters = ", ".join(f"{name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
+    first, *more = _decided(verdict)
+    lines = [f"{problem.name}: {first}", *more, str(problem.requirement.formula), parameters]
+    return "\n".join(wrapped(line, _TITLE_WIDTH) for line in lines if line)
+
+
+def _decided(verdict: Verdict) -> list[str]:
+    by, at = verdict.predicate, f"{verdict.critical_time:.5g} s"
+    decided = f"robustness {verdict.robustness:+.5g}, decided by {by} at {at}"
+    if verdict.breach is not None:
+        return [*verdict.breach.lines, decided]
+    return [f"{'violated' if verdict.violated else 'not violated'}, {decided}"]
 
 
 def _decided_colour(verdict: Verdict) -> str:
-    return _CRITICAL if verdict.robustness < 0 else _NEAREST
+    return _CRITICAL if verdict.violated else _NEAREST
 
 
 def _labels(problem: Problem) -> dict[str, dict[int, str]]:
@@ -121,19 +131,26 @@ def _labels(problem: Problem) -> dict[str, dict[int, str]]:
 def _is_hidden(ax: "Axes", verdict: Verdict) -> bool:
     """Whether the margin is too small to be seen at the scale of a panel."""
     low, high = ax.get_ylim()
-    return 0 < abs(verdict.robustness) < _HIDDEN * (high - low)
+    return 0 < _margin(verdict) < _HIDDEN * (high - low)
+
+
+def _margin(verdict: Verdict) -> float:
+    """How far the marked quantity is from its limit."""
+    if verdict.breach is not None:
+        return abs(verdict.breach.main.value - verdict.breach.main.limit)
+    return abs(verdict.robustness)
 
 
 def plot_requirement(
     problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None, *, inset: float | None = None
 ) -> "Figure":
-    """Plot the quantity that decided the verdict, with its bound, its window and the critical time.
+    """Plot the quantity that broke, or else decided the verdict, with its bound, its window and that time.
 
     Args:
         problem: the problem with the requirement.
         evaluation: an evaluation with its trajectory.
         ax: where to draw; None: a new figure.
-        inset: length in s of the time around the critical one that a second, enlarged plot inside shows.
+        inset: length in s of the time around the marked one that a second, enlarged plot inside shows.
 
     Raises:
         ValueError: if the evaluation has no trajectory.
@@ -145,28 +162,29 @@ def plot_requirement(
     drawn = panels(
         problem.requirement.formula, trajectory, evaluation.candidate, (), verdict, _labels(problem)
     )
-    decisive = next(panel for panel in drawn if panel.critical is not None)
+    decisive = next(panel for panel in drawn if panel.critical == verdict.moment)
     plot_panel(ax, decisive, _decided_colour(verdict))
     if inset is not None:
         _plot_inset(ax, decisive, verdict, inset)
-    ax.axvline(verdict.critical_time, color=_decided_colour(verdict), linewidth=0.8, linestyle=":")
-    ax.set(xlabel="time [s]", title=_decided(verdict))
+    ax.axvline(verdict.moment, color=_decided_colour(verdict), linewidth=0.8, linestyle=":")
+    ax.set_xlabel("time [s]")
+    ax.set_title("\n".join(wrapped(line, _TITLE_WIDTH) for line in _decided(verdict)), fontsize=10)
     return figure_of(ax)
 
 
 def _enlarged(panel: Panel, verdict: Verdict) -> float:
-    """Return how much time in s around the critical one to enlarge, so that the margin is seen."""
+    """Return how much time in s around the marked one to enlarge, so that the margin is seen."""
     length = _ENLARGED * float(panel.times[-1])
     while True:
-        near = panel.values[abs(panel.times - verdict.critical_time) <= length / 4]
-        if len(near) < _FEWEST_SAMPLES or abs(verdict.robustness) > _SEEN * float(np.ptp(near)):
+        near = panel.values[abs(panel.times - verdict.moment) <= length / 4]
+        if len(near) < _FEWEST_SAMPLES or _margin(verdict) > _SEEN * float(np.ptp(near)):
             return length
         length /= 2
 
 
 def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict, length: float) -> None:
-    """Draw the panel again, enlarged around the critical time, in the emptiest corner."""
-    critical = verdict.critical_time
+    """Draw the panel again, enlarged around the marked time, in the emptiest corner."""
+    critical = verdict.moment
     inside = ax.inset_axes(min(_CORNERS, key=lambda corner: _covered(ax, panel, corner)))
     plot_panel(inside, panel, _decided_colour(verdict))
     for text in inside.texts:
@@ -204,9 +222,13 @@ def plot_panel(ax: "Axes", panel: Panel, critical: str = _CRITICAL) -> None:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
         ax.plot(panel.times[within], bound.values[within], color=_BOUND, linewidth=1.2, linestyle="--")
         ax.axvspan(bound.start, bound.end, color=_WINDOW, alpha=0.08, linewidth=0)
-    if panel.critical is not None:
-        k = abs(panel.times - panel.critical).argmin()
-        ax.plot(panel.times[k], panel.values[k], "o", color=critical, markersize=5)
+    for start, end in panel.broken:
+        ax.axvspan(start, end, color=critical, alpha=0.15, linewidth=0)
+    for time, filling in ((panel.critical, critical), (panel.decided, "none")):
+        if time is not None:
+            k = abs(panel.times - time).argmin()
+            at = panel.times[k], panel.values[k]
+            ax.plot(*at, "o", color=critical, markersize=5, markerfacecolor=filling)
     if panel.points:
         ax.plot(*zip(*panel.points, strict=True), "o", color=_INPUT, markersize=3.5)
     if panel.limits is not None:

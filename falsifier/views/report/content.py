@@ -116,9 +116,11 @@ def outcome(section: Section) -> str:
 
 
 def _where(run: Run) -> str:
-    """Say how near a run came, and when, with the values of what decided."""
+    """Say what broke, or how near a run came, and when, with the values of what decided."""
     if run.verdict is None:
         return ""
+    if run.falsified and run.verdict.breach is not None:
+        return f": {run.verdict.breach.text}"
     signals = parse(run.verdict.predicate).signals
     values = "".join(f", {name} = {v:.6g}" for name, v in run.verdict.values.items() if name in signals)
     robustness, time = abs(run.verdict.robustness), run.verdict.critical_time

@@ -10,7 +10,7 @@ from falsifier.views.html import Html, el, join
 from falsifier.views.panels import Bound, Panel
 from falsifier.views.report.plots import COLOURS, Plots, history_plot, rate_plot, simulation_plots
 
-# Evenly spaced times of a simulation's table, beside the critical time.
+# Evenly spaced times of a simulation's table, beside the marked one.
 _ROWS = 11
 
 
@@ -61,15 +61,15 @@ def rate_figure(by_method: dict[str, list[Run]]) -> Html:
     return join(el("h3", "Falsified runs"), _group(rate_plot(by_method), [figure], table))
 
 
-def simulation_figures(drawn: Sequence[Panel], critical_time: float | None, columns: int) -> Html:
+def simulation_figures(drawn: Sequence[Panel], mark: float | None, columns: int) -> Html:
     """Show one simulation's quantities over time, zoomed together.
 
     Args:
         drawn: the quantities; without any, nothing is shown.
-        critical_time: in s.
+        mark: time in s to look at.
         columns: how finely curves are drawn.
     """
-    plots = simulation_plots(drawn, critical_time, columns)
+    plots = simulation_plots(drawn, mark, columns)
     if plots is None:
         return Html("")
     figures = [
@@ -80,23 +80,23 @@ def simulation_figures(drawn: Sequence[Panel], critical_time: float | None, colu
         )
         for panel in drawn
     ]
-    return _group(plots, figures, _values(drawn, critical_time))
+    return _group(plots, figures, _values(drawn, mark))
 
 
 def _headed(panel: Panel) -> str:
     return f"{panel.component}: {panel.title}" if panel.component else panel.title
 
 
-def _values(drawn: Sequence[Panel], critical_time: float | None) -> Html:
-    """The quantities at evenly spaced times and at the critical time."""
+def _values(drawn: Sequence[Panel], mark: float | None) -> Html:
+    """The quantities at evenly spaced times and at the marked one."""
     times = drawn[0].times
     at = {int(k) for k in np.linspace(0, len(times) - 1, _ROWS)}
-    critical = None if critical_time is None else int(np.abs(times - critical_time).argmin())
-    if critical is not None:
-        at.add(critical)
+    marked = None if mark is None else int(np.abs(times - mark).argmin())
+    if marked is not None:
+        at.add(marked)
     rows = [
         (
-            f"{times[k]:.6g}" + (" (critical)" if k == critical else ""),
+            f"{times[k]:.6g}" + (" (marked)" if k == marked else ""),
             *(f"{panel.values[k]:.6g}" for panel in drawn),
         )
         for k in sorted(at)

@@ -8,6 +8,7 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import plain
 from falsifier.core.words import counted
 from falsifier.views.report.content import replay_command, run_command, searches
+from falsifier.views.text import broken_lines
 
 
 def junit_report(directory: Path) -> str:
@@ -49,11 +50,13 @@ def _case(label: str, run: Run) -> ElementTree.Element:
     )
     if run.falsified and run.verdict is not None:
         count = counted(run.simulations, "simulation")
-        message = f"robustness {run.verdict.robustness:+.6g} after {count}"
-        failure = ElementTree.SubElement(case, "failure", message=message, type="falsified")
+        broken = f"{run.verdict.breach.main.what}; " if run.verdict.breach else ""
+        message = f"{broken}robustness {run.verdict.robustness:+.6g} after {count}"
+        failure = ElementTree.SubElement(case, "failure", message=plain(message), type="falsified")
         lines = (
             run.manifest.requirement.formula,
-            f"at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
+            *broken_lines(run.verdict),
+            f"decided at t = {run.verdict.critical_time:.6g} s: {run.verdict.predicate}",
             run.reason,
             replay_command(run),
             run_command(run.manifest.request, shared=run.shared),

@@ -12,6 +12,7 @@ from falsifier.views.report.content import (
     replay_command,
     run_command,
 )
+from falsifier.views.text import broken_lines
 
 
 def markdown_report(directory: Path) -> str:
@@ -38,6 +39,7 @@ def _section(section: Section) -> str:
     run = min((run for run in section.runs if run.falsified), key=lambda run: run.simulations)
     lines = [f"## {markdown_text(section.heading)}: falsified", markdown_code(section.formula)]
     if run.verdict is not None:
+        lines += [f"- {markdown_text(one_line(line))}" for line in broken_lines(run.verdict)]
         lines.append(
             f"Robustness {run.verdict.robustness:+.6g} at t = {run.verdict.critical_time:.6g} s, "
             f"decided by {markdown_code(run.verdict.predicate)}, after "

@@ -208,10 +208,10 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     run, verdict = shown.run, shown.run.verdict
     robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
     heading = f"{run.method.label}, seed {run.seed}: {run.spent.simulations_text}, {robustness}"
-    critical = verdict.critical_time if verdict else None
     facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
     if verdict is not None:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in verdict.values.items())
+        facts += [("what broke", verdict.breach.text)] if verdict.breach else []
         facts += [
             ("critical time", f"{verdict.critical_time:.6g} s, decided by {verdict.predicate}"),
             ("values then", values),
@@ -227,7 +227,7 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     return el(
         "details",
         el("summary", heading),
-        simulation_figures(shown.panels, critical, fineness),
+        simulation_figures(shown.panels, verdict.moment if verdict else None, fineness),
         _facts(facts),
         el("blockquote", rationale, title="the engine's rationale") if rationale else Html(""),
         el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),

@@ -14,6 +14,7 @@
     dots: { color: light, alpha: 0.6, size: 5 },
     point: { color: green, size: 6 },
     critical: { color: red, size: 9 },
+    decided: { line_color: red, fill_color: null, size: 9 },
     ...Object.fromEntries(["#1f5fa8", "#b35900", "#2f7d4f", "#7b3fa0", "#a3174f", "#5f6a00"].map(
       (line_color, i) => [`s${i}`, { line_color, line_width: 2 }])),
   };
@@ -49,8 +50,10 @@
     plot.yaxis.ticker = new Bokeh.BasicTicker({ desired_num_ticks: 5 });
     plot.yaxis.minor_tick_line_color = null;
     if (axis !== "time") plot.xaxis.ticker = new Bokeh.BasicTicker({ min_interval: 1 });
-    for (const [left, right] of shown.windows ?? []) {
-      plot.add_layout(new Bokeh.BoxAnnotation({ left, right, fill_color: grey, fill_alpha: 0.1, line_color: null }));
+    for (const [spans, fill_color, fill_alpha] of [[shown.windows, grey, 0.1], [shown.broken, red, 0.15]]) {
+      for (const [left, right] of spans ?? []) {
+        plot.add_layout(new Bokeh.BoxAnnotation({ left, right, fill_color, fill_alpha, line_color: null }));
+      }
     }
     for (const { y, style } of shown.levels ?? []) {
       plot.add_layout(new Bokeh.Span({ location: y, dimension: "width", ...LOOKS[style] }));

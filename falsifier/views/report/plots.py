@@ -40,7 +40,7 @@ class Plots:
         end: right end of the axis.
         axis: what is on the axis: "time", "simulation" or "simulations".
         plots: what each plot shows.
-        mark: critical time in s.
+        mark: time in s to look at.
     """
 
     start: float
@@ -122,12 +122,12 @@ def rate_plot(by_method: dict[str, list[Run]]) -> Plots:
     return Plots(0.0, max(longest, 1.0), "simulations", [{"range": [-0.03, 1.03], "lines": lines}])
 
 
-def simulation_plots(drawn: Sequence[Panel], critical_time: float | None, columns: int) -> Plots | None:
-    """Plot one simulation's quantities over time: bounds, windows, control points, critical time.
+def simulation_plots(drawn: Sequence[Panel], mark: float | None, columns: int) -> Plots | None:
+    """Plot one simulation's quantities over time: bounds, windows, control points, what broke or decided.
 
     Args:
         drawn: the quantities.
-        critical_time: in s.
+        mark: time in s to look at.
         columns: how finely; each column of a long trajectory is drawn by its extremes.
 
     Returns:
@@ -137,7 +137,7 @@ def simulation_plots(drawn: Sequence[Panel], critical_time: float | None, column
         return None
     times = drawn[0].times
     plots = [_panel(panel, columns) for panel in drawn]
-    return Plots(float(times[0]), float(times[-1]), "time", plots, critical_time)
+    return Plots(float(times[0]), float(times[-1]), "time", plots, mark)
 
 
 def _panel(panel: Panel, columns: int) -> Values:
@@ -148,12 +148,14 @@ def _panel(panel: Panel, columns: int) -> Values:
     dots = (
         [_curve([t for t, _ in panel.points], [v for _, v in panel.points], "point")] if panel.points else []
     )
-    if panel.critical is not None:
-        k = int(np.abs(panel.times - panel.critical).argmin())
-        dots.append(_curve([panel.times[k]], [panel.values[k]], "critical"))
+    for time, style_ in ((panel.critical, "critical"), (panel.decided, "decided")):
+        if time is not None:
+            k = int(np.abs(panel.times - time).argmin())
+            dots.append(_curve([panel.times[k]], [panel.values[k]], style_))
     return {
         "range": _padded(map(float, levels)),
         "windows": [[bound.start, bound.end] for bound in panel.bounds],
+        "broken": panel.broken,
         "levels": [{"y": limit, "style": "limit"} for limit in panel.limits or ()],
         "lines": [
             *(_bound(panel, bound, columns) for bound in panel.bounds),

@@ -16,7 +16,7 @@ from falsifier.views.panels import Panel
 from falsifier.views.plotting import plot, plot_evaluation, plot_panel, plot_requirement, png, save_figure
 from tests.fmu.small_systems import LOOP, system
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
-from tests.problems import hard, unusable
+from tests.problems import conditional, hard, unusable
 from tests.views.plotting.support import simulated, xs, ys
 
 
@@ -26,7 +26,10 @@ def test_a_requirement_is_drawn_on_given_axes_up_to_its_critical_time() -> None:
     assert plot_requirement(hard(), evaluation, ax) is ax.get_figure()
     dots = [line for line in ax.get_lines() if line.get_marker() == "o"]
     assert [xs(dot).tolist() for dot in dots] == [[evaluation.verdict.critical_time]]
-    assert f"decided at t = {evaluation.verdict.critical_time:.5g} s" in ax.get_title()
+    assert evaluation.verdict.breach is not None
+    first, decided = ax.get_title().splitlines()
+    assert first == evaluation.verdict.breach.text
+    assert f"decided by x <= 0.6 at {evaluation.verdict.critical_time:.5g} s" in decided
 
 
 def test_an_inset_shows_the_curve_and_its_bound_around_the_critical_time() -> None:
@@ -56,11 +59,46 @@ def test_an_evaluation_has_a_panel_for_what_is_compared_and_for_each_input() -> 
     assert ys(points[0]).tolist() == [1.0, 1.0, 0.5, 1.0]
     low, high = input_.get_ylim()
     assert low < -1.0 and high > 1.0, "the whole range of the input is seen"
-    first, formula = figure.get_suptitle().splitlines()
-    assert first.startswith("LAG: violated, robustness -")
-    assert first.endswith("x0 = 0.25")
-    assert formula == "G[0,10] (x <= 0.9)"
+    first, decided, formula, parameters = figure.get_suptitle().splitlines()
+    assert first.startswith("LAG: x <= 0.9 was violated from ")
+    assert decided.startswith("robustness -")
+    assert (formula, parameters) == ("G[0,10] (x <= 0.9)", "x0 = 0.25")
     assert [text.get_text() for text in output.texts] == ["x <= 0.9"]
+
+
+def test_what_broke_is_marked_and_what_decided_is_only_a_ring() -> None:
+    problem = conditional()
+    evaluation = evaluate(problem, problem.space.decode([0.95] * 4))
+    assert evaluation.verdict is not None and evaluation.verdict.predicate == "u >= 0.9"
+    figure = plot_evaluation(problem, evaluation)
+    condition, consequence, _ = figure.axes
+    (ring,), (dot,) = (
+        [line for line in ax.get_lines() if line.get_marker() == "o"] for ax in figure.axes[:2]
+    )
+    assert (xs(dot).tolist(), dot.get_markerfacecolor()) == ([10.0], CRITICAL)
+    assert (xs(ring).tolist(), ring.get_markerfacecolor()) == ([evaluation.verdict.critical_time], "none")
+    assert len(consequence.patches) == 2, "the window of the requirement, and when it was violated"
+    assert len(condition.patches) == 1
+    told = figure.get_suptitle().splitlines()
+    assert told[0].startswith("COND: x <= 0.5 was violated from 0.8 to 10 s: x = 0.9499")
+    assert told[1].startswith("while u >= 0.9 held")
+    ax = plot_requirement(problem, evaluation).axes[0]
+    assert ax.get_ylabel() == "x [m]"
+
+
+def test_the_title_has_all_parameters_on_as_many_lines_as_they_need() -> None:
+    problem = lag_problem()
+    values = {f"parameter{k}": k / 7 for k in range(8)}
+    candidate = replace(problem.space.decode([1.0] * 4), parameters=values)
+    figure = plot_evaluation(
+        problem, replace(evaluate(problem, problem.space.decode([1.0] * 4)), candidate=candidate)
+    )
+    title = figure.get_suptitle()
+    assert max(map(len, title.splitlines())) <= 110
+    assert all(f"{name} = {value:.6g}" in " ".join(title.split()) for name, value in values.items())
+    figure.draw_without_rendering()
+    (box,) = (text.get_window_extent() for text in figure.texts if text.get_text() == title)
+    assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
 
 
 def test_a_nearest_miss_is_not_drawn_as_a_violation() -> None:
@@ -124,7 +162,8 @@ def test_plot_takes_results_counterexamples_and_trajectories() -> None:
     assert result.counterexample is not None
     titles = [plot(shown).get_suptitle() for shown in (result, result.counterexample)]
     assert titles[0] == titles[1]
-    assert f"HARD: violated, robustness {result.counterexample.evaluation.robustness:+.5g}" in titles[0]
+    assert titles[0].startswith("HARD: x <= 0.6 was violated from ")
+    assert f"robustness {result.counterexample.evaluation.robustness:+.5g}" in titles[0]
     trajectory = result.counterexample.evaluation.trajectory
     assert trajectory is not None
     assert len(plot(trajectory).axes) == 2

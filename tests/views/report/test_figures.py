@@ -46,7 +46,7 @@ def test_a_simulation_has_its_values_at_round_times_and_at_the_critical_time() -
     text = simulation_figures([Panel(EVIL, TIMES, TIMES**2, (bound,), critical=3.3)], 3.3, 100)
     assert EVIL not in text
     assert text.count("<tr>") == 1 + 11 + 1
-    assert '<th scope="row">3.3 (critical)</th><td>10.89</td>' in text
+    assert '<th scope="row">3.3 (marked)</th><td>10.89</td>' in text
     assert "from 2 s to 4 s" in text
     assert simulation_figures([], None, 100) == ""
 

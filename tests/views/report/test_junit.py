@@ -17,7 +17,9 @@ def test_junit_has_a_case_for_each_run(campaign: Path) -> None:
         failures = [case.find("failure") for case in cases]
         assert [f is not None for f in failures] == [True, True, False, False]
         assert failures[0] is not None
-        assert (failures[0].get("message") or "").startswith("robustness -")
+        message = failures[0].get("message") or ""
+        assert message.startswith("x <= 0.6 was violated from ")
+        assert "; robustness -" in message
         assert "x <= 0.6" in (failures[0].text or "")
 
 
