@@ -136,8 +136,8 @@ class LiteLLMChat:
             # Given tools, litellm imports its MCP gateway, whose packages are not among litellm's own
             # requirements. It removes this argument before sending.
             arguments["_skip_mcp_handler"] = True
-        if request.room > 1 and "max_tokens" in arguments:
-            arguments["max_tokens"] *= request.room
+        if request.max_tokens:
+            arguments["max_tokens"] = max(request.max_tokens, arguments.get("max_tokens") or 0)
         return arguments
 
     def _reply(

@@ -19,6 +19,9 @@ MAX_REASKS = 2
 _LONGEST_QUOTE = 4000
 # Characters of a defect that are told; what is wrong stands at the beginning.
 _LONGEST_PROBLEM = 1200
+_CUT_OFF = "the reply was cut off at the token limit"
+# Limits of the tokens of a reply that is asked for again because it was cut off.
+_LEAST_TOKENS, _MOST_TOKENS = 4_000, 64_000
 
 
 class RejectedReplyError(FalsifierError):
@@ -71,7 +74,7 @@ def converse(
         values: list[T] = []
         problem = None
         try:
-            if respond is not None and reply.tool_calls:
+            if respond is not None and _calls_a_tool(request, reply):
                 following, problem = _called(request, reply, respond)
             else:
                 try:
@@ -91,10 +94,13 @@ def converse(
         else:
             problems.append(problem)
         request = following
-    raise NoValidReplyError(
+    text = (
         f"{chat.llm} gave no valid reply in {counted(len(problems), 'attempt')}; rejected because: "
         f"{' | '.join(dict.fromkeys(problems))}"
     )
+    if problems[-1].startswith(_CUT_OFF):
+        text += f"; allow longer replies (--llm-option max_tokens={_MOST_TOKENS}) or lower --effort"
+    raise NoValidReplyError(text)
 
 
 def _exchange(chat: Chat, request: ChatRequest, reply: ChatReply, problem: str | None) -> Exchange:
@@ -131,6 +137,12 @@ def _called(request: ChatRequest, reply: ChatReply, respond: Respond) -> tuple[C
     return following, problems[0] if len(problems) == len(answers) else None
 
 
+def _calls_a_tool(request: ChatRequest, reply: ChatReply) -> bool:
+    """Whether a reply calls a tool that it was offered; some servers deliver the answer itself as a call."""
+    offered = {tool.name for tool in request.tools}
+    return any(call.name in offered for call in reply.tool_calls)
+
+
 def _usable_text(reply: ChatReply) -> str:
     if reply.finish_reason == "content_filter":
         raise RejectedReplyError("the provider's content filter withheld the reply")
@@ -138,16 +150,20 @@ def _usable_text(reply: ChatReply) -> str:
         raise RejectedReplyError("the server could not parse it; write nothing before or after the answer")
     if reply.finish_reason == "refusal":
         raise RejectedReplyError(f"the reply refuses the task: {reply.text[:200]}")
-    if not reply.text.strip():
+    # Some servers put the whole answer into a call of a tool that nobody offered, or into the reasoning.
+    reasoning = "" if reply.finish_reason == "length" else reply.reasoning
+    places = (reply.text, *(call.arguments for call in reply.tool_calls), reasoning)
+    text = next((place for place in places if place.strip()), "")
+    if not text:
         raise RejectedReplyError("the reply was empty")
-    if len(reply.text) >= LONGEST_REPLY:
+    if len(text) >= LONGEST_REPLY:
         raise RejectedReplyError(f"the reply is too long, {LONGEST_REPLY} characters or more")
-    return reply.text
+    return text
 
 
 def _explained(reply: ChatReply, problem: str) -> str:
     if reply.finish_reason == "length":
-        return f"the reply was cut off at the token limit ({problem}); reason less and give a shorter reply"
+        return f"{_CUT_OFF} ({problem}); reason less and give a shorter reply"
     return problem
 
 
@@ -165,6 +181,13 @@ def _asked_again(request: ChatRequest, reply: ChatReply, problem: str) -> ChatRe
                     content=f"That reply cannot be used: {problem}.\nReply again in the required form.",
                 ),
             ),
-            "room": 2 if reply.finish_reason == "length" else request.room,
+            "max_tokens": _more_tokens(reply) if reply.finish_reason == "length" else request.max_tokens,
         }
     )
+
+
+def _more_tokens(reply: ChatReply) -> int:
+    """Twice what a reply had that was cut off."""
+    limit = reply.parameters.get("max_tokens")
+    had = max(reply.usage.completion_tokens, limit if isinstance(limit, int) else 0)
+    return min(max(2 * had, _LEAST_TOKENS), max(had, _MOST_TOKENS))

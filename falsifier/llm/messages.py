@@ -123,7 +123,10 @@ class ChatRequest(_MayUseTools):
     sample: int = Field(
         default=0, description="Distinguishes runs that ask the same question and want different replies."
     )
-    room: int = Field(default=1, description="Factor on the token limit after a reply that was cut off.")
+    max_tokens: int = Field(
+        default=0,
+        description="Token limit after a reply that was cut off, if it is larger than the usual one.",
+    )
     deadline: float | None = Field(
         default=None,
         exclude=True,

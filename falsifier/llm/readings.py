@@ -10,7 +10,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.llm.replies import json_objects, without_thoughts
+from falsifier.llm.lenient import json_objects, repaired, without_thoughts
 from falsifier.problem.template_advice import WHAT_CANNOT_BE_SAID
 
 MOST_READINGS = 3
@@ -75,7 +75,8 @@ def read_readings(text: str) -> list[ReadingReply]:
         RejectedReplyError: if it contains none, or they are not of the required form.
         SpecError: if it says that no formula can say it.
     """
-    found = [o for o in json_objects(without_thoughts(text)) if "readings" in o]
+    text = without_thoughts(text)
+    found = [o for o in (*json_objects(text), repaired(text)) if isinstance(o, dict) and "readings" in o]
     if not found:
         raise RejectedReplyError('it contains no JSON object with "readings"')
     try:

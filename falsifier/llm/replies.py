@@ -4,9 +4,8 @@ A prompt asks for one of two forms: JSON with signals by name and a rationale, o
 order between ``<point>`` and ``</point>``. A reply in the other form is read too.
 """
 
-import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Annotated, Any
@@ -27,10 +26,9 @@ from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
 from falsifier.core.space import Dimension, InputRange, ParameterRange, SearchSpace
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
+from falsifier.llm.lenient import json_objects, repaired, without_thoughts
 
 _POINT_TAG = re.compile(r"<(/?)point>", re.IGNORECASE)
-_THOUGHT_TAG = re.compile(r"<(/?)think>", re.IGNORECASE)
-_OBJECT_START = re.compile(r'\{(?=\s*["}])')
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*", re.ASCII)
 # Numbers and runs are written with fewer characters; for longer texts the expressions above would take a time
@@ -42,8 +40,9 @@ _LONGEST_RATIONALE = 2000
 _MOST_CANDIDATES = 1000
 # Share of a range by which a value may exceed it.
 _ROUNDING = 1e-3
-# How often the text of a reply may be read again in search of JSON, counted in its length.
-_READINGS = 20
+# Keys of a candidate, of its parts, and of several candidates.
+_PARTS = frozenset({"signals", "parameters", "point"})
+_KEYS = _PARTS | {"candidates", "rationale", "name", "values", "value", "times", "points", "interpolation"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +122,7 @@ class ReplyForm:
             missing = (
                 "numbers between <point> and </point>" if self.points else "JSON object with a candidate"
             )
-            raise RejectedReplyError(f"it contains no {missing}")
+            raise RejectedReplyError(f"it contains no {missing}{'' if self.points else _other_keys(text)}")
         each: list[Candidate | RejectedReplyError] = []
         for one in found:
             try:
@@ -272,6 +271,7 @@ def _signals_by_name(found: Any) -> Any:
 def _pairs_apart(signal: Any) -> Any:
     if not isinstance(signal, dict):
         return signal
+    signal = _plain_keys(signal)
     values = signal.get("values", signal.get("points"))
     if not isinstance(values, list):
         return {**signal, "values": [values]} if isinstance(values, int | float) else signal
@@ -282,7 +282,9 @@ def _pairs_apart(signal: Any) -> Any:
 
 
 def _parameters_by_name(found: Any) -> Any:
-    return [{"name": k, "value": v} for k, v in found.items()] if isinstance(found, dict) else found
+    if isinstance(found, dict):
+        return [{"name": k, "value": v} for k, v in found.items()]
+    return [_plain_keys(p) if isinstance(p, dict) else p for p in found] if isinstance(found, list) else found
 
 
 def _storable(text: str) -> str:
@@ -290,12 +292,16 @@ def _storable(text: str) -> str:
     return printable(text[: 2 * _LONGEST_RATIONALE])[:_LONGEST_RATIONALE]
 
 
+def _text_or_none(found: Any) -> Any:
+    return "" if found is None else found
+
+
 class CandidateReply(BaseModel):
     """One candidate, as an LLM writes it; unknown keys are ignored, not worth paying for another reply."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
-    rationale: Annotated[str, AfterValidator(_storable)] = ""
+    rationale: Annotated[str, BeforeValidator(_text_or_none), AfterValidator(_storable)] = ""
     signals: Annotated[list[SignalReply], FailFast(), BeforeValidator(_signals_by_name)] = Field(
         default_factory=list
     )
@@ -309,59 +315,72 @@ def _validated(found: dict[str, Any]) -> CandidateReply:
     try:
         return CandidateReply.model_validate(found)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise RejectedReplyError(f"{where}: {first['msg']}") from None
+        raise RejectedReplyError(_defect(error)) from None
+
+
+def _defect(error: ValidationError) -> str:
+    """What is wrong first, with the keys that are not known there: one of them may be what is missing."""
+    errors = error.errors(include_url=False, include_context=False, include_input=False)
+    first = errors[0]
+    where = ".".join(str(part) for part in first["loc"])
+    place = first["loc"][:-1]
+    unknown = [
+        _shown(str(e["loc"][-1])) for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == place
+    ]
+    text = f"{where}: {first['msg']}"
+    if unknown and first["type"] == "missing":
+        text += f"; unknown there: {', '.join(unknown[:10])}"
+    return text
 
 
 def _candidate_objects(text: str) -> list[dict[str, Any]]:
     """Candidates of the last JSON object that contains any: reasoning may show drafts before it."""
     for found in reversed(list(json_objects(text))):
+        if candidates := _candidates_of(found):
+            return candidates
+    return _candidates_of(repaired(text))
+
+
+def _other_keys(text: str) -> str:
+    """Which keys the last object of a reply without candidates has, and what was expected."""
+    objects = [found for found in json_objects(text) if found]
+    if not objects:
+        return ""
+    keys = ", ".join(_shown(key) for key in list(objects[-1])[:10])
+    expected = ", ".join(repr(key) for key in sorted(_PARTS))
+    return f": its keys are {keys}; expected {expected} or 'candidates'"
+
+
+def _candidates_of(found: Any) -> list[dict[str, Any]]:
+    """Candidates that an object is or contains, or that a list without a key consists of."""
+    if isinstance(found, dict):
+        found = _plain_keys(found)
         several = found.get("candidates")
         if isinstance(several, list) and several and all(isinstance(c, dict) for c in several):
-            return several[:_MOST_CANDIDATES]
-        if {"signals", "parameters", "point"} & found.keys():
-            return [found]
-    return []
+            return [_plain_keys(one) for one in several[:_MOST_CANDIDATES]]
+        return [found] if _PARTS & found.keys() else []
+    if not isinstance(found, list) or not found:
+        return []
+    if all(isinstance(one, int | float) for one in found):
+        return [{"point": found}]
+    objects = [_plain_keys(one) for one in found if isinstance(one, dict)]
+    if len(objects) < len(found):
+        return []
+    if all(_PARTS & one.keys() for one in objects):
+        return objects[:_MOST_CANDIDATES]
+    return [{"signals": objects}] if all({"name", "values"} <= one.keys() for one in objects) else []
 
 
-def json_objects(text: str) -> Iterator[dict[str, Any]]:
-    """JSON objects that are not inside of others, in order; the time is proportional to the length."""
-    # Python refuses to read integers of thousands of digits; as floats they are inf, which is rejected later.
-    decoder = json.JSONDecoder(parse_int=float)
-    allowance = _READINGS * len(text)
-    start = _OBJECT_START.search(text)
-    while start is not None and allowance > 0:
-        position = start.start()
-        try:
-            found, end = decoder.raw_decode(text, position)
-        except json.JSONDecodeError as error:
-            end = position + 1
-            # The error counts the lines before it, which is fast but not free.
-            allowance -= error.pos - position + len(text) // 1000 + 1
-        except RecursionError:
-            end = position + 1
-            allowance -= len(text)
-        else:
-            if isinstance(found, dict):
-                yield found
-        start = _OBJECT_START.search(text, end)
-
-
-def without_thoughts(text: str) -> str:
-    """The text outside of ``<think> ... </think>``; a thought that does not end stays."""
-    kept, start, begun = [], 0, -1
-    for tag in _THOUGHT_TAG.finditer(text):
-        if not tag[1]:
-            begun = tag.start() if begun < 0 else begun
-        elif begun >= 0:
-            kept.append(text[start:begun])
-            start, begun = tag.end(), -1
-    return "".join((*kept, text[start:]))
+def _plain_keys(found: dict[str, Any]) -> dict[str, Any]:
+    """An object with known keys in the case in which they were asked for."""
+    lowered = ((key.lower() if isinstance(key, str) else str(key), key) for key in found)
+    names = {key: low if low in _KEYS and low not in found else str(key) for low, key in lowered}
+    return {names[key]: value for key, value in found.items()}
 
 
 def _points(text: str) -> list[str]:
-    """What stands between the tags."""
+    """What stands between the tags, or after the only one."""
+    found: list[str]
     found, begun = [], -1
     for tag in _POINT_TAG.finditer(text):
         if not tag[1]:
@@ -369,6 +388,8 @@ def _points(text: str) -> list[str]:
         elif begun >= 0:
             found.append(text[begun : tag.start()])
             begun = -1
+    if begun >= 0 and not found:  # a model that stops at the end of the numbers
+        found.append(text[begun:])
     return found[-_MOST_CANDIDATES:]
 
 

@@ -33,7 +33,9 @@ class LLMSettings(_Strict):
     reply: ReplyKind = Field(
         default="json", description="What a reply consists of: a JSON object, or numbers between tags."
     )
-    options: dict[str, str | float] = Field(default_factory=dict, description="Passed to litellm unchanged.")
+    options: dict[str, str | int | float] = Field(
+        default_factory=dict, description="Passed to litellm unchanged."
+    )
     price: tuple[_Price, _Price] | None = Field(
         default=None,
         description="US dollars per million tokens sent, and per million received; default: litellm's table.",
@@ -47,7 +49,7 @@ class LLMSettings(_Strict):
 
     @field_validator("options")
     @classmethod
-    def _without_keys(cls, options: dict[str, str | float]) -> dict[str, str | float]:
+    def _without_keys(cls, options: dict[str, str | int | float]) -> dict[str, str | float]:
         for name in filter(is_secret_option, options):
             raise ValueError(
                 f"{name}: may contain a key; keys are read from the environment only, because requests are "

@@ -5,7 +5,7 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.failures import ContextExceededError
-from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, ToolCall
 from falsifier.llm.scripted import ScriptedChat
 from tests.llm.support import ADD, ask_with_tools, calling, wrong
 
@@ -77,7 +77,19 @@ def test_useless_replies_are_named(reply: ChatReply, problem: str) -> None:
 def test_a_reply_that_was_cut_off_gets_more_room_once() -> None:
     cut = ChatReply(text="", finish_reason="length")
     _, chat, _ = asked(cut, cut, "7")
-    assert [r.room for r in chat.requests] == [1, 2, 2]
+    assert [r.max_tokens for r in chat.requests] == [0, 4000, 4000]
+    long = ChatReply(text="", finish_reason="length", parameters={"max_tokens": 5000})
+    _, chat, _ = asked(long, "7")
+    assert [r.max_tokens for r in chat.requests] == [0, 10_000]
+    with pytest.raises(NoValidReplyError, match="max_tokens"):
+        asked(cut, cut, cut)
+
+
+def test_an_answer_only_in_the_reasoning_or_in_a_call_that_nobody_offered_is_read() -> None:
+    assert asked(ChatReply(text="", reasoning="7"))[0] == 7
+    assert asked(ChatReply(text="", tool_calls=(ToolCall(id="1", name="json", arguments="7"),)))[0] == 7
+    with pytest.raises(NoValidReplyError, match="cut off"):
+        asked(*[ChatReply(text="", reasoning="7", finish_reason="length")] * 3)
 
 
 def test_cut_off_but_complete_is_valid() -> None:

@@ -356,3 +356,67 @@ def test_each_of_several_bad_candidates_is_told() -> None:
         RejectedReplyError, match=r"candidate 1: .*: 1 is outside.*; candidate 2: .*: 2 is outside"
     ):
         ReplyForm(SPACE, count=2).read(json.dumps({"candidates": bad}))
+
+
+VALUES = '"signals": [{"name": "throttle", "values": [1, 2, 3]}, {"name": "brake", "values": [0, 5]}]'
+MASS = '"parameters": [{"name": "mass", "value": 950}]'
+WHOLE = f"{{{VALUES}, {MASS}}}"
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        pytest.param(f"{{{VALUES}, {MASS},}}", id="trailing comma"),
+        pytest.param(WHOLE.replace("3]", "3, ]"), id="trailing comma in a list"),
+        pytest.param(WHOLE.replace("[1,", "[ // slow\n 1,"), id="comment"),
+        pytest.param(WHOLE.replace("[1,", "[ # slow\n 1,"), id="comment of Python"),
+        pytest.param(WHOLE.replace("[1,", "[ /* slow */ 1,"), id="comment of C"),
+        pytest.param(WHOLE.replace('"', "'"), id="single quotes"),
+        pytest.param(WHOLE.replace('"', ""), id="no quotes"),
+        pytest.param(WHOLE.translate(str.maketrans("{}[]:,", "｛｝［］：，")), id="full-width punctuation"),
+        pytest.param(
+            WHOLE.replace('"signals', "“signals").replace('signals"', "signals”"), id="curly quotes"
+        ),
+        pytest.param(WHOLE.replace("signals", "Signals").replace("name", "Name"), id="case of keys"),
+        pytest.param(WHOLE.replace('], "param', '] "param'), id="missing comma"),
+        pytest.param(f'{{"rationale": "the "brake" stays", {VALUES}, {MASS}}}', id="quotes within a text"),
+        pytest.param(f'{{"rationale": None, {VALUES}, {MASS}}}', id="Python's None"),
+        pytest.param(f"[{WHOLE}]", id="list of candidates"),
+        pytest.param("[1, 2, 3, 0, 5, 950]", id="bare list"),
+        pytest.param("<point>1, 2, 3, 0, 5, 950", id="tag without its end"),
+        pytest.param(
+            f"I choose:\n```json\n{WHOLE[:-1]},}}\n```\nas it is slow {{so}}.", id="fence and prose"
+        ),
+        pytest.param(
+            "signals:\n  - name: throttle\n    values: [1, 2, 3]\n  - {name: brake, values: [0, 5]}\n"
+            "parameters:\n  - name: mass\n    value: 950\n",
+            id="YAML",
+        ),
+    ],
+)
+def test_mistakes_that_can_be_read_in_one_way_only_cost_nothing(odd: str) -> None:
+    (candidate,) = ReplyForm(SPACE).read(odd)
+    assert candidate.signals["throttle"].values == (1, 2, 3)
+    assert candidate.signals["brake"].values == (0, 5)
+    assert candidate.parameters == {"mass": 950}
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        pytest.param(WHOLE[:-20], id="cut off"),
+        pytest.param(WHOLE.replace("2, 3", "..., 3"), id="omission"),
+        pytest.param(WHOLE.replace("1, 2, 3", "1/2, 2*3, 3"), id="arithmetic"),
+        pytest.param(WHOLE.replace("[1, 2, 3]", "[1, 2, 3"), id="bracket missing"),
+    ],
+)
+def test_what_could_mean_several_things_is_rejected(odd: str) -> None:
+    with pytest.raises(RejectedReplyError):
+        ReplyForm(SPACE).read(odd)
+
+
+def test_wrong_keys_are_named() -> None:
+    with pytest.raises(RejectedReplyError, match=r"'inputs'.*expected.*'signals'"):
+        ReplyForm(SPACE).read('{"inputs": {"throttle": [1, 2, 3]}}')
+    with pytest.raises(RejectedReplyError, match=r"values.*unknown there: 'value'"):
+        ReplyForm(SPACE).read('{"signals": [{"name": "throttle", "value": 3}]}')
