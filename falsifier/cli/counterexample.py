@@ -239,19 +239,16 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.counterexamples.export import export_counterexample, why_no_script
+    from falsifier.counterexamples.export import export_counterexample
 
     stored = load(run)
     directory = out or _beside(run, "export")
     with _problem(stored) as problem:
         written = export_counterexample(problem, stored, _simulated(stored, problem), directory)
-        missing = why_no_script(problem.model)
     if store is not None:
         written.append(Database(store).save(problem, stored))
     for path in written:
         say(str(path))
-    if missing:
-        say(missing)
 
 
 @click.command("robustness-map")

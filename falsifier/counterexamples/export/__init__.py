@@ -8,7 +8,7 @@
     MODEL.fmu                   copy of the FMU
     SYSTEM.ssp                  of a system of FMUs: its FMUs and connections, start values and inputs
     components/                 of a system: what each component saw, to simulate it alone; see components.py
-    replay.py                   simulates either with FMPy only; writes outputs.csv, prints the critical time
+    replay.py                   simulates the FMU with FMPy only; writes outputs.csv, prints the critical time
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
     test_NAME.py                a pytest test that fails as long as the counterexample violates
@@ -27,14 +27,13 @@ from falsifier.counterexamples.export.scripts import (
     pytest_file,
     replay_script,
 )
-from falsifier.counterexamples.export.system_script import system_script, why_no_script
 from falsifier.counterexamples.export.tables import file_columns, write_csv, write_json, write_mat, write_ssv
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel, System
 from falsifier.problem.problem import Problem
 
-__all__ = ["export_counterexample", "why_no_script"]
+__all__ = ["export_counterexample"]
 
 
 def export_counterexample(
@@ -43,8 +42,7 @@ def export_counterexample(
     """Write a counterexample for other tools; return the files.
 
     Files that do not apply are omitted: input.csv if the model has no inputs, the simulation scripts if the
-    model is not an FMU, replay.py for a system that FMPy cannot step (``why_no_script``), the test if the
-    problem cannot be loaded from a file.
+    model is not an FMU, the test if the problem cannot be loaded from a file.
 
     Args:
         problem: the problem whose requirement is violated.
@@ -70,9 +68,8 @@ def export_counterexample(
         files.append(write_package(problem.model, problem.experiment.stop_time, inside, target))
         files += write_components(problem, evaluation.candidate, directory)
     columns = file_columns(table, problem.model)
-    is_system = isinstance(problem.model, System)
     scripts = {
-        "replay.py": (system_script if is_system else replay_script)(problem, evaluation, columns),
+        "replay.py": replay_script(problem, evaluation, columns),
         "replay.mos": openmodelica_script(problem, start),
         f"test_{identifier(problem.name)}.py": pytest_file(stored),
     }

@@ -1,15 +1,20 @@
-"""The master of a system in plain Python on FMPy's classes, as exported counterexamples carry it.
+"""The master of a system in plain Python on FMPy's classes, an independent reference for that of the worker.
 
-Nothing here imports this module: its text becomes the second half of a script, after tables of the system's
-components and connections. Therefore it needs only fmpy and numpy. It does what master.py and
-coupled_stepping.py do, in the same order; tests compare the two. ``main`` describes the tables.
+It does what worker/system.c does, in the same order, for components of co-simulation.
 """
 
-import csv
 import os
-import tempfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.model import Experiment
+from falsifier.core.signals import Signal as InputSignal
+from falsifier.fmu import System
+from falsifier.fmu.systems.network import SYSTEM, Member, Place
 
 # Early returns at one time, or rounds of one event iteration, after which an FMU is considered stuck.
 MAX_ROUNDS = 1000
@@ -40,7 +45,7 @@ class Signal:
 class Component:
     """One FMU of the system, loaded and instantiated."""
 
-    def __init__(self, name: str, about: dict[str, Any], here: Path, folder: Path) -> None:
+    def __init__(self, name: str, about: dict[str, Any], folder: Path) -> None:
         import fmpy
         from fmpy import fmi2, fmi3
 
@@ -50,7 +55,7 @@ class Component:
         self.waiting: dict[str, float] = {}
         self.held: dict[str, float] = {}
         # Each component has a copy of its own: two with the same FMU then share no static data.
-        fmpy.extract(str(here / about["fmu"]), str(folder))
+        fmpy.extract(str(about["fmu"]), str(folder))
         make = fmi3.FMU3Slave if about["fmi"] == 3 else fmi2.FMU2Slave
         self.fmu = make(
             guid=about["token"],
@@ -101,10 +106,10 @@ class Component:
         for _ in range(MAX_ROUNDS):
             again, ends, *_ = self.fmu.updateDiscreteStates()
             if ends:
-                raise SystemExit(f"{self.name}: the FMU terminated the simulation")
+                raise AssertionError(f"{self.name}: the FMU terminated the simulation")
             if not again:
                 return
-        raise SystemExit(f"{self.name}: the events never end")
+        raise AssertionError(f"{self.name}: the events never end")
 
     def gather(self, signals: dict[str, Signal], driven: dict[str, float], middle: float) -> None:
         """Collect the inputs of a step: from outside as at its start, connected ones as in its middle."""
@@ -154,7 +159,7 @@ class Component:
                 self.fmu.enterStepMode()
             if ends or end - time <= 1e-12 * max(1.0, abs(end)):
                 return bool(ends)
-        raise SystemExit(f"{self.name}: the FMU makes no progress at t = {time:g} s")
+        raise AssertionError(f"{self.name}: the FMU makes no progress at t = {time:g} s")
 
     def read(self, signals: dict[str, Signal], time: float) -> None:
         """Read the connected outputs."""
@@ -186,7 +191,12 @@ def typed(kind: str, value: Any) -> Any:
 class Master:
     """Initialises the components across their connections and steps them together."""
 
-    def __init__(self, system: dict[str, Any], components: list[Component], driven: Any) -> None:
+    def __init__(
+        self,
+        system: dict[str, Any],
+        components: list[Component],
+        driven: Callable[[int], dict[str, float]],
+    ) -> None:
         self.system, self.components, self.driven = system, components, driven
         self.step = system["stop_time"] / system["steps"]
         self.signals = {f"{c.name}.{n}": Signal() for c in components for n in c.about["outputs"]}
@@ -208,7 +218,7 @@ class Master:
             if (k + 1) % self.system["every"] == 0:
                 rows.append(self.row(end))
             if ends and not is_last:
-                raise SystemExit(f"an FMU terminated the simulation at t = {end:g} s")
+                raise AssertionError(f"an FMU terminated the simulation at t = {end:g} s")
         return rows
 
     def find_first_values(self) -> None:
@@ -223,7 +233,7 @@ class Master:
             if not any(map(self.moves, values, before)):
                 return
             before = values
-        raise SystemExit("the initialisation does not converge")
+        raise AssertionError("the initialisation does not converge")
 
     def moves(self, value: float, before: float) -> bool:
         """Whether a value has not yet converged."""
@@ -280,7 +290,7 @@ class Master:
         finally:
             for component, state in zip(due, kept, strict=True):
                 component.free(state)
-        raise SystemExit(f"the loop of {', '.join(c.name for c in components)} does not converge")
+        raise AssertionError(f"the loop of {', '.join(c.name for c in components)} does not converge")
 
     def row(self, time: float) -> list[float]:
         """Return time and recorded values: connected outputs as they were exchanged, others as they are."""
@@ -289,64 +299,128 @@ class Master:
             self.signals[f"{name}.{variable}"].value
             if f"{name}.{variable}" in self.signals
             else by_name[name].get(variable)
-            for name, variable in self.system["recorded"].values()
+            for name, variable in self.system["recorded"]
         ]
         return [time, *values]
 
 
-def read_inputs(file: Path, names: list[str], system: dict[str, Any]) -> Any:
-    """Return a function that gives the inputs at a communication point, after the step if they step there."""
-    import numpy as np
+def simulate(
+    model: System,
+    experiment: Experiment,
+    signals: Mapping[str, InputSignal],
+    parameters: Mapping[str, float],
+    root: Path,
+) -> NDArray[np.float64]:
+    """Simulate a system with FMPy; return time and recorded outputs by sample, shape (samples, 1 + outputs).
 
-    if not names:
-        return lambda k: {}
-    with file.open(newline="", encoding="utf-8") as lines:
-        table = np.array(list(csv.reader(lines))[1:], dtype=float)
-    times = np.arange(system["steps"] + 1) * (system["stop_time"] / system["steps"])
-    # Of rows with the same time, this takes the last.
-    columns = [np.interp(times, table[:, 0], column) for column in table[:, 1:].T]
-    return lambda k: {name: float(column[k]) for name, column in zip(names, columns, strict=True)}
-
-
-def simulate(system: dict[str, Any], here: Path) -> list[list[float]]:
-    """Simulate the system whose FMUs and input.csv are in a folder; return the recorded rows."""
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as root:
-        parts = [
-            Component(name, about, here, Path(root) / str(k))
-            for k, (name, about) in enumerate(system["components"].items())
-        ]
-        driven = read_inputs(here / "input.csv", system["columns"], system)
-        rows = Master(system, parts, driven).simulate()
-        for part in parts:
-            part.fmu.terminate()
-            part.fmu.freeInstance()
-    return rows
-
-
-def main(system: dict[str, Any], here: Path) -> None:
-    """Simulate what is in a folder, write outputs.csv, compare the values around the critical time.
-
-    ``system`` has the times, how values are exchanged, and the names of the columns of input.csv and of the
-    recorded variables. Each component, in the order in which they step, has its FMU, the number of steps of
-    the system per step of its own, variables (type, value reference, element and size of an array), start
-    values, connected outputs, and where each input comes from: ``factor * source + offset``. The source is a
-    connected output (before it is known, the input is ``value``), a column of input.csv, or the constant
-    ``value``. ``held`` inputs change in event mode only. ``loops``: positions from where to where components
-    repeat their steps. ``expected``: rows as they were recorded, the critical one among them.
+    FMUs are unpacked to subfolders of ``root``.
     """
-    rows = simulate(system, here)
-    names = ["time", *system["recorded"]]
-    with (here / "outputs.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(rows)
-    shown = [names.index(name) for name in ("time", *system["shown"])]
-    print("".join(f"{names[k]:>24}" for k in shown))
-    worst = 0.0
-    for number, expected in system["expected"].items():
-        values = [rows[number][k] for k in shown]
-        worst = max([worst, *(abs(a - b) for a, b in zip(values[1:], expected, strict=True))])
-        mark = "  <- critical time" if number == system["critical"] else ""
-        print("".join(f"{value:24.9g}" for value in values) + mark)
-    print(f"largest difference from the recorded values in these rows: {worst:.3g}")
-    print(f"all {len(rows)} rows are in outputs.csv next to this script")
+    system = tables(model, experiment, signals, parameters)
+    parts = [
+        Component(name, about, root / str(k)) for k, (name, about) in enumerate(system["components"].items())
+    ]
+    times = np.arange(system["steps"] + 1) * (experiment.stop_time / system["steps"])
+    columns = {name: signal.sample(times) for name, signal in signals.items()}
+    driven = [{name: float(column[k]) for name, column in columns.items()} for k in range(len(times))]
+    rows = Master(system, parts, driven.__getitem__).simulate()
+    for part in parts:
+        part.fmu.terminate()
+        part.fmu.freeInstance()
+    return np.array(rows)
+
+
+def tables(
+    model: System, experiment: Experiment, signals: Mapping[str, InputSignal], parameters: Mapping[str, float]
+) -> dict[str, Any]:
+    """Return the system as plain tables.
+
+    They have the times, how values are exchanged, and the recorded variables. Each component, in the order
+    of stepping, has its FMU, the number of communication steps per step of its own, variables (type, value
+    reference, element and size of an array), start values, connected outputs, and the source of each input:
+    ``factor * source + offset``. The source is a connected output (before it is known, the input is
+    ``value``), a signal, or the constant ``value``. ``held`` inputs change in event mode only. ``loops``:
+    positions from where to where components repeat their steps.
+    """
+    network, coupling = model.network, model.network.coupling
+    values = {**dict(model.frame.values), **parameters, **dict(experiment.strings)}
+    feeds = _feeds(model, signals, values)
+    every = max(round(experiment.output_interval / (experiment.step_size or experiment.output_interval)), 1)
+    steps = (experiment.samples - 1) * every
+    places = [network.places[name] for name in experiment.outputs]
+    start = {network.places[name]: value for name, value in values.items()}
+    sources = {link.source for link in network.links}
+    components = {}
+    for k in network.order:
+        member = network.members[k]
+        components[member.name] = _component(
+            member,
+            experiment.stop_time / steps,
+            start={p.name: value for p, value in start.items() if p.member == k and p not in feeds},
+            feeds={p.name: feed for p, feed in feeds.items() if p.member == k},
+            outputs=sorted(p.name for p in sources if p.member == k),
+            others=sorted({p.name for p in places if p.member == k}),
+        )
+    return {
+        "stop_time": experiment.stop_time,
+        "steps": steps,
+        "every": every,
+        "tolerance": experiment.tolerance,
+        "method": coupling.method,
+        "convergence": coupling.tolerance,
+        "max_rounds": coupling.max_rounds,
+        "loops": dict(network.loops),
+        "components": components,
+        "recorded": [(network.members[p.member].name, p.name) for p in places],
+    }
+
+
+def _component(
+    member: Member,
+    step: float,
+    *,
+    start: Mapping[str, float | str],
+    feeds: Mapping[str, Mapping[str, Any]],
+    outputs: list[str],
+    others: list[str],
+) -> dict[str, Any]:
+    description = member.description
+    slots = {name: description.slots[name] for name in dict.fromkeys((*start, *feeds, *outputs, *others))}
+    kinds = {v.name: v for v in description.info.variables}
+    has_events = description.major == 3 and description.event_mode
+    arrays = {slot.reference for slot in slots.values() if slot.size > 1}
+    return {
+        "fmu": member.path,
+        "fmi": description.major,
+        "token": description.token,
+        "identifier": description.identifiers[member.interface],
+        "event_mode": has_events,
+        "every": 1 if member.step is None else round(member.step / step),
+        "variables": {name: (s.type, s.reference, s.offset, s.size) for name, s in slots.items()},
+        "arrays": {reference: description.arrays[reference] for reference in arrays},
+        "start": dict(start),
+        "inputs": dict(feeds),
+        "held": [name for name in feeds if has_events and kinds[name].variability != "continuous"],
+        "outputs": outputs,
+    }
+
+
+def _feeds(
+    model: System, signals: Mapping[str, InputSignal], values: Mapping[str, float | str]
+) -> dict[Place, dict[str, Any]]:
+    """Return where each input comes from: a connected output, a signal, or a constant."""
+    network = model.network
+    feeds: dict[Place, dict[str, Any]] = {}
+    for link in network.links:
+        feed: dict[str, Any] = {"factor": link.factor, "offset": link.offset}
+        if link.source.member != SYSTEM:
+            feed |= {"from": network.title(link.source), "value": link.start, "linear": link.is_linear}
+        elif link.source.name in signals:
+            feed |= {"input": link.source.name}
+        else:
+            constant = values.get(link.source.name, model.info[link.source.name].start)
+            feed |= {"value": float(constant or 0.0)}
+        feeds[link.target] = feed
+    for name in signals:
+        if network.places[name].member != SYSTEM:
+            feeds[network.places[name]] = {"factor": 1.0, "offset": 0.0, "input": name}
+    return feeds
