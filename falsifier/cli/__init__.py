@@ -4,8 +4,8 @@ import errno
 import os
 import sys
 import traceback
-from contextlib import suppress
 from importlib import import_module
+from io import StringIO
 from typing import NoReturn
 
 import click
@@ -135,8 +135,9 @@ def _carried_out(arguments: list[str]) -> int:
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.ClickException as error:
-        with suppress(OSError):
-            error.show()
+        shown = StringIO()
+        error.show(shown)
+        warn(shown.getvalue().rstrip("\n"))
         return 2
     except (click.Abort, KeyboardInterrupt):
         warn("interrupted")

@@ -8,7 +8,7 @@ import click
 
 from falsifier.cli.options import Decorator, Function, add, repeatable
 from falsifier.context.values import NOTHING
-from falsifier.core.secrets import is_secret_option
+from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts.variants import CONTEXT_VARIANT, DEFAULT_VARIANT
@@ -211,6 +211,11 @@ def _llm_option(text: str) -> tuple[str, str | float]:
     if is_secret_option(name):  # options are written to the run's manifest
         raise click.UsageError(
             f"--llm-option {name}: keys are read from the environment only; set the provider's variable"
+        )
+    if holds_credentials(value):
+        raise click.UsageError(
+            f"--llm-option {name}: contains a user name or a password, and options are recorded; state them "
+            "in the environment"
         )
     try:
         number = int(value) if value.isdigit() else float(value)

@@ -34,8 +34,11 @@ _KEY_SHAPES = (
     # Only where a word begins, so that time does not grow with the square of a text's length.
     r"(?<![\w-])eyJ[\w-]{10,}+\.[\w-]{10,}(?:\.[\w-]*)?",
 )
-_CREDENTIALS_IN_ADDRESS = r"(?<=://)[^\s/@]+(?=@)"
+# Passwords may contain an unescaped @ themselves.
+_CREDENTIALS_IN_ADDRESS = r"(?<=://)[^\s/?#'\"]+(?=@)"
 _VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS)))
+# The same for an address alone: without a scheme too, and a password may contain a slash; a port is none.
+_CREDENTIALS = re.compile(r"(?:.*?://)?(?:[^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$))[^@]*@)")
 _IN_TEXT = re.compile(
     "|".join(
         (
@@ -96,6 +99,15 @@ def secrets_in(options: Mapping[str, Any]) -> list[str]:
     return found
 
 
+def holds_credentials(address: str) -> bool:
+    """Whether an address contains a user name or a password.
+
+    >>> holds_credentials("http://me:word@host/v1"), holds_credentials("http://host:80/v1/@me")
+    (True, False)
+    """
+    return _CREDENTIALS.match(address) is not None
+
+
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
     """Return a message with secrets replaced: given ones, held ones and whatever looks like a known key."""
     return _IN_TEXT.sub(_REDACTED, redact_held(text, secrets))
@@ -106,12 +118,19 @@ def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
 
     For replies of language models, whose words and names may look like keys without being any.
     """
-    held = (v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v))
+    held = [v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
+    held += [part for value in held for part in _credentials_in(value)]
     # Longest first: a secret that contains another one would otherwise be left in pieces.
     for secret in sorted({s.strip() for s in (*secrets, *held)}, key=len, reverse=True):
         if len(secret) >= _SHORTEST:
             text = text.replace(secret, _REDACTED)
     return text
+
+
+def _credentials_in(address: str) -> list[str]:
+    """User name and password of an address together, and the password alone."""
+    found = re.search(_CREDENTIALS_IN_ADDRESS, address)
+    return [] if found is None else [found[0], found[0].partition(":")[2]]
 
 
 def line_of_secret(text: str) -> int | None:

@@ -9,6 +9,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
+from falsifier.core.secrets import holds_credentials
 from falsifier.errors import ModelError, SpecError
 
 # Maximum time in s to wait for a cluster's scheduler.
@@ -85,6 +86,11 @@ def connected(cluster: str) -> Iterator[ClusterExecutor]:
         SpecError: if this is not such an address, or Dask is not installed.
         ModelError: if the scheduler cannot be reached.
     """
+    if holds_credentials(cluster):
+        raise SpecError(
+            "--executor: expected dask:tcp://HOST:PORT without a user name and a password, which Dask does "
+            "not take; certificates are stated in Dask's own configuration"
+        )
     kind, _, address = cluster.partition(":")
     if kind != "dask" or not address:
         raise SpecError(f"--executor {cluster}: expected dask:tcp://HOST:PORT")

@@ -10,7 +10,7 @@ from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.litellm_import import check_name, check_options, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
-from falsifier.llm.providers import find_key, first_mode, key_variable
+from falsifier.llm.providers import check_address, find_key, first_mode, key_variable
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate, RetryingChat
 from falsifier.llm.usage import Price
 
@@ -18,12 +18,13 @@ _HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word
 
 
 def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, Any] | None = None) -> None:
-    """Check an LLM's name, key and options without sending anything.
+    """Check an LLM's name, address, key and options without sending anything.
 
     Raises:
         ChatError: saying what to set or change.
     """
     check_name(llm)
+    check_address(llm, api_base)
     find_key(llm, api_base=api_base)
     check_options(llm, options or {}, api_base=api_base)
 
@@ -57,7 +58,7 @@ def connect(
         cache: directory of stored replies; None: no cache.
 
     Raises:
-        ChatError: for an unknown provider, an unknown option or a missing key.
+        ChatError: for an unknown provider, an unknown option, a missing key, or an address with a password.
     """
     preflight(llm, api_base=api_base, options=options)
     client = LiteLLMChat(

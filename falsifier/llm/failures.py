@@ -13,7 +13,7 @@ from falsifier.core.printable import printable
 from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.providers import known, server_address
-from falsifier.llm.transport import RefusedReplyError
+from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
@@ -44,6 +44,9 @@ _LONGEST_DETAIL = 600
 # What the client library puts before the server's own words, several times over.
 _FULL_STOP = re.compile(r"(?<!\.)\.$")
 _CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")
+_LETTERS = re.compile(r"[^\W\d_]{2}")
+# The title of a page that a proxy answers with says what the page says.
+_TITLE = re.compile(r"<title>([^<]+)</title>", re.IGNORECASE)
 _LONGER = (
     "start its server with a longer context (llama.cpp: --ctx-size 32768; vLLM: --max-model-len 32768), or "
 )
@@ -109,14 +112,15 @@ def classify(
         secrets: texts to remove from the message.
         offers_tools: whether the request offered tools.
     """
+    where = f" at {redact(api_base, secrets)}" if api_base else ""
     if isinstance(error, RefusedReplyError):
-        at = f" at {redact(api_base, secrets)}" if api_base else ""
-        return ChatError(f"{llm}{at}: {redact(printable(str(error)), secrets)}")
+        return ChatError(f"{llm}{where}: {redact(printable(str(error)), secrets)}")
     status = _status(error)
     text = redact(printable(f"{type(error).__name__}: {error}"), secrets)
-    lowered = _first_lines(text).lower()
-    detail = _first_lines(_own_words(text))
-    where = f" at {redact(api_base, secrets)}" if api_base else ""
+    lowered = _beginning(text).lower()
+    detail = _beginning(_own_words(text))
+    if status is not None and not _LETTERS.search(detail):
+        detail = f"the server answers with the HTTP status {status} and without a reason"
     keys = " or ".join(key_variables) or "the API key"
     address = server_address(llm, api_base)
     if _is_refused(error) and _is_this_machine(address):
@@ -127,6 +131,8 @@ def classify(
             "or correct --api-base",
             patience=_LOCAL_PATIENCE,
         )
+    if isinstance(error, BrokenReplyError):
+        return TransientChatError(f"{llm}{where}: {redact(printable(str(error)), secrets)}")
     if status in (401, 403):
         return ChatError(f"{llm}{where}: the provider rejected the key; check {keys}. {detail}")
     if status in (400, 422, 500) and any(word in lowered for word in _UNREADABLE_WORDS):
@@ -174,12 +180,14 @@ def _own_words(text: str) -> str:
         told = json.loads(said)["error"]["message"]
     except (ValueError, TypeError, KeyError, RecursionError):
         told = said
+    if title := _TITLE.search(said):
+        told = title[1]
     return told if isinstance(told, str) and told.strip() else text
 
 
-def _first_lines(text: str) -> str:
-    """Beginning of a message, without the stack trace that the client library may append."""
-    text = text.split("Traceback (most recent call last)")[0].strip()
+def _beginning(text: str) -> str:
+    """Beginning of a message in one line, without the stack trace that the client library may append."""
+    text = " ".join(text.split("Traceback (most recent call last)")[0].split())
     # Without its full stop, because more follows in most messages.
     return _FULL_STOP.sub("", text) if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
 

@@ -39,8 +39,10 @@ def load_litellm() -> Any:
     except ImportError as error:
         raise ChatError(f"litellm cannot be imported ({error}): pip install litellm") from None
     litellm.suppress_debug_info = True
-    # litellm's own types cause this pydantic warning; the user can do nothing about it.
-    warnings.filterwarnings("ignore", message=".*`ReadOnly` qualifier", category=UserWarning)
+    # litellm's own types, and replies of another form, cause these warnings of pydantic; the user can do
+    # nothing about the first, and is told of the second.
+    for text in (".*`ReadOnly` qualifier", "Pydantic serializer warnings"):
+        warnings.filterwarnings("ignore", message=text, category=UserWarning)
     return litellm
 
 

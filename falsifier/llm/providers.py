@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
+from urllib.parse import urlsplit
 
+from falsifier.core.secrets import holds_credentials
 from falsifier.errors import ChatSetupError
 from falsifier.llm.messages import MODES, Mode
 
@@ -92,6 +94,30 @@ def known(llm: str) -> Provider:
     return PROVIDERS.get(provider_of(llm), Provider())
 
 
+def check_address(llm: str, api_base: str | None) -> None:
+    """Refuse an address that is none, or that contains a user name and a password.
+
+    Addresses are recorded, printed in commands and seen by whoever lists the processes of the machine.
+
+    Raises:
+        ChatSetupError: saying how to state it; without the address if that contains a password.
+    """
+    if api_base is None:
+        return
+    if holds_credentials(api_base):
+        raise ChatSetupError(
+            "--api-base: an address with a user name or a password would be recorded; drop --api-base, and "
+            f"put the whole address into the environment variable {_address_variable(llm)}"
+        )
+    try:
+        parts = urlsplit(api_base)
+        is_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        is_address = False
+    if not is_address:
+        raise ChatSetupError(f"--api-base {api_base}: expected http://HOST:PORT/v1 or https://...")
+
+
 def find_key(llm: str, *, api_base: str | None = None) -> str | None:
     """Key for an LLM from the environment.
 
@@ -104,7 +130,9 @@ def find_key(llm: str, *, api_base: str | None = None) -> str | None:
     provider = known(llm)
     if variable := key_variable(llm):
         return os.environ[variable].strip()
-    if provider.openai_client and (api_base is not None or provider.local):
+    # Azure has no address of its own, so that a stated one says nothing about the key.
+    address = api_base if provider_of(llm) == "azure" else server_address(llm, api_base)
+    if provider.openai_client and (address or provider.local):
         return NO_KEY
     if provider.keys and api_base is None:
         variables = " or ".join(provider.keys)
@@ -122,8 +150,14 @@ def server_address(llm: str, api_base: str | None) -> str:
 
     Empty if only the client library knows it.
     """
-    variable = "OLLAMA" if known(llm) is _OLLAMA else provider_of(llm).upper()
-    return api_base or os.environ.get(f"{variable}_API_BASE", "") or known(llm).address
+    return api_base or os.environ.get(_address_variable(llm), "") or known(llm).address
+
+
+def _address_variable(llm: str) -> str:
+    """Environment variable in which the client library looks for a server's address."""
+    # A campaign's settings hold for several LLMs and are made without a name.
+    provider = "OLLAMA" if known(llm) is _OLLAMA else provider_of(llm).upper() or "OPENAI"
+    return f"{provider}_API_BASE"
 
 
 def first_mode(llm: str) -> Mode:

@@ -9,11 +9,12 @@ therefore replaced; requests that are not made within ``within`` pass through it
 """
 
 import atexit
+import json
 import os
 import socket
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar, copy_context
 from functools import cache
 from queue import Empty, SimpleQueue
@@ -34,8 +35,43 @@ _GIVEN_UP: WeakSet[Thread] = WeakSet()
 _REDIRECTS = frozenset({301, 302, 303, 307, 308})
 
 
+# Maximum number of characters of a reply that an error repeats.
+_LONGEST_BEGINNING = 80
+_CUT = "the server or a proxy before it ended it; its log says why"
+_ADDRESS = "check host, port and http or https in --api-base"
+_NO_LLM = f"that is no server of a language model; {_ADDRESS}"
+# How httpx and what it stands on tell a failure, by words of it, and what causes and cures it.
+_FAULTS = (
+    (
+        ("name or service not known", "name resolution", "getaddrinfo", "nodename nor servname"),
+        "the server's name is not known here",
+        "check --api-base and the network",
+    ),
+    (
+        ("certificate_verify_failed",),
+        "the server's certificate is not trusted",
+        "name the file with its authority's certificate in the environment variable SSL_CERT_FILE",
+    ),
+    (("[ssl",), "the server does not speak TLS", _ADDRESS),
+    (
+        ("without sending a response",),
+        "the server closed the connection without a reply",
+        f"{_ADDRESS}, and the server's log",
+    ),
+    (("receive buffer too long",), "the reply has headers of more than 100 kB", _NO_LLM),
+    (("illegal chunk", "transfer-encoding"), "the reply is no valid HTTP", _CUT),
+    (("illegal", "protocol"), "the server does not answer in HTTP", _NO_LLM),
+    (("without sending complete", "incomplete"), "the connection was cut within the reply", _CUT),
+    (("reset by peer", "broken pipe"), "the connection was cut", _CUT),
+)
+
+
 class RefusedReplyError(Exception):
     """The server did something that is not accepted; the message says what."""
+
+
+class BrokenReplyError(Exception):
+    """No reply came, or not one of an LLM's server; the message says what is wrong, and what to do."""
 
 
 def within(seconds: float, action: Callable[[], T]) -> T:
@@ -44,6 +80,7 @@ def within(seconds: float, action: Callable[[], T]) -> T:
     Raises:
         TimeoutError: if it has not returned by then.
         RefusedReplyError: if a server's reply was refused.
+        BrokenReplyError: if the action failed because of the connection, or of a reply that is not readable.
     """
     _guard_transport()
     call = _Call()
@@ -71,6 +108,8 @@ def within(seconds: float, action: Callable[[], T]) -> T:
             _GIVEN_UP.add(thread)
     if call.refusal:
         raise RefusedReplyError(call.refusal)
+    if error is not None and call.fault:
+        raise BrokenReplyError(call.fault) from error
     if error is not None:
         raise error
     return result  # type: ignore[return-value]
@@ -98,10 +137,11 @@ def _is_importing(thread: Thread) -> bool:
 
 
 class _Call:
-    """The connections of one call, and why a reply was refused."""
+    """The connections of one call, why a reply was refused, and what was wrong with the last one."""
 
     def __init__(self) -> None:
         self.refusal = ""
+        self.fault = ""
         self._lock = Lock()
         self._connections: list[socket.socket] = []
         self._has_ended = False
@@ -132,9 +172,11 @@ class _Call:
         # Compressed, a small reply could fill the memory.
         request.headers["Accept-Encoding"] = "identity"
         request.extensions = {**request.extensions, "trace": self._note}
-        response = handle(transport, request)
+        self.fault = ""
+        with self._noting_faults():
+            response = handle(transport, request)
         self._check(request, response)
-        response.stream = _limited_stream(response.stream, self)
+        response.stream = self._read(response)
         return response
 
     def refuse(self, reason: str) -> None:
@@ -162,9 +204,21 @@ class _Call:
         connection.shutdown(socket.SHUT_RDWR)
         connection.close()
 
+    @contextmanager
+    def _noting_faults(self) -> Iterator[None]:
+        import httpx
+
+        try:
+            yield
+        except httpx.TimeoutException:
+            raise
+        except httpx.TransportError as error:
+            self.fault = self.refusal or _fault_of(error)
+            raise
+
     def _check(self, request: "httpx.Request", response: "httpx.Response") -> None:
-        if response.status_code in _REDIRECTS and (target := response.headers.get("location")):
-            self._check_redirect(request.url, target)
+        if response.status_code in _REDIRECTS:
+            self.refuse(_redirection(request.url, response.headers.get("location")))
         encoding = response.headers.get("content-encoding", "identity").lower()
         if encoding != "identity":
             self.refuse(f"the reply is compressed ({encoding[:20]}), which was not asked for")
@@ -172,21 +226,84 @@ class _Call:
         if length.isascii() and length.isdigit() and float(length) > _MOST_BYTES:
             self.refuse(_too_long())
 
-    def _check_redirect(self, asked: "httpx.URL", location: str) -> None:
+    def _read(self, response: "httpx.Response") -> "httpx.SyncByteStream":
+        """Return the response's stream, which ends at the limit and says if what came is no reply."""
         import httpx
 
-        try:
-            target = asked.join(location)
-        except (httpx.InvalidURL, ValueError):
-            self.refuse("the server redirects to an address that cannot be read")
-        is_safer = (asked.scheme, target.scheme) == ("http", "https")
-        is_same = (asked.scheme, asked.port) == (target.scheme, target.port)
-        if target.host != asked.host or not (is_same or is_safer):
-            origin = f"{target.scheme}://{target.netloc.decode('ascii', 'replace')}"[:200]
-            self.refuse(
-                f"the server redirects to {origin}, and prompts do not follow; if that is the right address, "
-                "state it with --api-base"
-            )
+        inner, call = response.stream, self
+
+        class Read(httpx.SyncByteStream):
+            def __iter__(self) -> Iterator[bytes]:
+                received = bytearray()
+                with call._noting_faults():
+                    for part in inner:  # type: ignore[union-attr]
+                        received += part
+                        if len(received) > _MOST_BYTES:
+                            call.refuse(_too_long())
+                        yield part
+                if response.is_success:
+                    call.fault = _unreadable(bytes(received))
+
+            def close(self) -> None:
+                inner.close()  # type: ignore[union-attr]
+
+        return Read()
+
+
+def _redirection(asked: "httpx.URL", location: str | None) -> str:
+    """Why a redirect is refused: a prompt goes only where the user sent it."""
+    import httpx
+
+    try:
+        target = asked.join(location or "").copy_with(query=None, fragment=None)
+    except (httpx.InvalidURL, ValueError):
+        return "the server redirects to an address that cannot be read, and prompts do not follow"
+    if target == asked:
+        return "the server redirects to the same address, or names none; check --api-base and its log"
+    base = str(target).removesuffix("/chat/completions").removesuffix("/api/chat")[:200]
+    return (
+        f"the server redirects to {base}, and prompts do not follow; if that is the right address, state it "
+        "with --api-base"
+    )
+
+
+def _fault_of(error: Exception) -> str:
+    """What is wrong with a connection, and what to do."""
+    import httpx
+
+    text = str(error).partition(": bytearray(")[0].rstrip(".") or type(error).__name__
+    if isinstance(error, httpx.ProxyError):
+        return f"the proxy does not pass the request on ({text}): check HTTP_PROXY, HTTPS_PROXY and NO_PROXY"
+    for words, cause, cure in _FAULTS:
+        if any(word in text.lower() for word in words):
+            return f"{cause} ({text}): {cure}"
+    return f"no connection to the server ({text}): check --api-base and the network"
+
+
+def _unreadable(body: bytes) -> str:
+    """What is wrong with the body of a reply; said only if the client library cannot read it either."""
+    try:
+        text = body.decode()
+        sent = json.loads(text)
+    except UnicodeDecodeError:
+        return f"the reply is not text in UTF-8: {_NO_LLM}"
+    except RecursionError:
+        return f"the reply is nested too deeply to be read: {_NO_LLM}"
+    except ValueError:
+        begins = text[:_LONGEST_BEGINNING].strip()
+        found = f"it begins with {begins!r}" if begins else "it is empty"
+        return (
+            f"the reply is not JSON ({found}): check --api-base, which for most servers ends with /v1, and "
+            "the server's log; a proxy or a page for signing in may answer in its place"
+        )
+    error = sent.get("error") if isinstance(sent, dict) else None
+    if error:
+        return f"the server reports: {error}" if isinstance(error, str) else ""
+    begins = text[:_LONGEST_BEGINNING].strip()
+    return (
+        f"the reply does not have the form of an LLM's (it begins with {begins!r}): check --api-base, and "
+        "that the LLM's name begins with the provider whose interface the server has"
+    )
 
 
 _CALL: ContextVar[_Call | None] = ContextVar("_CALL", default=None)
@@ -203,24 +320,6 @@ def _guard_transport() -> None:
         return handle(self, request) if call is None else call.send(handle, self, request)
 
     httpx.HTTPTransport.handle_request = handle_request  # type: ignore[method-assign]
-
-
-def _limited_stream(inner: Any, call: _Call) -> Any:
-    import httpx
-
-    class Limited(httpx.SyncByteStream):
-        def __iter__(self) -> Iterator[bytes]:
-            received = 0
-            for part in inner:
-                received += len(part)
-                if received > _MOST_BYTES:
-                    call.refuse(_too_long())
-                yield part
-
-        def close(self) -> None:
-            inner.close()
-
-    return Limited()
 
 
 def _too_long() -> str:

@@ -1,11 +1,12 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from falsifier.core.secrets import is_secret_option
+from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.llm.messages import ReplyKind
+from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
@@ -47,6 +48,11 @@ class LLMSettings(_Strict):
     fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 
+    @model_validator(mode="after")
+    def _without_password(self) -> Self:
+        check_address(self.name, self.api_base)
+        return self
+
     @field_validator("options")
     @classmethod
     def _without_keys(cls, options: dict[str, str | int | float]) -> dict[str, str | float]:
@@ -55,6 +61,9 @@ class LLMSettings(_Strict):
                 f"{name}: may contain a key; keys are read from the environment only, because requests are "
                 "recorded"
             )
+        for name, value in options.items():
+            if isinstance(value, str) and holds_credentials(value):
+                raise ValueError(f"{name}: contains a user name or a password, and requests are recorded")
         return options
 
 

@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from falsifier.core.literals import plain
+from falsifier.core.secrets import redact
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,9 +27,9 @@ class Live(Protocol):
 
 
 def warn(text: str) -> None:
-    """Print a message for people on stderr, if that can be written to."""
+    """Print a message for people on stderr, without secrets, if that can be written to."""
     with suppress(OSError):
-        print(plain(text), file=sys.stderr, flush=True)
+        print(plain(redact(text)), file=sys.stderr, flush=True)
 
 
 def error_console() -> "Console":

@@ -2,14 +2,17 @@
 
 import json
 import string
+from base64 import b64encode
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from falsifier.core.secrets import redact, redact_held
+from falsifier.core.secrets import holds_credentials, redact, redact_held
+from falsifier.errors import ChatSetupError
 from falsifier.fmu.environment import worker_environment
+from falsifier.search.request import LLMSettings
 from tests.command import Done, falsifier
 from tests.hostile.servers import Behaviour, answers, completion, misbehaving, response, sends
 
@@ -96,3 +99,69 @@ def test_what_a_model_says_cannot_act_on_the_terminal(tmp_path: Path) -> None:
     seen = done.out + done.err
     assert "samples" in seen or "simulation" in seen
     assert "owned" not in seen and "\x1b[2J" not in seen and "\u202e" not in seen
+
+
+PASSWORD = "a-plain-password"
+
+
+@pytest.mark.parametrize("at", ["http://me:{}@127.0.0.1:9/v1", "me:{}@host/v1", "http://me:a/{}@host/v1"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "AT1", "--llm", "openai/m", "--out", "run", "--api-base"),
+        ("bench", "AT1", "--llm", "openai/m", "--out", "run", "--yes", "--api-base"),
+        ("llm", "check", "openai/m", "--api-base"),
+        ("formalize", "AT1", "fast", "--llm", "openai/m", "--api-base"),
+        ("bench", "AT1", "--out", "run", "--executor"),
+    ],
+    ids=lambda command: " ".join((command[0], command[-1])),
+)
+def test_an_address_with_a_password_is_refused_and_not_repeated(
+    tmp_path: Path, command: tuple[str, ...], at: str
+) -> None:
+    at = f"dask:{at}" if command[-1] == "--executor" else at
+    done = falsifier(*command, at.format(PASSWORD), cwd=tmp_path)
+    assert done.code == 2
+    assert f"{command[-1]}:" in done.err
+    assert command[-1] == "--executor" or "environment variable OPENAI_API_BASE" in done.err
+    assert PASSWORD not in done.out + done.err + recorded(tmp_path)
+
+
+def test_an_option_with_a_password_is_refused() -> None:
+    with pytest.raises(ValueError, match="base_url: contains a user name or a password") as caught:
+        LLMSettings(name="openai/m", options={"base_url": f"http://me:{PASSWORD}@host"})
+    assert PASSWORD not in str(caught.value)
+    with pytest.raises(ChatSetupError, match="environment variable HOSTED_VLLM_API_BASE"):
+        LLMSettings(name="hosted_vllm/m", api_base=f"http://me:{PASSWORD}@host")
+
+
+def test_an_address_in_the_environment_is_used_with_its_password_and_shown_without(tmp_path: Path) -> None:
+    page = response(f"<html>{PASSWORD}, me:{PASSWORD}".encode(), status="418 X")
+    with misbehaving(sends(page)) as server:
+        address = server.url.replace("://", f"://me:{PASSWORD}@")
+        done = falsifier(
+            *("run", "AT1", "--llm", "openai/m", "--budget", "2", "--out", "run", "--no-cache"),
+            cwd=tmp_path,
+            env={"OPENAI_API_BASE": address, "HTTP_PROXY": "", "http_proxy": ""},
+        )
+        sent = b64encode(f"me:{PASSWORD}".encode())
+        assert server.requests and all(b"Basic " + sent in request for request in server.requests)
+    seen = done.out + done.err + recorded(tmp_path)
+    assert "[redacted]" in seen
+    assert PASSWORD not in seen
+
+
+@pytest.mark.parametrize("option", ["--llm", "--engine", "--budget", "--no-such-option"])
+def test_an_address_in_the_wrong_place_is_not_repeated_either(tmp_path: Path, option: str) -> None:
+    done = falsifier("run", "AT1", f"{option}=http://me:{PASSWORD}@host/v1", cwd=tmp_path)
+    assert done.code == 2
+    assert PASSWORD not in done.out + done.err
+
+
+@given(st.text(LETTERS + "/:@-_.", min_size=6, max_size=20), st.text(LETTERS + "/:-_.", max_size=20))
+def test_credentials_in_an_address_are_found_and_addresses_without_them_stay(word: str, path: str) -> None:
+    # Digits and a slash would be a port and a path.
+    assert holds_credentials(f"http://me:x{word}@host/{path}")
+    assert holds_credentials(f"me:x{word}@host/{path}")
+    assert not holds_credentials(f"http://host:8000/{path}@x")
+    assert not holds_credentials(f"http://[::1]:8000/{path}")

@@ -1,6 +1,8 @@
 """Servers of language models that hang, trickle, send garbage or redirect: every call ends, and in time."""
 
 import json
+import socket
+import struct
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -187,19 +189,89 @@ def test_a_compressed_reply_is_not_unpacked() -> None:
 
 
 @pytest.mark.parametrize("status", [301, 302, 303, 307, 308])
-def test_no_prompt_follows_a_redirect_to_another_server(status: int) -> None:
+@pytest.mark.parametrize(
+    "path", ["/v2/chat/completions", "/v1/chat/completions", ""], ids=["on", "loop", "-"]
+)
+def test_no_prompt_follows_a_redirect(status: int, path: str) -> None:
     with misbehaving(answers()) as other:
-        moved = response(b"", status=f"{status} Moved", headers=f"location: {other.url}/chat/completions\r\n")
-        with misbehaving(sends(moved)) as server:
+        place = f"{other.root}{path}" if path == "/v2/chat/completions" else path
+        header = f"location: {place}\r\n" if path else ""
+        with misbehaving(sends(response(b"", status=f"{status} Moved", headers=header))) as server:
             (error,) = ended(lambda: connect("openai/m", api_base=server.url).complete(REQUEST))
             assert len(server.requests) == 1
         assert not other.requests
     assert isinstance(error, ChatError)
-    assert f"redirects to {other.root}" in str(error) and "--api-base" in str(error)
+    expected = f"redirects to {other.root}/v2," if "v2" in path else "redirects to the same address"
+    assert expected in str(error) and "--api-base" in str(error)
 
 
-def test_a_redirect_within_the_server_is_followed() -> None:
-    moved = response(b"", status="307 Temporary Redirect", headers="location: /v2/chat/completions\r\n")
-    with misbehaving(sends(moved), answers("fine")) as server:
-        assert LiteLLMChat("openai/m", api_base=server.url).complete(REQUEST).text == "fine"
-    assert b"/v2/chat/completions" in server.requests[1].split(b"\r\n")[0]
+def resets(after: bytes) -> Behaviour:
+    """Send something and cut the connection without closing it."""
+
+    def behave(connection: socket.socket, _request: bytes, _closed: threading.Event) -> None:
+        connection.sendall(after)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+
+    return behave
+
+
+BROKEN: dict[str, tuple[Behaviour, str]] = {
+    "reset": (resets(b""), "connection was cut"),
+    "hang up": (sends(b""), "closed the connection without a reply"),
+    "reset in the body": (resets(HEAD + b"content-length: 100\r\n\r\n{"), "connection was cut"),
+    "end in the body": (sends(HEAD + b"content-length: 100\r\n\r\n{"), "cut within the reply"),
+    "end in a chunk": (sends(CHUNKED + b"ff\r\n{"), "cut within the reply"),
+    "oversized headers": (sends(HEAD + b"x: " + b"a" * 300_000 + b"\r\n\r\n{}"), "headers of more than"),
+    "no http": (sends(b"\x15\x03\x01\x00\x02\x02\x46"), "does not answer in HTTP"),
+    "chunk garbage": (sends(CHUNKED + b"zz\r\nhello\r\n"), "no valid HTTP"),
+    "half a JSON": (sends(response(b'{"id": ')), "not JSON (it begins with '{\"id\":')"),
+    "a page": (sends(response(b"<html><body>Sign in</body></html>")), "not JSON (it begins with '<html>"),
+    "nothing": (sends(response(b"")), "not JSON (it is empty)"),
+    "no UTF-8": (sends(response(b'{"id": "\xff\xfe"}')), "not text in UTF-8"),
+    "depth": (sends(response(b"[" * 100_000)), "nested too deeply"),
+    "no choices": (sends(response(b'{"id": "1", "choices": []}')), "does not have the form"),
+    "a list": (sends(response(b"[]")), "does not have the form"),
+    "an error as text": (sends(response(b'{"error": "model not loaded"}')), "model not loaded"),
+    "a page of a proxy": (
+        sends(response(b"<html>\n<title>502 Bad Gateway</title>\n</html>", status="502 x")),
+        "502 Bad Gateway",
+    ),
+}
+
+
+@pytest.mark.parametrize("llm", ["openai/m", "hosted_vllm/m"])
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_reply_that_is_none_is_told_with_its_cause_and_cure_in_one_line(what: str, llm: str) -> None:
+    behaviour, cause = BROKEN[what]
+    with misbehaving(behaviour) as server:
+        (error,) = ended(lambda: LiteLLMChat(llm, api_base=server.url, timeout=HANG).complete(REQUEST))
+        assert isinstance(error, ChatError)
+        told = str(error)
+        assert told.startswith(f"{llm} at {server.url}: ") and "\n" not in told
+    assert cause in told
+    assert "<class" not in told and "bytearray" not in told and not told.endswith("Connection error")
+    if "502" not in cause and "loaded" not in cause:
+        assert "check" in told or "its log" in told
+
+
+def test_a_server_without_a_name_is_told() -> None:
+    chat = LiteLLMChat("openai/m", api_base="http://no-such-host.invalid/v1", timeout=HANG)
+    (error,) = ended(lambda: chat.complete(REQUEST))
+    assert isinstance(error, ChatError)
+    assert "name is not known" in str(error) and "--api-base" in str(error)
+
+
+def test_https_to_a_server_without_tls_is_told() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def answer() -> None:
+            connection, _ = listening.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(b"HTTP/1.1 400 Bad\r\n\r\n")
+
+        threading.Thread(target=answer, daemon=True).start()
+        address = f"https://127.0.0.1:{listening.getsockname()[1]}/v1"
+        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=address, timeout=HANG).complete(REQUEST))
+    assert isinstance(error, ChatError)
+    assert "does not speak TLS" in str(error) and "http or https in --api-base" in str(error)
