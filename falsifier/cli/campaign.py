@@ -51,6 +51,8 @@ from falsifier.cli.options import (
     objective_option,
     out_option,
     parameterization_option,
+    policy_changes,
+    policy_options,
     profile_option,
     quiet_option,
     seed_option,
@@ -93,6 +95,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     help="Parameterization of the suite, as the category numbers it.",
 )
 @profile_option
+@policy_options
 @parameterization_option(multiple=True, suite=PROTOCOL_PARAMETERIZATION)
 @engine_option(multiple=True)
 @llm_option(multiple=True)
@@ -172,7 +175,8 @@ def bench(
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
     check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
-    problems = _with_context(problems, context)
+    rights = policy_changes(options)
+    problems = [source.model_copy(update={"changes": rights}) for source in _with_context(problems, context)]
     if not llms:
         refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     if not parameterization:

@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
+from falsifier.problem.sections import ModelChanges
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS
@@ -61,6 +62,31 @@ def template_option(command: Function) -> Function:
         metavar="'NAME KEY=VALUE ...'",
         help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
     )(command)
+
+
+def policy_options(command: Function) -> Function:
+    """Add what FMUs may do."""
+    return add(
+        command,
+        click.option(
+            "--allow",
+            multiple=True,
+            metavar="write:PATH|read:PATH|programs",
+            help="What the FMU may do beyond changing its own folders: change PATH, read PATH although it "
+            "may hold keys, execute programs. In addition to the spec's. Repeatable.",
+        ),
+        click.option(
+            "--deny",
+            multiple=True,
+            metavar="network",
+            help="What the FMU may not do: open network connections, for example to a licence server.",
+        ),
+    )
+
+
+def policy_changes(options: dict[str, Any]) -> ModelChanges:
+    """Take the values of policy_options out of a command's keyword arguments."""
+    return changes_from_options(allow=options.pop("allow"), deny=options.pop("deny"))
 
 
 def problem_options(command: Function) -> Function:
@@ -119,6 +145,7 @@ def problem_options(command: Function) -> Function:
             metavar="SECONDS",
             help="Maximum wall-clock time of one simulation; default: the spec's, or 60.",
         ),
+        policy_options,
     )
 
 
@@ -133,7 +160,10 @@ def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[
 
 def problem_source(options: dict[str, Any]) -> ProblemSource:
     """Take the values of problem_options out of a command's keyword arguments."""
-    varied = ("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface")
+    varied = (
+        *("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface"),
+        *("allow", "deny"),
+    )
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
     context = options.pop("context", ())
     stated = {

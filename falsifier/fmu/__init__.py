@@ -3,6 +3,7 @@
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
 from falsifier.fmu.isolation import stop_simulations
+from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.ssp import is_package, read_package
 from falsifier.fmu.systems.network import Coupling, Frame
@@ -15,6 +16,7 @@ __all__ = [
     "Coupling",
     "FmuModel",
     "Frame",
+    "Policy",
     "System",
     "fmu_files",
     "fmus_sha256",
@@ -22,6 +24,7 @@ __all__ = [
     "is_packaged",
     "read_info",
     "read_package",
+    "resolved",
     "stop_simulations",
     "with_local_files",
 ]

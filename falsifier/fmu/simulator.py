@@ -17,6 +17,7 @@ from falsifier.fmu import in_process
 from falsifier.fmu.description import Description, archive, describe, needed_tool_text
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.fmu.plan import make_plan
+from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
 from falsifier.fmu.worker_order import Order
 
@@ -32,10 +33,14 @@ class FmuModel:
         logging: whether to ask the FMU for messages in every simulation; otherwise only after a failure.
         windows: whether to simulate the library for 64-bit Windows, through Wine, although there is another;
             if there is no other for this machine, that happens anyway.
+        allow: what the FMU may do beyond changing its own folders: ``write:PATH``, ``read:PATH`` (a file or
+            folder that may hold keys), ``programs`` (execute programs).
+        deny: what it may not do: ``network`` (open connections).
         sha256: hash of the file; models with different files are not equal.
 
     Raises:
         ModelError: if the file is not an FMU or does not offer the interface.
+        SpecError: if what is allowed or denied is unknown, or a path does not exist.
     """
 
     path: Path
@@ -43,9 +48,14 @@ class FmuModel:
     isolate: bool = field(default=True, kw_only=True)
     logging: bool = field(default=False, kw_only=True)
     windows: bool = field(default=False, kw_only=True)
+    allow: tuple[str, ...] = field(default=(), kw_only=True)
+    deny: tuple[str, ...] = field(default=(), kw_only=True)
     sha256: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
+        for name in ("allow", "deny"):
+            object.__setattr__(self, name, resolved(getattr(self, name), Path()))
+        Policy.of(self.allow, self.deny)
         object.__setattr__(self, "path", Path(self.path).absolute())
         object.__setattr__(self, "sha256", archive.file_hash(self.path))
         _check_interface(self)

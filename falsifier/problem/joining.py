@@ -105,7 +105,7 @@ def join(
             file,
         ),
         fixed,
-        (*model.info.notes, *_notes(grid, model.info, known)),
+        (*model.info.notes, *_notes(grid, model.info, known), *_rights(model)),
     )
 
 
@@ -177,6 +177,7 @@ def join_system(
         SpecError: naming what is unknown and the option that specifies it.
     """
     components = {each: {"fmu": str(part.fmu)} for each, part in system.parts.items()}
+    system = replace(system, allow=(*system.allow, *changes.allow), deny=(*system.deny, *changes.deny))
     return _join_formula(
         {"components": components},
         system.info,
@@ -296,6 +297,13 @@ def _notes(grid: Grid | None, info: ModelInfo, known: Collection[str]) -> Iterat
     unset = [v.name for v in info.inputs if v.name not in known]
     if unset:
         yield f"inputs without a start value, left to the {info.noun}: {', '.join(unset)}"
+
+
+def _rights(model: Model) -> Iterator[str]:
+    """Say what a spec or an option lets the FMU do, which the user may not have written."""
+    for name, said in (("allow", "may also"), ("deny", "may not use")):
+        if words := getattr(model, name, ()):
+            yield f"the {model.info.noun} {said}: {', '.join(words)}"
 
 
 def _recording(

@@ -78,6 +78,8 @@ def load_problem(
     time_limit: float | None = None,
     interface: Interface | None = None,
     context: Sequence[str] = (),
+    allow: Sequence[str] = (),
+    deny: Sequence[str] = (),
 ) -> Problem:
     """Load one problem.
 
@@ -96,6 +98,8 @@ def load_problem(
         time_limit: maximum wall-clock time of one simulation in s.
         interface: interface with which the FMU is simulated.
         context: files that a language model may read, ``fmu`` or ``none``; see ProblemSource.
+        allow: what the FMU may do beyond what the spec allows: ``write:PATH``, ``read:PATH``, ``programs``.
+        deny: what it may not do: ``network``.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -108,6 +112,8 @@ def load_problem(
         output_interval=output_interval,
         time_limit=time_limit,
         interface=interface,
+        allow=allow,
+        deny=deny,
     )
     return load_source(
         ProblemSource(

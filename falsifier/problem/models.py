@@ -11,10 +11,12 @@ from falsifier.fmu import (
     Connection,
     Coupling,
     FmuModel,
+    Policy,
     System,
     is_package,
     read_info,
     read_package,
+    resolved,
 )
 from falsifier.problem.sections import ModelChanges
 from falsifier.problem.spec import Spec
@@ -34,11 +36,19 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     """
     stated = [layer.logging for layer in layers if layer.logging is not None]
     logging = stated[-1] if stated else spec.model.logging
+    allowed = (*spec.model.allow, *(word for layer in layers for word in layer.allow))
+    allow = resolved(allowed, path.parent)
+    deny = (*spec.model.deny, *(word for layer in layers for word in layer.deny))
+    try:
+        Policy.of(allow, deny)
+    except SpecError as error:
+        raise SpecError(str(error), file=str(path), key="model") from None
     if is_system(spec):
         _check_interface(spec, layers, str(path))
-        return make_system(spec, path, logging=logging)
+        return replace(make_system(spec, path, logging=logging), allow=allow, deny=deny)
     fmu = _existing(path, spec.model.fmu or "", "model.fmu")
-    return FmuModel(fmu, interface=_interface(spec, layers, read_info(fmu), str(path)), logging=logging)
+    interface = _interface(spec, layers, read_info(fmu), str(path))
+    return FmuModel(fmu, interface=interface, logging=logging, allow=allow, deny=deny)
 
 
 def is_system(spec: Spec) -> bool:

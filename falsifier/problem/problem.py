@@ -77,6 +77,8 @@ class Problem:
         time_limit: float | None = None,
         interface: Interface | None = None,
         context: Sequence[str] = (),
+        allow: Sequence[str] = (),
+        deny: Sequence[str] = (),
     ) -> Self:
         """Return the problem for an FMU and a formula.
 
@@ -95,6 +97,9 @@ class Problem:
             time_limit: maximum wall-clock time of one simulation in s; default: 60.
             interface: interface of the FMU; default: co-simulation if the FMU offers it.
             context: files that a language model may read, and ``fmu`` for what lies inside the FMU.
+            allow: what the FMU may do beyond changing its own folders: ``write:PATH``, ``read:PATH`` (a file
+                or folder that may hold keys), ``programs`` (execute programs).
+            deny: what it may not do: ``network`` (open connections).
 
         Raises:
             SpecError: naming what is wrong or unknown.
@@ -113,6 +118,8 @@ class Problem:
             tolerance=tolerance,
             time_limit=time_limit,
             interface=interface,
+            allow=allow,
+            deny=deny,
         )
         joined = join_fmu(Path(fmu), formula, changes=changes, name=name)
         source = ProblemSource(

@@ -128,6 +128,12 @@ class ModelSection(Strict):
     )
     logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
+    allow: tuple[str, ...] = Field(
+        (),
+        description="What the FMU may do beyond changing its own folders: write:PATH, read:PATH (a file or "
+        "folder that may hold keys), programs (execute programs).",
+    )
+    deny: tuple[str, ...] = Field((), description="What it may not do: network (open connections).")
 
 
 class ComponentSection(Strict):
@@ -220,6 +226,8 @@ class ModelChanges(Strict):
     tolerance: Seconds | None = None
     time_limit: Seconds | None = None
     logging: bool | None = None
+    allow: tuple[str, ...] = ()
+    deny: tuple[str, ...] = ()
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
 

@@ -11,6 +11,7 @@ from falsifier.core.arguments import instance
 from falsifier.core.model import Interface
 from falsifier.core.signals import INTERPOLATIONS
 from falsifier.errors import SpecError, did_you_mean, rejected
+from falsifier.fmu import resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 
 _DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
@@ -34,6 +35,8 @@ def changes_from(
     *,
     inputs: Mapping[str, InputChoice],
     parameters: Mapping[str, ParameterChoice],
+    allow: Iterable[str] = (),
+    deny: Iterable[str] = (),
     **experiment: float | Interface | None,
 ) -> ModelChanges:
     """Return the changes for Python values.
@@ -41,6 +44,8 @@ def changes_from(
     Args:
         inputs: choices by input name.
         parameters: choices by parameter name.
+        allow: what the FMU may do beyond simulating; see Policy. Paths begin in the current folder.
+        deny: what it may not do.
         experiment: fields of ModelChanges; None leaves a field unchanged.
 
     Raises:
@@ -49,15 +54,16 @@ def changes_from(
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
     sections = {name: _input_section(name, choice) for name, choice in inputs.items()}
-    return _changes(
-        sections, {name: _parameter_section(name, choice) for name, choice in parameters.items()}, experiment
-    )
+    named = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
+    return _changes(sections, named, experiment, allow, deny)
 
 
 def changes_from_options(
     *,
     inputs: Iterable[str] = (),
     parameters: Iterable[str] = (),
+    allow: Iterable[str] = (),
+    deny: Iterable[str] = (),
     **experiment: float | Interface | None,
 ) -> ModelChanges:
     """Return the changes for command-line options.
@@ -68,14 +74,15 @@ def changes_from_options(
             (searched as in the spec, or between the FMU's min and max) or ``name=value`` (kept constant).
         parameters: ``name=value`` (fixed), ``name=low:high`` (searched) or ``name=text`` (a string; a file is
             named relative to the current folder).
+        allow: ``write:PATH``, ``read:PATH`` or ``programs``; paths begin in the current folder.
+        deny: ``network``.
         experiment: fields of ModelChanges; None leaves a field unchanged.
 
     Raises:
         SpecError: naming the option that is invalid.
     """
-    return _changes(
-        _once("--input", map(_input, inputs)), _once("--param", map(_parameter, parameters)), experiment
-    )
+    parameter_sections = _once("--param", map(_parameter, parameters))
+    return _changes(_once("--input", map(_input, inputs)), parameter_sections, experiment, allow, deny)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
@@ -90,16 +97,24 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     for field in ("interface", "stop_time", "output_interval", "time_limit"):
         if (value := getattr(changes, field)) is not None:
             options.append((f"--{field.replace('_', '-')}", str(value)))
-    return options
+    return [
+        *options,
+        *(("--allow", word) for word in changes.allow),
+        *(("--deny", word) for word in changes.deny),
+    ]
 
 
 def _changes(
     inputs: Mapping[str, object],
     parameters: Mapping[str, object],
     experiment: Mapping[str, float | Interface | None],
+    allow: Iterable[str],
+    deny: Iterable[str],
 ) -> ModelChanges:
     data: dict[str, Any] = {"inputs": inputs, "parameters": parameters}
     data |= {name: value for name, value in experiment.items() if value is not None}
+    rights = {"allow": resolved(allow, Path()), "deny": tuple(deny)}
+    data |= {name: words for name, words in rights.items() if words}
     try:
         return ModelChanges.model_validate(data)
     except ValidationError as error:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.fmu import Coupling, System
+from falsifier.fmu import Coupling, FmuModel, System
 from falsifier.problem.loading import load_problem
 from tests.fmu.fixtures import path
 
@@ -129,3 +129,48 @@ def test_wrong_specs_name_the_file_the_key_and_the_cure(text: str, message: str,
     with pytest.raises(SpecError, match=re.escape(message)) as wrong:
         load_problem(write(tmp_path, text))
     assert str(wrong.value).startswith(f"{tmp_path}/cruise.toml: ")
+
+
+RIGHTS = f"""
+[model]
+fmu = "{path("Plant_2")}"
+stop_time = 10.0
+allow = ["write:logs"]
+[inputs.u]
+range = [0.0, 1.0]
+control_points = 3
+[requirements.R]
+formula = "G[0,10] (y <= 0.8)"
+deny = ["network"]
+"""
+
+
+def test_what_an_fmu_may_do_comes_from_spec_requirement_and_options(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    problem = load_problem(write(tmp_path, RIGHTS), allow=["programs"])
+    assert isinstance(problem.model, FmuModel)
+    assert problem.model.allow == (f"write:{tmp_path / 'logs'}", "programs")
+    assert problem.model.deny == ("network",)
+    assert any("may also: write:" in note and "programs" in note for note in problem.notes)
+
+
+def test_a_system_gets_the_same(tmp_path: Path) -> None:
+    text = '[model]\ndeny = ["network"]\n' + COMPONENTS + CONNECTIONS + REST
+    problem = load_problem(write(tmp_path, text), allow=["programs"])
+    assert isinstance(problem.model, System)
+    assert (problem.model.allow, problem.model.deny) == (("programs",), ("network",))
+
+
+@pytest.mark.parametrize(
+    ("allow", "deny", "message"),
+    [
+        ("write:absent", "", "absent: there is no such file or folder; create it first"),
+        ("reading", "", "unknown 'reading'.*write:PATH, read:PATH, programs"),
+        ("", "files", "unknown 'files'.*network"),
+    ],
+)
+def test_rights_that_do_not_exist_are_named(tmp_path: Path, allow: str, deny: str, message: str) -> None:
+    (tmp_path / "logs").mkdir()
+    file = write(tmp_path, RIGHTS)
+    with pytest.raises(SpecError, match=f"cruise.toml: model: .*{message}"):
+        load_problem(file, allow=[allow] if allow else [], deny=[deny] if deny else [])

@@ -29,6 +29,7 @@ def test_options_that_cannot_be_read_are_named(option: str, message: str) -> Non
         {"inputs": ["u=0:1:3"], "stop_time": 5.0},
         {"inputs": ["u=-0.1:0.3:3:linear", "v=0.25", "w"], "parameters": ["p=1e-07", "q=0:0.1"]},
         {"interface": "model-exchange", "output_interval": 0.01},
+        {"allow": ["write:/data/logs", "programs"], "deny": ["network"]},
         {},
     ],
 )
@@ -39,7 +40,7 @@ def test_changes_can_be_said_as_options_again(options: dict[str, Any]) -> None:
         key = {"--input": "inputs", "--param": "parameters"}.get(
             name, name.removeprefix("--").replace("-", "_")
         )
-        if key in ("inputs", "parameters"):
+        if key in ("inputs", "parameters", "allow", "deny"):
             said.setdefault(key, []).append(value)
         else:
             said[key] = value

@@ -16,6 +16,7 @@ from falsifier.fmu import in_process
 from falsifier.fmu.description import archive
 from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.fmu.plan import make_plan
+from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.systems.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
 from falsifier.fmu.systems.wiring import Connection, make_network
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
@@ -64,6 +65,8 @@ class System:
         package: the SSP package that it was read from, if it was.
         isolate: whether to simulate in a worker process; if not, a crash of an FMU crashes this process.
         logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
+        allow: what the FMUs may do; see FmuModel.
+        deny: what they may not do.
         key: hash of everything that determines the trajectories: FMUs, steps, connections, coupling, frame.
 
     Raises:
@@ -85,8 +88,13 @@ class System:
     key: str = field(default="", init=False, repr=False, compare=False)
     isolate: bool = field(default=True, kw_only=True)
     logging: bool = field(default=False, kw_only=True)
+    allow: tuple[str, ...] = field(default=(), kw_only=True)
+    deny: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
+        for name in ("allow", "deny"):
+            object.__setattr__(self, name, resolved(getattr(self, name), Path()))
+        Policy.of(self.allow, self.deny)
         instance("components", self.components, Mapping, "FMUs by name")
         instance("connections", self.connections, Mapping, "outputs by input")
         if not self.components:

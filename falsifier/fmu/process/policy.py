@@ -1,0 +1,235 @@
+"""What FMUs may do: what users allow and deny, what that means on this machine, and what was refused."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from falsifier.core.printable import printable
+from falsifier.errors import SpecError, did_you_mean
+
+# Letters and bits of worker/sandbox.h.
+_WRITABLE, _READABLE, _HIDDEN, _PROGRAMS, _NETWORK, _WINE, _MEMORY, _COMMAND = b"WRHPNIMC"
+_FILES, _PROCESSES, _SYSTEM_CALLS, _REFUSALS = 1, 2, 4, 8
+
+_PROGRAMS_WORD, _NETWORK_WORD = "programs", "network"
+_PATHS = ("write", "read")
+
+# What holds keys and passwords in a home folder, and what talks to those who hold them.
+_IN_HOME = """
+.ssh .gnupg .netrc .config .aws .azure .kube .docker .gsutil .boto .s3cfg .oci .databrickscfg .kaggle .env
+.git-credentials .pypirc .npmrc .yarnrc .yarnrc.yml .condarc .wgetrc .curlrc .pgpass .my.cnf .smbcredentials
+.vault-token .terraformrc .terraform.d .m2/settings.xml .m2/settings-security.xml .gradle/gradle.properties
+.cargo/credentials .cargo/credentials.toml .gem/credentials .composer/auth.json .nuget/NuGet .huggingface
+.cache/huggingface/token .cache/huggingface/stored_tokens .password-store .local/share/keyrings
+.local/share/kwalletd .local/share/python_keyring .claude .claude.json .codex .gemini .openai .anthropic
+.continue .cursor .vscode .vscode-server .jupyter .mozilla .thunderbird .pki .var/app snap .dbus .Xauthority
+.ICEauthority .vnc .bitcoin .electrum .bash_history .zsh_history .python_history .sh_history .psql_history
+.mysql_history .lesshst .viminfo Library/Keychains
+"""
+# Variables that name such files and folders.
+_NAMED = """
+XDG_CONFIG_HOME GNUPGHOME NETRC AWS_SHARED_CREDENTIALS_FILE AWS_CONFIG_FILE KUBECONFIG XAUTHORITY BOTO_CONFIG
+GOOGLE_APPLICATION_CREDENTIALS CLOUDSDK_CONFIG AZURE_CONFIG_DIR DOCKER_CONFIG PIP_CONFIG_FILE HF_TOKEN_PATH
+NPM_CONFIG_USERCONFIG PGPASSFILE XDG_RUNTIME_DIR
+"""
+# Devices, sockets and keys of the machine.
+_OF_MACHINE = "/dev /run/user /run/secrets /run/credentials /var/run/secrets"
+# What nobody else could read.
+_OF_ROOT = """
+/etc/shadow /etc/shadow- /etc/gshadow /etc/gshadow- /etc/ssh /etc/ssl/private /etc/krb5.keytab /etc/kubernetes
+/etc/rancher /etc/NetworkManager/system-connections /var/lib/kubelet
+"""
+
+# The refusals that an error tells.
+_SHOWN_REFUSALS = 3
+_ADVICE = "allow it with `--allow {}`"
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """What an FMU may do beyond reading files and changing those of its own folders.
+
+    Attributes:
+        writable: files and folders that it may change, with all below.
+        readable: files and folders that it may read although they may hold keys.
+        programs: whether it may execute programs.
+        network: whether it may open connections.
+    """
+
+    writable: tuple[Path, ...] = ()
+    readable: tuple[Path, ...] = ()
+    programs: bool = False
+    network: bool = True
+
+    @classmethod
+    def of(cls, allow: Iterable[str], deny: Iterable[str] = ()) -> "Policy":
+        """Return the policy for what a user allows and denies.
+
+        Args:
+            allow: ``write:PATH``, ``read:PATH``, ``programs``; paths are absolute or begin in this folder.
+            deny: ``network``.
+
+        Raises:
+            SpecError: naming what is not one of these.
+        """
+        paths: dict[str, list[Path]] = {kind: [] for kind in _PATHS}
+        programs, network = False, True
+        for word in allow:
+            kind, colon, path = word.partition(":")
+            if colon and kind in paths and path.strip():
+                paths[kind].append(_existing(word, path))
+            elif word == _PROGRAMS_WORD:
+                programs = True
+            else:
+                raise SpecError(f"allow: {_wrong(word, ('write:PATH', 'read:PATH', _PROGRAMS_WORD))}")
+        for word in deny:
+            if word != _NETWORK_WORD:
+                raise SpecError(f"deny: {_wrong(word, (_NETWORK_WORD,))}")
+            network = False
+        return cls(tuple(paths["write"]), tuple(paths["read"]), programs, network)
+
+
+def resolved(allow: Iterable[str], folder: Path) -> tuple[str, ...]:
+    """Return what is allowed with absolute paths; others begin in this folder, ``~`` is the home.
+
+    >>> resolved(["programs", "write:/data/logs"], Path("/spec"))
+    ('programs', 'write:/data/logs')
+    """
+    found = []
+    for word in allow:
+        kind, colon, path = word.partition(":")
+        if colon and kind in _PATHS and path.strip():
+            word = f"{kind}:{(folder / Path(path.strip()).expanduser()).absolute()}"
+        found.append(word)
+    return tuple(found)
+
+
+def _existing(word: str, path: str) -> Path:
+    found = Path(path.strip()).expanduser()
+    if not found.exists():
+        raise SpecError(f"allow {word}: there is no such file or folder; create it first")
+    return found.resolve()
+
+
+def _wrong(word: str, known: Sequence[str]) -> str:
+    return f"unknown {word!r}; {did_you_mean(word, known)}"
+
+
+def hidden_places(environment: Mapping[str, str], home: Path, *, is_root: bool) -> tuple[str, ...]:
+    """Return the files and folders that no FMU may read, whether they exist or not.
+
+    Args:
+        environment: variables that name such files.
+        home: the user's home.
+        is_root: whether FMUs could read what is root's.
+    """
+    places = [Path(place) for place in (_OF_MACHINE + (_OF_ROOT if is_root else "")).split()]
+    places += [home / name for name in _IN_HOME.split()]
+    places += [
+        Path(part) for name in _NAMED.split() for part in environment.get(name, "").split(os.pathsep) if part
+    ]
+    # Both by the path that is known and by the one that it stands for.
+    found = {os.path.normpath(place) for place in places if place.is_absolute()}
+    found |= {os.path.realpath(place) for place in places if place.is_absolute()}
+    return tuple(sorted(found - {"/", os.path.realpath(home)}))
+
+
+def encoded(
+    policy: Policy,
+    folders: Sequence[Path],
+    hidden: Sequence[str],
+    *,
+    memory: int,
+    readable: Sequence[Path] = (),
+    command: Sequence[str] = (),
+) -> bytes:
+    """Return what the guard of a worker is told; see worker/guard.c.
+
+    Args:
+        policy: what the FMU may do.
+        folders: its own folders, the working folder first.
+        hidden: what it may not read.
+        memory: bytes that its processes may use together; 0: no limit.
+        readable: further places that it needs to read.
+        command: the program that the process becomes, which is Wine; empty: the worker itself.
+    """
+    own = [str(path) for path in (*map(Path.resolve, folders), *policy.writable)]
+    parts = [bytes([_WRITABLE]) + os.fsencode(path) for path in own]
+    parts += [bytes([_READABLE]) + os.fsencode(path.resolve()) for path in (*policy.readable, *readable)]
+    parts += [bytes([_HIDDEN]) + os.fsencode(path) for path in hidden]
+    parts += [bytes([_COMMAND]) + os.fsencode(word) for word in command]
+    parts += [bytes([_PROGRAMS])] * (policy.programs or bool(command))
+    parts += [bytes([_NETWORK])] * policy.network + [bytes([_WINE])] * bool(command)
+    parts.append(bytes([_MEMORY]) + str(memory).encode())
+    text = b"".join(part + b"\0" for part in parts)
+    return len(text).to_bytes(4, "little") + text
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What the guard of a worker has told.
+
+    Attributes:
+        cause: what ended the process, empty if the guard does not know.
+        refusals: what was refused before, and how it can be allowed; empty if nothing.
+    """
+
+    cause: str = ""
+    refusals: str = ""
+
+
+def read_told(data: bytes) -> Told:
+    """Return what a guard's bytes say; they contain names that an FMU has chosen."""
+    causes, refused = [], []
+    for part in dict.fromkeys(data.split(b"\0")):
+        kind, path = part[:1], printable(os.fsdecode(part[1:]).encode("utf-8", "replace").decode())
+        match kind:
+            case b"r":
+                causes.append(f"the FMU replaced its program by {path}")
+            case b"m":
+                causes.append("the FMU used more memory than it may")
+            case b"w":
+                advice = _ADVICE.format(f"write:{Path(path).parent}")
+                refused.append(f"tried to change {path}, which was refused; {advice}")
+            case b"x":
+                advice = _ADVICE.format(_PROGRAMS_WORD)
+                refused.append(f"tried to execute {path}, which was refused; {advice}")
+            case b"s":
+                refused.append("tried to signal another process, which was refused")
+            case b"p":
+                refused.append("tried to change the settings of another process, which was refused")
+            case b"f":
+                refused.append("tried to start more processes than it may")
+    shown = refused[:_SHOWN_REFUSALS]
+    more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
+    return Told("; ".join(causes), f"the FMU {'; it '.join(shown)}{more}" if shown else "")
+
+
+def policy_text(policy: Policy, enforced: int) -> str:
+    """Say in one line what FMUs may do on this machine.
+
+    Args:
+        policy: what users have allowed and denied.
+        enforced: bits of ``enum enforced`` in worker/sandbox.h.
+    """
+    files, calls = bool(enforced & _FILES), bool(enforced & _SYSTEM_CALLS)
+    may = [f"change files in its own folders{_also(policy.writable)}"]
+    may.append("open network connections" if policy.network else "")
+    may.append("execute programs" if policy.programs else "")
+    lacking = []
+    if not files:
+        lacking.append("that it changes no other files" + (" on purpose" if enforced & _REFUSALS else ""))
+        lacking.append("that it reads no keys")
+    if not enforced & _PROCESSES:
+        lacking.append("that it leaves other processes alone")
+    if not calls and not policy.network:
+        lacking.append("that it opens no connections")
+    if not calls and not policy.programs and not files:
+        lacking.append("that it executes no programs")
+    text = "the FMU may " + ", ".join(filter(None, may))
+    return text if not lacking else f"{text}; this system does not enforce {', '.join(lacking)}"
+
+
+def _also(paths: Iterable[Path]) -> str:
+    return "".join(f" and {path}" for path in paths)

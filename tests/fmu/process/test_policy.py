@@ -1,0 +1,50 @@
+"""What FMUs may do: in words, and as the guard of a worker is told."""
+
+from pathlib import Path
+
+from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
+
+ALL = 15
+
+
+def test_keys_are_hidden_by_every_path_that_leads_to_them(tmp_path: Path) -> None:
+    elsewhere, home = tmp_path / "elsewhere", tmp_path / "home"
+    elsewhere.mkdir()
+    home.mkdir()
+    (home / ".ssh").symlink_to(elsewhere)
+    named = {"GOOGLE_APPLICATION_CREDENTIALS": str(tmp_path / "key.json"), "XDG_CONFIG_HOME": str(home)}
+    hidden = hidden_places(named, home, is_root=False)
+    assert {str(home / ".ssh"), str(elsewhere), str(home / ".netrc"), str(tmp_path / "key.json")} <= {*hidden}
+    assert str(home) not in hidden, "an FMU may need the rest of the home"
+    assert "/etc/shadow" not in hidden
+    assert "/etc/shadow" in hidden_places({}, home, is_root=True)
+
+
+def test_the_guard_is_told_paths_without_links(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "link").symlink_to("logs")
+    policy = Policy.of([f"write:{tmp_path / 'link'}", "programs"], ["network"])
+    told = encoded(policy, [tmp_path], ["/hidden"], memory=7)
+    assert int.from_bytes(told[:4], "little") == len(told) - 4
+    real = str(tmp_path.resolve())
+    assert told[4:].decode().split("\0") == [f"W{real}", f"W{real}/logs", "H/hidden", "P", "M7", ""]
+
+
+def test_what_was_refused_is_told_with_the_way_out() -> None:
+    told = read_told(b"w/etc/x\0w/etc/x\0x/bin/sh\0s\0")
+    assert told.cause == "" and told.refusals.count("/etc/x") == 1
+    for said in ("--allow write:/etc`", "/bin/sh", "--allow programs`", "signal"):
+        assert said in told.refusals
+    assert "\x1b" not in read_told(b"w/\x1b[2J\xff\0").refusals
+    assert read_told(b"r/bin/true\0").cause.endswith("/bin/true")
+    assert read_told(b"") == read_told(b"?unknown\0")
+
+
+def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
+    usual = policy_text(Policy(), ALL)
+    assert "network" in usual and "enforce" not in usual and "programs" not in usual
+    assert "network" not in policy_text(Policy(network=False), ALL)
+    assert "/data/logs" in policy_text(Policy((Path("/data/logs"),), programs=True), ALL)
+    nothing = policy_text(Policy(network=False), 0)
+    for lacking in ("files", "keys", "processes", "connections", "programs"):
+        assert lacking in nothing.partition("not enforce")[2]
