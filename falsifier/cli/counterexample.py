@@ -53,6 +53,7 @@ from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm, other_interface
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import shown, signed
 from falsifier.views.terminal import warn
 
 # Shrinking usually reaches a local minimum with fewer simulations.
@@ -171,7 +172,7 @@ def _shrink(
     say(shrunk_line(problem, shrunk, budget))
     say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
     half = ", half of the original's; --margin changes it" if margin is None else ""
-    say(f"  margin         at least {shrunk.least_margin:.6g} was kept{half}")
+    say(f"  margin         at least {shown(shrunk.least_margin):.6g} was kept{half}")
     for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
         say(f"  {line}")
     say(f"  files          {', '.join(map(str, written))}")
@@ -343,7 +344,7 @@ def _subject(found: Subject) -> Iterator[tuple[Problem, Evaluation]]:
 def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
     evaluation = evaluate(problem, problem.space.admit(Candidate.from_json(stored.candidate)))
     if not evaluation.violated:
-        found = evaluation.reason or f"its robustness is now {evaluation.robustness:+.6g}"
+        found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"
         raise SpecError(
             f"the counterexample of {problem.name} no longer violates: {found}; to search for another one: "
             "falsifier run"
@@ -352,7 +353,7 @@ def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
 
 
 def _inputs_line(evaluation: Evaluation) -> str:
-    return f"{in_one_line(evaluation.candidate)}; robustness {evaluation.robustness:+.6g}"
+    return f"{in_one_line(evaluation.candidate)}; robustness {signed(evaluation.robustness)}"
 
 
 def _replayed_json(replayed: Replayed) -> dict[str, Any]:

@@ -10,12 +10,13 @@ import click
 from falsifier.cli.files import check_out, draw_evaluation, write_counterexample
 from falsifier.cli.output import say
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted, in_one_line, margin_words
+from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.nearest_miss import NearestMiss
 from falsifier.counterexamples.shrink import Shrunk, shrink_miss
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import margin_words, signed
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_json
 
@@ -24,7 +25,7 @@ def nearest_miss_line(miss: NearestMiss) -> str:
     """Say what a nearest miss is, before anything is said about it."""
     return (
         f"{miss.requirement} was not falsified in {counted(miss.simulations, 'simulation')}; this is about "
-        f"the nearest miss, with robustness {miss.robustness:+.6g} ({margin_words(miss.robustness)})."
+        f"the nearest miss, with robustness {signed(miss.robustness)} ({margin_words(miss.robustness)})."
     )
 
 
@@ -47,7 +48,7 @@ def shrink_nearest_miss(
             budget=budget,
             within=within,
             progress=lambda simpler, n: warn(
-                f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {simpler.robustness:+.6g}"
+                f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {signed(simpler.robustness)}"
             ),
         )
         confirmation = confirm(problem, shrunk.evaluation) if shrunk.evaluation.violated else None
@@ -72,8 +73,8 @@ def shrink_nearest_miss(
         lines.append(f"  violated       this simpler input violates the requirement: {confirmation.reason}")
     else:
         tenth = ", a tenth more than before; --within changes it" if within is None else ""
-        allowed = f"up to {-shrunk.least_margin:+.6g} was allowed{tenth}"
-        lines.append(f"  robustness     {found.robustness:+.6g}; {allowed}")
+        allowed = f"up to {signed(-shrunk.least_margin)} was allowed{tenth}"
+        lines.append(f"  robustness     {signed(found.robustness)}; {allowed}")
     lines += [f"  {line}" for line in candidate_lines(found.candidate, problem.space)]
     lines.append(f"  files          {', '.join(map(str, files))}")
     say("\n".join(map(one_line, lines)))

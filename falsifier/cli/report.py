@@ -13,6 +13,7 @@ from falsifier.cli.options import budget_option, directory_argument, json_option
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
+from falsifier.stl.margins import signed
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.terminal import warn
 
@@ -70,7 +71,7 @@ def validate(*, file: Path, budget: int, as_json: bool) -> None:
 
 def _finding_line(f: Finding) -> str:
     rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
-    robustness = "" if f.robustness is None else f", robustness {f.robustness:+.6g}"
+    robustness = "" if f.robustness is None else f", robustness {signed(f.robustness)}"
     return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
 
 

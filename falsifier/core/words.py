@@ -93,17 +93,6 @@ def parameterization_text(r: InputRange) -> str:
     return f"(free: at most {most}, at least {r.free.min_interval:g} s apart)"
 
 
-def margin_words(robustness: float) -> str:
-    """Say what a robustness means.
-
-    >>> margin_words(-0.5), margin_words(0.5)
-    ('violated by this margin', 'holds with this margin; below 0 is a violation')
-    """
-    if robustness < 0:
-        return "violated by this margin"
-    return f"holds {'with this margin' if robustness > 0 else 'with no margin left'}; below 0 is a violation"
-
-
 def counted(count: int, noun: str) -> str:
     """Return a count and its noun, in the singular or plural.
 

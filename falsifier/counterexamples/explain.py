@@ -22,6 +22,7 @@ from falsifier.counterexamples.simplicity import rest_value
 from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.stl import Diagnosis, in_words
+from falsifier.stl.margins import is_on_limit, margin_words, shown, signed
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Chat
@@ -63,6 +64,11 @@ class Effect:
         """Whether the violation disappears without this part."""
         return self.robustness is not None and self.robustness >= 0
 
+    @property
+    def told(self) -> str:
+        """The robustness as it is shown."""
+        return signed(self.robustness, 4)
+
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
@@ -87,8 +93,12 @@ class Explanation:
         demand = requirement.description or in_words(requirement.formula)
         robustness = self.diagnosis.robustness
         named = "robustness, the margin by which it holds"
-        found = f"It is violated by {-robustness:.5g} ({named}: {robustness:+.5g})"
-        if not self.violated:
+        if is_on_limit(robustness):
+            meaning = margin_words(robustness, str(self.diagnosis.path[-1].formula))
+            found = f"It {'is ' if self.violated else ''}{meaning}"
+        elif self.violated:
+            found = f"It is violated by {-robustness:.5g} ({named}: {robustness:+.5g})"
+        else:
             found = f"It is not violated here; {robustness:.5g} is missing to a violation ({named})"
         sentences = [
             f"{self.problem.name} requires: {demand.rstrip('.')}.",
@@ -112,15 +122,15 @@ class Explanation:
                 yield f"With {e.name} {instead} the simulation fails."
             elif e.robustness < 0:
                 yield (
-                    f"With {e.name} {instead} the requirement would be violated by {-e.robustness:.4g}, "
-                    "which is not confirmed yet."
+                    f"With {e.name} {instead} the requirement would be violated by "
+                    f"{-shown(e.robustness):.4g}, which is not confirmed yet."
                 )
             elif e.robustness > here:
-                yield f"{part} brings it near: {instead} robustness would be {e.robustness:+.4g}."
+                yield f"{part} brings it near: {instead} robustness would be {e.told}."
             elif e.robustness == here:
                 yield f"{part} makes no difference: {instead} robustness would be the same."
             else:
-                yield f"{part} keeps it away: {instead} robustness would be {e.robustness:+.4g}, nearer."
+                yield f"{part} keeps it away: {instead} robustness would be {e.told}, nearer."
         for name in dict.fromkeys(e.name for e in whole if (e.robustness or 0.0) > here):
             spans = [e for e in self.effects if e.name == name and e.span is not None]
             yield from map(self._stretch, sorted(spans, key=lambda e: -(e.robustness or 0.0))[:1])
@@ -129,11 +139,11 @@ class Explanation:
         whole = [e for e in self.effects if e.span is None]
         needed = sorted((e for e in whole if e.needed), key=lambda e: -(e.robustness or 0.0))
         for e in needed:
-            yield f"{self._part(e)} is necessary: {self._instead(e)} robustness would be {e.robustness:+.4g}."
+            yield f"{self._part(e)} is necessary: {self._instead(e)} robustness would be {e.told}."
         for e in whole:
             if e.robustness is not None and not e.needed:
                 part, instead = self._part(e), self._instead(e)
-                yield f"{part} is not necessary: {instead} robustness would still be {e.robustness:+.4g}."
+                yield f"{part} is not necessary: {instead} robustness would still be {e.told}."
         for name in dict.fromkeys(e.name for e in needed):
             spans = [e for e in self.effects if e.name == name and e.span is not None]
             decisive = [e for e in spans if e.needed]
@@ -152,7 +162,7 @@ class Explanation:
         start, end = effect.span or (0.0, 0.0)
         return (
             f"{_capitalized(effect.name)} is decisive from {start:.4g} to {end:.4g} s: "
-            f"{self._instead(effect)} during that time robustness would be {effect.robustness:+.4g}."
+            f"{self._instead(effect)} during that time robustness would be {effect.told}."
         )
 
     def _instead(self, effect: Effect) -> str:

@@ -20,6 +20,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search import manifest
 from falsifier.search.journal import holds_run
 from falsifier.search.manifest import Manifest
+from falsifier.stl.margins import signed
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +80,9 @@ class NearestMiss:
             raise SimulationError(f"{problem.name}: the simulation now fails: {evaluation.reason}")
         if evaluation.violated:
             raise SpecError(
-                f"the nearest miss of {problem.name} now violates (robustness {evaluation.robustness:+.6g}): "
-                "the model or the requirement has changed; search again: falsifier run ... --start-from "
-                f"{self.directory}"
+                f"the nearest miss of {problem.name} now violates (robustness "
+                f"{signed(evaluation.robustness)}): the model or the requirement has changed; search again: "
+                f"falsifier run ... --start-from {self.directory}"
             )
         return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
 

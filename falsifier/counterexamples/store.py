@@ -33,6 +33,7 @@ from falsifier.search import manifest
 from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.search.manifest import RequirementRecord
 from falsifier.search.records import ConfirmedRecord
+from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
 
 FILE_NAME = "counterexample.json"
@@ -284,8 +285,8 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
     confirmation = confirm(problem, evaluation) if evaluation.violated else None
     status = _STATUS[confirmation.outcome if confirmation else "refuted"]
     text = (
-        f"{problem.name}: {_WORDS[status]}, robustness {evaluation.robustness:+.6g} "
-        f"(recorded {stored.robustness:+.6g})"
+        f"{problem.name}: {_WORDS[status]}, robustness {signed(evaluation.robustness)} "
+        f"(recorded {signed(stored.robustness)})"
     )
     text += f"; {confirmation.reason}" if confirmation else ""
     return Replayed(status, confirmation, evaluation, text + changes)

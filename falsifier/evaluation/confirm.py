@@ -16,6 +16,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import signed
 
 if TYPE_CHECKING:
     from falsifier import Figure
@@ -82,7 +83,8 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
             reason=reason,
         )
     reason = (
-        f"a fresh simulation gives {fresh.robustness:+.6g}, the second monitor (rtamt) {fresh.reference:+.6g}"
+        f"a fresh simulation gives {signed(fresh.robustness)}, the second monitor (rtamt) "
+        f"{signed(fresh.reference)}"
     )
     finer = half_step(problem)
     halved = _repeat(finer, evaluation.candidate, known=fresh)
@@ -94,11 +96,11 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     elif halved.doubt:
         outcome = "fragile" if halved.robustness >= 0 else "refuted"
         change = halved.robustness - fresh.robustness
-        reason = f"{reason}, but with {steps} it {halved.doubt}, a change of {change:+.4g}"
+        reason = f"{reason}, but with {steps} it {halved.doubt}, a change of {signed(change, 4)}"
     elif _same(fresh.trajectory, halved.trajectory):
         reason += "; its outputs do not depend on the communication step"
     else:
-        reason += f"; {steps} gives {halved.robustness:+.6g}"
+        reason += f"; {steps} gives {signed(halved.robustness)}"
     return Confirmation(
         problem=problem,
         evaluation=evaluation,
@@ -145,9 +147,9 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
         return known
     reference, doubt = _second_monitor(problem, again.trajectory)
     if not again.violated:
-        doubt = f"does not violate: robustness {again.robustness:+.6g}"
+        doubt = f"does not violate: robustness {signed(again.robustness)}"
     elif reference is not None and reference >= 0:
-        doubt = f"has robustness {again.robustness:+.6g}, but rtamt computes {reference:+.6g}"
+        doubt = f"has robustness {signed(again.robustness)}, but rtamt computes {signed(reference)}"
     return _Opinion(again.trajectory, again.robustness, reference, doubt)
 
 

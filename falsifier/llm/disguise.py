@@ -39,6 +39,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict
 from falsifier.stl.expression import Name, Number
 from falsifier.stl.formula import Predicate
+from falsifier.stl.margins import is_on_limit
 
 Columns = Mapping[str, NDArray[np.float64]]
 
@@ -188,7 +189,7 @@ class Disguise:
     def hidden_robustness(self, verdict: Verdict, robustness: float) -> float:
         """Return a robustness in the scale of what decided a verdict on the same candidate."""
         predicate = next((p for p in self._predicates if str(p) == verdict.predicate), None)
-        if predicate is None:
+        if predicate is None or is_on_limit(robustness):
             return robustness
         if predicate in self.derived:
             return self.scales[self.derived[predicate]].number(robustness) - _MIDDLE

@@ -29,7 +29,8 @@ from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, in_words
 from falsifier.stl.formula import And
 from falsifier.stl.implication import implies
-from falsifier.stl.intervals import decided
+from falsifier.stl.intervals import decided, margins
+from falsifier.stl.margins import is_on_limit, shown
 from falsifier.stl.tell_apart import tell_apart
 
 _LONGEST_SENTENCE = 4000
@@ -198,6 +199,11 @@ def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
             f"{part} {'always' if holds else 'never'} holds within the ranges of its signals; "
             "check threshold, unit and direction"
         )
+    if is_on_limit(margins(formula, ranges_of(problem)).low):
+        raise RejectedReplyError(
+            "it can be violated only exactly on its limit, so that no margin leads a search: "
+            "for x == 3 write abs(x - 3) <= 0.5"
+        )
     _check_examples(reply, formula, problem)
     stated = replace(
         problem,
@@ -231,7 +237,7 @@ def _check_examples(reply: ReadingReply, formula: Formula, problem: Problem) -> 
             said, found = ("satisfied", "violated") if satisfied else ("violated", "satisfied")
             raise RejectedReplyError(
                 f"the example that you call {said} is {found} by the formula, with robustness "
-                f"{robustness:.4g}: is an inequality reversed, or a window wrong?"
+                f"{shown(robustness):.4g}: is an inequality reversed, or a window wrong?"
             )
 
 

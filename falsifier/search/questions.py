@@ -16,6 +16,7 @@ from falsifier.search.records import (
     ExchangeRecord,
     Record,
 )
+from falsifier.stl.margins import signed
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,9 @@ def _outcomes(records: Iterable[Record], requirement: str) -> dict[int, tuple[st
     for record in records:
         if isinstance(record, EvaluatedRecord):
             verdict = record.verdicts.get(requirement)
-            text = f"robustness {verdict.robustness:+.6g}" if verdict else f"{record.status}: {record.reason}"
+            text = (
+                f"robustness {signed(verdict.robustness)}" if verdict else f"{record.status}: {record.reason}"
+            )
             found[record.index] = text, record.seconds
         elif isinstance(record, ConfirmedRecord) and record.requirement == requirement:
             text, seconds = found[record.index]

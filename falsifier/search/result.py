@@ -12,6 +12,7 @@ from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.levels import Level
 from falsifier.search.moves import Objective
+from falsifier.stl.margins import signed
 
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
@@ -59,7 +60,7 @@ class Result:
 
     def __repr__(self) -> str:
         # All trajectories and variables would fill pages of a terminal.
-        least = "" if self.robustness is None else f", robustness {self.robustness:+.6g}"
+        least = "" if self.robustness is None else f", robustness {signed(self.robustness)}"
         return f"Result({self.problem.name}: {self.status}{least}, {self.spent.simulations_text})"
 
     @property

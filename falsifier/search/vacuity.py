@@ -14,6 +14,7 @@ from falsifier.search.effects import Effects
 from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.expression import Number
 from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Not, Or, Predicate, Until
+from falsifier.stl.margins import signed
 
 # A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
 _FAR = 3.0
@@ -132,13 +133,14 @@ class Vacuity:
         if not self._moved:
             text = (
                 f"Nothing that was searched had an effect on {listed(signals)}: the same {self._in_all()}, "
-                f"with robustness {value:+.6g}. Search longer, or search inputs and "
+                f"with robustness {signed(value)}. Search longer, or search inputs and "
                 f"parameters on which {'it depends' if len(signals) == 1 else 'they depend'}."
             )
         elif all(name in info and info[name].kind == "real" for name in signals):
             text = (
-                f"The robustness was {value:+.6g} {self._in_all()}, although {listed(sorted(self._moved))} "
-                "changed: what decides the requirement was never reached by what was searched."
+                f"The robustness was {signed(value)} {self._in_all()}, although "
+                f"{listed(sorted(self._moved))} changed: what decides the requirement was never reached by "
+                "what was searched."
             )
         else:
             return

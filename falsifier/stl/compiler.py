@@ -26,6 +26,7 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
+from falsifier.stl.margins import on_limit
 from falsifier.stl.program import Part, Place, Program
 
 _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
@@ -209,7 +210,7 @@ class _Compiler:
             offset = self._negated(offset, n)
         self.checked[len(self.rows)] = node, Place(offset - first, first, first + n - 1)
         self.rows.append((op.CHECK, 0, offset, 0, n, 0))
-        self.numbers.append((0.0, 0.0))
+        self.numbers.append((on_limit(node.operator), 0.0))
         return offset
 
     def _negated(self, offset: int, n: int) -> int:

@@ -22,6 +22,7 @@ from falsifier.stl.formula import (
     Predicate,
     Until,
 )
+from falsifier.stl.margins import is_on_limit
 from falsifier.stl.program import Part
 from falsifier.stl.witness import path_to_decider
 
@@ -72,10 +73,11 @@ class Vacuity:
     def text(self) -> str:
         """The finding in words."""
         over = _moment(self.window)
-        never, near = "not", f"it was false by {number(-self.margin)}"
+        off = "exactly on its limit" if is_on_limit(self.margin) else f"false by {number(-self.margin)}"
+        never, near = "not", f"it was {off}"
         if self.window[0] < self.window[1]:
             never = "never"
-            near = f"it came closest at {seconds(self.nearest)}, false by {number(-self.margin)}"
+            near = f"it came closest at {seconds(self.nearest)}, {off}"
         if self.only:
             why = f"its condition was {never} true"
             return f"Vacuous: {self.implication} held {over} only because {why}; {near}."
@@ -228,7 +230,7 @@ def _plain(
 def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:
     """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
     left, right = (valued(side, values, value) for side in (predicate.left, predicate.right))
-    if value == 0:
+    if is_on_limit(value):
         return f"{left} equals {right}"
     if predicate.operator in ("==", "!="):
         relation = "differs from"
@@ -244,7 +246,7 @@ def valued(side: Expression, values: Mapping[str, float], margin: float, unit: s
         return str(side)
     value = float(side.evaluate(values))
     # So many digits that both sides read as different.
-    ratio = abs(value / margin) if margin else 0.0
+    ratio = 0.0 if is_on_limit(margin) else abs(value / margin)
     digits = log10(ratio) + 2 if 0.0 < ratio < inf else 0.0
     return f"{side} = {value:.{int(np.clip(digits, _DIGITS, _MOST_DIGITS))}g}{unit and f' {unit}'}"
 

@@ -10,6 +10,7 @@ from itertools import product
 
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
 from falsifier.stl.formula import And, Formula, Iff, Implies, Not, Or, Predicate, Until
+from falsifier.stl.margins import on_limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,39 +75,27 @@ def margins(formula: Formula, ranges: Mapping[str, Interval]) -> Interval:
     return parts[0]
 
 
-def decided(
-    formula: Formula, ranges: Mapping[str, Interval], *, polarity: int = 1
-) -> Iterator[tuple[Formula, bool]]:
+def decided(formula: Formula, ranges: Mapping[str, Interval]) -> Iterator[tuple[Formula, bool]]:
     """Yield the largest parts that hold for all trajectories in range, or for none, and which of the two.
-
-    Exactly 0 is no violation of the whole formula. So a part at 0 counts as held where it must hold and as
-    failed where it is a condition: ``brake > 0`` with brakes from 0 on is a condition that may fail.
 
     Args:
         formula: the formula.
         ranges: range of each signal.
-        polarity: 1 where the formula must hold, -1 under a negation or as a condition, 0 for both.
     """
     found = margins(formula, ranges)
-    if found.low > 0 or (found.low == 0 and polarity == 1):
-        yield formula, True
-    elif found.high < 0 or (found.high == 0 and polarity == -1):
-        yield formula, False
+    if found.low > 0 or found.high < 0:
+        yield formula, found.low > 0
     else:
-        for child, sign in zip(formula.children, _signs(formula), strict=True):
-            yield from decided(child, ranges, polarity=sign * polarity)
-
-
-def _signs(formula: Formula) -> tuple[int, ...]:
-    """Return how the truth of each operand acts on the formula's."""
-    if isinstance(formula, Not):
-        return (-1,)
-    if isinstance(formula, Implies):
-        return -1, 1
-    return (0 if isinstance(formula, Iff) else 1,) * len(formula.children)
+        for child in formula.children:
+            yield from decided(child, ranges)
 
 
 def _margin(predicate: Predicate, difference: Interval) -> Interval:
+    found, at_zero = _distance(predicate, difference), on_limit(predicate.operator)
+    return Interval(found.low or at_zero, found.high or at_zero)
+
+
+def _distance(predicate: Predicate, difference: Interval) -> Interval:
     if predicate.operator in ("<", "<="):
         return -difference
     if predicate.operator in (">", ">="):

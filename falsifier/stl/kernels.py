@@ -79,7 +79,7 @@ def _run(program: Integers, numbers: Floats, buffer: Floats, signal_size: int) -
         a = buffer[first : first + length + width]
         b = buffer[second : second + length]
         if code == op.CHECK:
-            if _first_infinite(a) >= 0:
+            if not _settled(a, numbers[r, 0]):
                 return BAD_STEP, r
         elif code >= op.WINDOW_MINIMUM:
             _temporal(code, out, a, b)
@@ -187,6 +187,20 @@ def _smallest(a: Floats, sign: float) -> float:
     for i in range(a.size):
         best = min(best, sign * a[i])
     return best
+
+
+@compiled
+def _settled(margins: Floats, on_limit: float) -> bool:
+    """Replace margins of 0 by a value with the sign of the comparison; return whether all are finite."""
+    # The first loop has no branch, so it is vectorised; the others run only if there is something to do.
+    bad, ties = 0, 0
+    for i in range(margins.size):
+        bad += margins[i] - margins[i] != 0.0
+        ties += margins[i] == 0.0
+    if ties:
+        for i in range(margins.size):
+            margins[i] = on_limit if margins[i] == 0.0 else margins[i]
+    return bad == 0
 
 
 @compiled

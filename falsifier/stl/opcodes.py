@@ -12,4 +12,4 @@ ABS, SQRT, EXP, LOG, SIN, COS = 9, 10, 11, 12, 13, 14
 WINDOW_MINIMUM, WINDOW_MAXIMUM = 15, 16  # out[i] = minimum, maximum of a[i..i+width]
 REST_MINIMUM, REST_MAXIMUM = 17, 18  # out[i] = minimum, maximum of a[i..end]
 UNTIL = 19  # out[i] = max(b[i], min(a[i], out[i+1]))
-CHECK = 20  # writes nothing; the evaluation stops unless a is finite
+CHECK = 20  # the evaluation stops unless a is finite; where it is 0, it becomes p

@@ -20,10 +20,11 @@ import types
 import typing
 import warnings
 from dataclasses import dataclass, field
-from math import inf
+from math import copysign, inf
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError
@@ -43,10 +44,16 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
+from falsifier.stl.margins import ON_LIMIT
+
+_COMPARISONS = {
+    "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal,
+    "==": np.equal, "!=": np.not_equal,
+}  # fmt: skip
 
 
 def robustness(formula: Formula, trajectory: Trajectory) -> float:
-    """Return the robustness at time 0 computed by rtamt.
+    """Return the robustness at time 0 computed by rtamt; exactly on the limit, its sign says what is true.
 
     Raises:
         FormulaError: if the bound of a window is not a multiple of the trajectory's step.
@@ -57,12 +64,10 @@ def robustness(formula: Formula, trajectory: Trajectory) -> float:
     end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
     if needed > end + 1e-6 * trajectory.step:
         raise MonitorError(f"the formula needs {needed:g} s, but the trajectory ends at {end:g} s")
-    translation = _Translation(trajectory)
-    text = translation.at_start(formula)
-    columns = translation.columns
-    if len(trajectory) == 1:  # rtamt fails on one sample; repeating it does not change the value at time 0
-        columns = {name: values * 2 for name, values in columns.items()}
-    return _evaluate(text, columns or {"v0": [0.0] * max(2, len(trajectory))})
+    found = _evaluate(formula, _Translation(trajectory))
+    if found == 0:  # on the limit, it depends on the comparisons: rtamt evaluates their truth, 1 or -1
+        return copysign(ON_LIMIT, _evaluate(formula, _Translation(trajectory, of_truth=True)))
+    return found
 
 
 @dataclass(slots=True)
@@ -70,6 +75,7 @@ class _Translation:
     """Text for rtamt and the columns that it refers to."""
 
     trajectory: Trajectory
+    of_truth: bool = False
     columns: dict[str, list[float]] = field(default_factory=dict)
     aliases: dict[Expression, str] = field(default_factory=dict)
 
@@ -95,6 +101,8 @@ class _Translation:
     def formula(self, f: Formula) -> str:
         """Return the text of a formula, in parentheses."""
         match f:
+            case Predicate() if self.of_truth:
+                return f"({self.truth(f)} >= 0)"
             case Predicate("!=", left, right):
                 return f"(not ({self.side(left)} == {self.side(right)}))"
             case Predicate(operator, left, right):
@@ -148,17 +156,33 @@ class _Translation:
         if isinstance(expression, Number):
             return number_text(expression.value)
         if expression not in self.aliases:
-            known = {name: self.trajectory[name] for name in expression.signals}
-            values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)
-            if not np.isfinite(values).all():
-                time = self.trajectory.times[int(np.flatnonzero(~np.isfinite(values))[0])]
-                raise MonitorError(f"{expression} has no finite value at {time:g} s")
             self.aliases[expression] = f"v{len(self.columns)}"
-            self.columns[self.aliases[expression]] = values.tolist()
+            self.columns[self.aliases[expression]] = self.values(expression).tolist()
         return self.aliases[expression]
 
+    def truth(self, predicate: Predicate) -> str:
+        """Return the alias of a column that is 1 where a predicate is true and -1 where it is false."""
+        true = _COMPARISONS[predicate.operator](self.values(predicate.left), self.values(predicate.right))
+        alias = f"v{len(self.columns)}"
+        self.columns[alias] = np.where(true, 1.0, -1.0).tolist()
+        return alias
 
-def _evaluate(text: str, columns: dict[str, list[float]]) -> float:
+    def values(self, expression: Expression) -> NDArray[np.float64]:
+        """Return the values of a compared expression at all samples."""
+        known = {name: self.trajectory[name] for name in expression.signals}
+        values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)
+        if not np.isfinite(values).all():
+            time = self.trajectory.times[int(np.flatnonzero(~np.isfinite(values))[0])]
+            raise MonitorError(f"{expression} has no finite value at {time:g} s")
+        return values
+
+
+def _evaluate(formula: Formula, translation: _Translation) -> float:
+    text = translation.at_start(formula)
+    length = len(translation.trajectory)
+    columns = translation.columns or {"v0": [0.0] * length}
+    if length == 1:  # rtamt fails on one sample; repeating it does not change the value at time 0
+        columns = {name: values * 2 for name, values in columns.items()}
     specification = _rtamt().StlDiscreteTimeOfflineSpecification()
     for name in columns:
         specification.declare_var(name, "float")

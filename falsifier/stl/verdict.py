@@ -11,7 +11,8 @@ class Verdict:
     """Robustness of a requirement on one trajectory, and what decided it.
 
     Attributes:
-        robustness: signed margin at time 0; < 0 is a violation, exactly 0 is not.
+        robustness: signed margin at time 0; < 0 is a violation, and nothing else is. A margin of exactly 0
+            is given as -1e-300 if the requirement is violated, and as 1e-300 if it holds.
         critical_time: time in s that decided the value.
         predicate: text of the deciding predicate.
         values: signal values at the critical time, by name.
@@ -31,5 +32,5 @@ class Verdict:
 
     @property
     def violated(self) -> bool:
-        """Whether the robustness is below 0; exactly 0 is not a violation."""
+        """Whether the requirement is violated."""
         return self.robustness < 0

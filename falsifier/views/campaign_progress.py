@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from falsifier.campaigns import Progress, RunProgress
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
+from falsifier.stl.margins import signed
 from falsifier.views.terminal import error_console, moving, unbroken
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class PlainScoreboard:
 
 def run_line(run: RunProgress) -> str:
     """Describe an ended run in one line."""
-    best = "" if run.best is None else f", best robustness {run.best:+.4g}"
+    best = "" if run.best is None else f", best robustness {signed(run.best, 4)}"
     count = run.spent.simulations_text
     reason = f": {run.reason}" if run.status == "failed" else ""
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
@@ -126,7 +127,7 @@ def _fitting(progress: Progress, rate: float | None, console: "Console") -> "Ren
             f"{part.finished}/{len(part.runs)}",
             str(part.counts["falsified"]),
             str(part.spent.simulations),
-            "" if part.best is None else f"{part.best:+.4g}",
+            "" if part.best is None else signed(part.best, 4),
             "?" if cost is None else f"{cost:.4f}" if part.spent.calls else "",
         )
     return table

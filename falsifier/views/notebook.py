@@ -19,6 +19,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl import in_words
+from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join
@@ -131,7 +132,7 @@ def _verdict_facts(verdict: Verdict) -> list[Fact]:
     values = ", ".join(f"{name} = {value:g}" for name, value in verdict.values.items())
     return [
         *([("what broke", verdict.breach.text)] if verdict.breach else []),
-        ("robustness", f"{verdict.robustness:+.6g} ({sign})"),
+        ("robustness", f"{signed(verdict.robustness)} ({sign})"),
         ("critical time", f"{verdict.critical_time:g} s"),
         ("decided by", el("code", verdict.predicate)),
         ("values then", values),

@@ -18,6 +18,7 @@ from falsifier.search.events import (
 )
 from falsifier.search.levels import Level, level_name
 from falsifier.search.parameterization import parameterization_note
+from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
 
@@ -189,7 +190,7 @@ def note(event: Evaluated) -> str:
     best = event.best
     if best is None or best.verdict is None:
         return "no successful simulation yet"
-    return f"best robustness {best.verdict.robustness:+.5g} at t = {best.verdict.critical_time:.5g} s"
+    return f"best robustness {signed(best.verdict.robustness, 5)} at t = {best.verdict.critical_time:.5g} s"
 
 
 class NotebookLine:

@@ -6,9 +6,9 @@ from typing import Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import margin_words
 from falsifier.problem.template_advice import Advice, hint
 from falsifier.search.formalize import Difference, Formalized, Reading
+from falsifier.stl.margins import margin_words, signed
 from falsifier.views.sparkline import trace_lines
 from falsifier.views.text import llm_use
 
@@ -95,7 +95,7 @@ def _nominal(reading: Reading) -> str:
     nominal = reading.nominal
     if nominal is None or nominal.robustness is None:
         return f"the simulation failed: {'' if nominal is None else one_line(nominal.reason)}"
-    return f"robustness {nominal.robustness:+.6g} ({margin_words(nominal.robustness)})"
+    return f"robustness {signed(nominal.robustness)} ({margin_words(nominal.robustness)})"
 
 
 def _difference_lines(difference: Difference) -> Iterator[str]:

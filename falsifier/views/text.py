@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted, margin_words
+from falsifier.core.words import candidate_lines, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -18,6 +18,7 @@ from falsifier.search.levels import Outcome, outcomes
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 from falsifier.stl import Verdict
+from falsifier.stl.margins import margin_words, signed
 
 
 def result_text(result: Result) -> str:
@@ -72,7 +73,7 @@ def results_text(results: Sequence[Result]) -> str:
     lines = []
     for result in results:
         shown = result.counterexample.evaluation if result.counterexample else result.best
-        robustness = "" if shown is None else f", robustness {shown.robustness:+.6g}"
+        robustness = "" if shown is None else f", robustness {signed(shown.robustness)}"
         where = "" if result.counterexample is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
@@ -164,7 +165,8 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
             f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
             for name, value in verdict.values.items()
         )
-        lines.append(f"  robustness     {verdict.robustness:+.6g} ({margin_words(verdict.robustness)})")
+        meaning = margin_words(verdict.robustness, verdict.predicate)
+        lines.append(f"  robustness     {signed(verdict.robustness)} ({meaning})")
         lines.append(f"  critical time  {verdict.critical_time:.6g} s, decided by {verdict.predicate}")
         lines.append(f"  values then    {values}")
     lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]

@@ -81,10 +81,14 @@ def test_what_does_not_happen_again_is_refuted() -> None:
     assert "does not violate" in found.reason
 
 
-def test_robustness_zero_is_refuted() -> None:
-    problem = lag_problem("G[0,10] (x - x <= 0)")
+@pytest.mark.parametrize(
+    ("formula", "outcome"), [("G[0,10] (x - x <= 0)", "refuted"), ("G[0,10] (x - x < 0)", "confirmed")]
+)
+def test_exactly_on_the_limit_the_comparison_decides(formula: str, outcome: str) -> None:
+    problem = lag_problem(formula)
     found = confirm(problem, highest(problem))
-    assert (found.outcome, found.robustness) == ("refuted", 0.0)
+    assert (found.outcome, found.robustness == found.reference) == (outcome, True)
+    assert ("a fresh simulation gives -0, " in found.reason) == (outcome == "confirmed")
 
 
 def test_monitors_that_disagree_refute(monkeypatch: pytest.MonkeyPatch) -> None:

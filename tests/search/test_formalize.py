@@ -210,7 +210,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"violated": [{"name": "speed", "times": [5, 0], "values": [0, 200]}]},
         "in order",
     ),
-    "always by ==": ({"formula": "G[0,20] (gear == 2 -> speed <= 120)"}, "always holds"),
+    "no margin by ==": ({"formula": "G[0,20] (gear == 2 -> speed <= 120)"}, "only exactly on its limit"),
 }  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from falsifier.search.loop import search
 from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
 from falsifier.search.run import falsify
 from falsifier.search.steps import Live
+from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
 from tests.problems import broken, mostly_broken, never
 from tests.search.support import run
@@ -59,11 +60,21 @@ def test_only_values_within_the_models_limits_are_searched() -> None:
         assess(wide, budget=1)
 
 
-def test_robustness_zero_is_no_violation() -> None:
-    result = run(lag_problem("G[0,10] (x - x <= 0)"), budget=3)
+@pytest.mark.parametrize("comparison", ["x - x <= 0", "x - x == 0", "not (x - x != 0)"])
+def test_what_holds_on_its_limit_is_no_violation(comparison: str) -> None:
+    result = run(lag_problem(f"G[0,10] ({comparison})"), budget=3)
     assert result.status == "not falsified"
-    assert result.best is not None
-    assert result.best.robustness == 0
+    assert result.best is not None and result.best.verdict is not None
+    assert not result.best.violated
+    assert is_on_limit(result.best.verdict.robustness)
+
+
+@pytest.mark.parametrize("comparison", ["x - x < 0", "x - x != 0", "not (x - x >= 0)"])
+def test_what_fails_on_its_limit_is_a_violation(comparison: str) -> None:
+    result = run(lag_problem(f"G[0,10] ({comparison})"), budget=3)
+    assert (result.status, result.spent.simulations) == ("falsified", 1)
+    assert result.counterexample is not None and result.counterexample.evaluation.verdict is not None
+    assert is_on_limit(result.counterexample.evaluation.verdict.robustness)
 
 
 def test_failed_simulations_are_evaluations_with_a_reason() -> None:

@@ -1,7 +1,8 @@
 """The semantics written down once more, as slow and direct as the definition."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from operator import eq, ge, gt, le, lt, ne
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from falsifier.stl.constants import Constant
 from falsifier.stl.formula import (
     Always,
     And,
+    Comparison,
     Eventually,
     Formula,
     Iff,
@@ -21,7 +23,11 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
+from falsifier.stl.margins import on_limit
 
+TRUE_IF: dict[Comparison, Callable[[float, float], bool]] = {
+    "<": lt, "<=": le, ">": gt, ">=": ge, "==": eq, "!=": ne,
+}  # fmt: skip
 Columns = Mapping[str, NDArray[np.float64]]
 
 
@@ -49,7 +55,7 @@ class Direct:
                 "<": right - left, "<=": right - left, ">": left - right, ">=": left - right,
                 "==": -abs(left - right), "!=": abs(left - right),
             }[f.operator]  # fmt: skip
-            return margin, k
+            return margin or on_limit(f.operator), k
         if isinstance(f, Not):
             value, at = self.judge(f.operand, k)
             return -value, at
@@ -76,6 +82,35 @@ class Direct:
         left = first_smallest([self.judge(f.left, i) for i in range(k, end + 1)])
         right = self.judge(f.right, end)
         return smaller(left, right)
+
+    def holds(self, f: Formula, k: int = 0) -> bool:
+        """Whether a formula is true at sample k, without any margin."""
+        match f:
+            case Predicate(operator, left, right):
+                here = {name: column[k] for name, column in self.columns.items()}
+                return TRUE_IF[operator](float(left.evaluate(here)), float(right.evaluate(here)))
+            case Not(operand):
+                return not self.holds(operand, k)
+            case And(left, right):
+                return self.holds(left, k) and self.holds(right, k)
+            case Or(left, right):
+                return self.holds(left, k) or self.holds(right, k)
+            case Implies(left, right):
+                return not self.holds(left, k) or self.holds(right, k)
+            case Iff(left, right):
+                return self.holds(left, k) == self.holds(right, k)
+            case Next(operand):
+                return self.holds(operand, k + 1)
+            case Always(operand, window):
+                return all(self.holds(operand, i) for i in self.samples(window, k))
+            case Eventually(operand, window):
+                return any(self.holds(operand, i) for i in self.samples(window, k))
+            case Until(left, right, window):
+                return any(
+                    self.holds(right, end) and all(self.holds(left, i) for i in range(k, end + 1))
+                    for end in self.samples(window, k)
+                )
+        raise TypeError(f"not a formula: {f!r}")
 
 
 def smaller(left: tuple[float, int], right: tuple[float, int]) -> tuple[float, int]:

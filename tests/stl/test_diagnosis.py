@@ -45,7 +45,8 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
         ("x > 4", "x = 3 is below 4 by 1."),
         ("x == 4", "x = 3 differs from 4 by 1."),
         ("x != 4", "x = 3 differs from 4 by 1."),
-        ("not (x <= 3)", "'not' holds: x = 3 equals 3."),
+        ("not (x <= 3)", "'not' fails: x = 3 equals 3."),
+        ("not (x < 3)", "'not' holds: x = 3 equals 3."),
         ("not (x <= 4)", "'not' fails: x = 3 is below 4 by 1."),
         ("x <= 5 and y <= 3", "the right side of 'and' decided: y = 2 is below 3 by 1."),
         ("x <= 9 and (y <= 9 and x <= 9) and y <= 3",
@@ -85,6 +86,12 @@ def test_a_condition_that_was_never_true_is_not_the_only_reason_where_the_conseq
     found = diagnose("G[0,1] (x >= 3 -> y <= 4)", x=[1.0, 2.0], y=[3.0, 4.0])
     assert not found.vacuous
     assert "The condition of x >= 3 -> y <= 4 was never true over [0, 1] s" in found.text
+
+
+def test_a_condition_exactly_on_its_limit_is_true_if_its_comparison_says_so() -> None:
+    found = diagnose("G[0,1] (x > 0 -> y <= 4)", x=[0.0, 0.0], y=[9.0, 9.0])
+    assert found.vacuous and found.text.endswith("it came closest at 0 s, exactly on its limit.")
+    assert diagnose("G[0,1] (x >= 0 -> y <= 4)", x=[0.0, 0.0], y=[9.0, 9.0]).robustness < 0
 
 
 def test_a_condition_that_was_true_once_is_not_vacuous() -> None:

@@ -6,6 +6,7 @@ import pytest
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Monitor, parse
 from falsifier.stl.intervals import Interval, decided, margins
+from falsifier.stl.margins import ON_LIMIT
 
 RANGES = {"x": Interval(-1, 2), "y": Interval(0.5, 3), "b": Interval(0, 1)}
 FORMULAS = [
@@ -35,7 +36,8 @@ def test_no_trajectory_in_range_is_outside_the_bounds(text: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "low", "high"),
-    [("x <= 1", -1, 2), ("abs(x) <= 5", 3, 5), ("x == 4", -5, -2), ("z <= 1", -np.inf, np.inf),
+    [("x <= 1", -1, 2), ("x < 2", -ON_LIMIT, 3), ("x <= 2", ON_LIMIT, 3),
+     ("abs(x) <= 5", 3, 5), ("x == 4", -5, -2), ("z <= 1", -np.inf, np.inf),
      ("z - z <= 1", -np.inf, np.inf)],
 )  # fmt: skip
 def test_bounds_of_single_signals_are_tight(text: str, low: float, high: float) -> None:
@@ -47,14 +49,15 @@ def test_bounds_of_single_signals_are_tight(text: str, low: float, high: float) 
     [
         ("G (x <= 2)", [("G (x <= 2)", True)]),
         ("G (x <= 1 -> y > 4)", [("y > 4", False)]),
-        ("G (x == 1 -> y <= 1)", [("G (x == 1 -> y <= 1)", True)]),
+        ("G (x == 1 -> y <= 1)", []),
         ("F (x > 2.5)", [("F (x > 2.5)", False)]),
         ("G (x <= 1)", []),
         ("G (b > 0 -> x <= 1)", []),
         ("G (not (b > 0 and y > 1))", []),
-        ("G (b < 0 or x <= 1)", []),
+        ("G (b > 0 or b >= 0)", [("G (b > 0 or b >= 0)", True)]),
+        ("G (b < 0 or x <= 1)", [("b < 0", False)]),
         ("G (b < 0 -> x <= 1)", [("G (b < 0 -> x <= 1)", True)]),
-        ("b >= 0 <-> x <= 1", []),
+        ("b >= 0 <-> x <= 1", [("b >= 0", True)]),
         ("G (b >= 0 and x <= 1)", [("b >= 0", True)]),
         ("(x <= 1) and (y <= 5)", [("y <= 5", True)]),
     ],

@@ -11,6 +11,7 @@ import pytest
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl import Monitor, Verdict, parse
+from falsifier.stl.margins import ON_LIMIT, is_on_limit
 from tests.stl.direct import Direct
 from tests.stl.randoms import STEP, random_case, random_trajectory
 
@@ -36,6 +37,19 @@ def test_random_formulas_agree_with_the_direct_definition(block: int) -> None:
         assert found == (robustness, t.times[sample]), (seed, str(formula))
 
 
+@pytest.mark.parametrize("block", range(4))
+def test_the_sign_of_the_robustness_is_the_truth_of_the_formula(block: int) -> None:
+    on_limit = [0, 0]
+    for seed in range(100_000 + block * 400, 100_000 + (block + 1) * 400):
+        formula, t = random_case(seed)
+        monitor = Monitor(formula, STEP, len(t))
+        robustness, holds = monitor.evaluate(t).robustness, Direct(t.columns, STEP).holds(formula)
+        assert (robustness > 0, robustness < 0) == (holds, not holds), (seed, str(formula))
+        assert monitor.batch({name: column[None] for name, column in t.columns.items()})[0] == robustness
+        on_limit[holds] += is_on_limit(robustness)
+    assert min(on_limit) > 10, "both kinds were tried"
+
+
 # -- values and critical times by hand -----------------------------------------------------------------------
 
 X = [3.0, 1.0, 4.0, 1.0, 5.0]
@@ -48,16 +62,22 @@ Y = [2.0, 7.0, 1.0, 8.0, 2.0]
         ("x <= 5", 2, 0),
         ("x < 5", 2, 0),
         ("x >= 5", -2, 0),
-        ("x == 3", 0, 0),
+        ("x == 3", ON_LIMIT, 0),
         ("x != 5", 2, 0),
+        ("x != 3", -ON_LIMIT, 0),
+        ("not (x == 3)", -ON_LIMIT, 0),
+        ("not (x >= 3)", -ON_LIMIT, 0),
+        ("not (x > 3)", ON_LIMIT, 0),
+        ("x > 3 or x >= 3", ON_LIMIT, 0),
+        ("(X (x <= 1)) and (x < 3)", -ON_LIMIT, 0),  # the operand that is false
         ("not (x == 5)", 2, 0),
         ("x^2 <= 10", 1, 0),
         ("2 <= x <= 4", 1, 0),
         ("G (x <= 4)", -1, 4),
-        ("G[1,3] (x <= 4)", 0, 2),
+        ("G[1,3] (x <= 4)", ON_LIMIT, 2),
         ("G[1,3] (x >= 0)", 1, 1),  # the earlier of two smallest
         ("F[1,3] (x <= 0)", -1, 1),  # the earlier of two largest
-        ("F (y >= 8)", 0, 3),
+        ("F (y >= 8)", ON_LIMIT, 3),
         ("G[4,4] (x <= 4)", -1, 4),
         ("X (x <= 3)", 2, 1),
         ("X X (x <= 3)", -1, 2),
@@ -67,12 +87,12 @@ Y = [2.0, 7.0, 1.0, 8.0, 2.0]
         ("(X (x <= 3)) or (x <= 5)", 2, 1),
         ("not (X (x <= 3)) -> (x <= 5)", 2, 1),
         ("(x <= 5) <-> (X (x <= 3))", 2, 1),
-        ("(x <= 4) U (y >= 8)", 0, 2),  # left at its smallest value on ties
-        ("(x <= 4) U (y >= 7.5)", 0, 2),
+        ("(x <= 4) U (y >= 8)", ON_LIMIT, 2),  # left at its smallest value on ties
+        ("(x <= 4) U (y >= 7.5)", ON_LIMIT, 2),
         ("(x <= 9) U (y >= 7)", 1, 3),
-        ("(x <= 3) U (y >= 7)", 0, 0),
+        ("(x <= 3) U (y >= 7)", ON_LIMIT, 0),
         ("(x <= 9) U[0,2] (y >= 9)", -2, 1),
-        ("(x <= 4) U[3,4] (y >= 4)", 0, 2),
+        ("(x <= 4) U[3,4] (y >= 4)", ON_LIMIT, 2),
         ("(x >= 9) U[1,2] (y >= 0)", -8, 1),
     ],
 )
@@ -98,8 +118,8 @@ def test_operators_without_a_window_reach_to_the_end() -> None:
     assert judge("G (x >= 0)", t) == (-7.0, 4.0)
     assert judge("G F (x >= 0)", t) == (-7.0, 4.0)
     assert judge("F G (x >= 0)", t) == (-7.0, 4.0)
-    assert judge("G[0,3] F (x >= 0)", t) == (0.0, 3.0)
-    assert judge("(x >= 0) U G (x <= 0)", t) == (0.0, 3.0)
+    assert judge("G[0,3] F (x >= 0)", t) == (ON_LIMIT, 3.0)
+    assert judge("(x >= 0) U G (x <= 0)", t) == (ON_LIMIT, 3.0)
 
 
 def test_one_sample_and_constants() -> None:
@@ -107,7 +127,7 @@ def test_one_sample_and_constants() -> None:
     assert judge("G (x <= 3)", t) == (1.0, 0.0)
     assert judge("F[0,0] (x <= 3) and (x >= 0) U (x >= 1)", t) == (1.0, 0.0)
     assert judge("1 + 1 <= 5", trajectory(x=X)) == (3.0, 0.0)
-    assert judge("G[0,2] (min(1, 2) * x <= 2^2)", trajectory(x=[4.0, 4.0, 4.0])) == (0.0, 0.0)
+    assert judge("G[0,2] (min(1, 2) * x <= 2^2)", trajectory(x=[4.0, 4.0, 4.0])) == (ON_LIMIT, 0.0)
 
 
 # -- the automatic transmission and the chasing cars ---------------------------------------------------------
@@ -260,14 +280,14 @@ def test_robustness_of_every_sub_formula() -> None:
     formula = parse("G[1,2] (x <= 4) -> F[0,3] (y >= 8)")
     values = Monitor(formula, 1.0, 5).robustness(t)
     assert {str(f): v for f, v in values.items()} == {
-        str(formula): 0.0,
-        "G[1,2] (x <= 4)": 0.0,
+        str(formula): ON_LIMIT,
+        "G[1,2] (x <= 4)": ON_LIMIT,
         "x <= 4": 1.0,
-        "F[0,3] (y >= 8)": 0.0,
+        "F[0,3] (y >= 8)": ON_LIMIT,
         "y >= 8": -6.0,
     }
     later = Monitor(formula, 1.0, 5).robustness(t, time=3.0)
-    assert {str(f): v for f, v in later.items()} == {"x <= 4": 3.0, "y >= 8": 0.0}
+    assert {str(f): v for f, v in later.items()} == {"x <= 4": 3.0, "y >= 8": ON_LIMIT}
     with pytest.raises(MonitorError, match="outside"):
         Monitor(formula, 1.0, 5).robustness(t, time=9.0)
 
@@ -314,7 +334,7 @@ def test_columns_may_be_booleans_integers_or_strided() -> None:
     columns = {"b": np.array([True, False, True]), "i": np.array([1, 2, 3]), "x": matrix[:, 0]}
     t = Trajectory(np.arange(3.0), columns)
     verdict = Monitor(parse("G (b or i <= 3) and F (x >= 5)"), 1.0, 3).evaluate(t)
-    assert verdict.robustness == 0.0
+    assert verdict.robustness == ON_LIMIT
     assert verdict.values == {"b": 1.0, "i": 3.0, "x": 5.0}
     assert {type(v) for v in verdict.values.values()} == {float}
 

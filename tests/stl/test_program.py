@@ -5,6 +5,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.stl import parse
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.evaluator import fill
+from falsifier.stl.margins import ON_LIMIT
 
 TIMES = np.arange(11.0)
 
@@ -21,9 +22,9 @@ def test_every_part_finds_its_values_in_the_buffer() -> None:
         "x >= 3",
     ]
     assert parts["x <= 5"].over(buffer, 0, 2).tolist() == [5.0, 4.0, 3.0]
-    assert parts["F[1,3] (x >= 3)"].over(buffer, 0, 2).tolist() == [0.0, 1.0, 2.0]
-    assert [parts["x <= 5 and F[1,3] (x >= 3)"].at(buffer, k) for k in range(3)] == [0.0, 1.0, 2.0]
-    assert program.root.at(buffer, 0) == 0.0
+    assert parts["F[1,3] (x >= 3)"].over(buffer, 0, 2).tolist() == [ON_LIMIT, 1.0, 2.0]
+    assert [parts["x <= 5 and F[1,3] (x >= 3)"].at(buffer, k) for k in range(3)] == [ON_LIMIT, 1.0, 2.0]
+    assert program.root.at(buffer, 0) == ON_LIMIT
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.stl import parse
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.evaluator import fill
+from falsifier.stl.margins import ON_LIMIT
 from falsifier.stl.witness import Waypoint, path_to_decider
 
 TIMES = np.arange(6.0)
@@ -29,7 +30,7 @@ def test_the_way_goes_through_every_operator_with_its_window() -> None:
         ("n", 2, None),
         ("x", 2, None),
     ]
-    assert [w.value for w in found] == [0.0, 0.0, 0.0, -0.0]
+    assert [w.value for w in found] == [-ON_LIMIT, -ON_LIMIT, -ON_LIMIT, ON_LIMIT]
 
 
 @pytest.mark.parametrize(

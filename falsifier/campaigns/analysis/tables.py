@@ -12,6 +12,7 @@ from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
 from falsifier.campaigns.plan import Method
 from falsifier.core.literals import csv_cell, markdown_text, one_line
+from falsifier.stl.margins import shown
 
 NONE = "–"
 
@@ -187,7 +188,7 @@ def _numbers(s: Statistics) -> tuple[str, ...]:
         _interval(s.mean_interval, 1),
         _number(s.median, 1),
         _number(s.deviation, 1),
-        NONE if s.best is None else f"{s.best:.4g}",
+        NONE if s.best is None else f"{shown(s.best):.4g}",
         *spent,
     )
 

@@ -9,6 +9,7 @@ from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import signed
 
 # Rows that replay.py prints before and after the critical time.
 _SHOWN_ROWS = 3
@@ -22,7 +23,7 @@ Simulates a counterexample with FMPy only; writes outputs.csv and prints the row
     python replay.py [MODEL.fmu]
 
 {requirement}: {formula}
-Recorded robustness {robustness:+.6g}, decided at t = {critical_time:.6g} s by {predicate}
+Recorded robustness {robustness}, decided at t = {critical_time:.6g} s by {predicate}
 """
 
 _REPLAY = '''\
@@ -132,7 +133,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     about = _REPLAY_ABOUT.format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),
-        robustness=verdict.robustness,
+        robustness=signed(verdict.robustness),
         critical_time=verdict.critical_time,
         predicate=one_line(verdict.predicate),
     )

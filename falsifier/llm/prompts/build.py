@@ -28,12 +28,13 @@ from falsifier.llm.prompts.blocks import (
     TaskBlock,
 )
 from falsifier.llm.prompts.circumstances import Circumstances
-from falsifier.llm.prompts.numbers import bounds, number, signed
+from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, clock, published_facts
 from falsifier.llm.prompts.reply import reply_block
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl import in_words
+from falsifier.stl.margins import is_on_limit, margin_words, signed
 
 # Control-point times listed individually; of longer lists the first ones and the last.
 _MAX_TIMES = 25
@@ -301,13 +302,16 @@ def _sample(
         reply,
         in_brief=depth == "summary" or (depth == "plain" and not mark),
     )
-    if evaluation.robustness is None:
+    verdict = evaluation.verdict
+    if verdict is None:
         return SampleLines(number=index + 1, mark=mark, inputs=inputs, failure=_failure(evaluation))
     rich = variant.has("observations")
     if rich:
-        robustness = signed(evaluation.robustness, observations.ROBUSTNESS_DIGITS)
+        robustness = signed(verdict.robustness, observations.ROBUSTNESS_DIGITS)
+        if is_on_limit(verdict.robustness):
+            robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
     else:
-        robustness = f"{evaluation.robustness:.{ROBUSTNESS_DECIMALS + view.more_decimals}f}"
+        robustness = f"{verdict.robustness:.{ROBUSTNESS_DECIMALS + view.more_decimals}f}"
     return SampleLines(
         number=index + 1,
         mark=mark,
@@ -353,7 +357,7 @@ def _notes(view: View, evaluations: Sequence[Evaluation]) -> list[str]:
     if not _is_flat(evaluations):
         return []
     return [
-        f"The robustness is flat: it was {signed(values[0])} in all {len(values)} samples, so its value "
+        f"The robustness is flat: it was {signed(values[0], 3)} in all {len(values)} samples, so its value "
         "gives no direction. Look instead at how close a condition came to being true, how briefly a "
         "discrete value was held, and how far a signal was from its switching point."
     ]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.llm.prompts.numbers import signed
+from falsifier.stl.margins import signed
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,11 @@ def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float
     if robustness is None:
         why = "a second simulation of it failed"
     elif robustness >= 0:
-        again, why = robustness, f"a second simulation gave robustness {signed(robustness)}"
+        again, why = robustness, f"a second simulation gave robustness {signed(robustness, 3)}"
     elif again is not None and again >= 0:
-        why = f"at half the simulation step its robustness is {signed(again)}"
+        why = f"at half the simulation step its robustness is {signed(again, 3)}"
     else:
-        told = "" if reference is None else f", {signed(reference)} instead of {signed(robustness)}"
+        told = "" if reference is None else f", {signed(reference, 3)} instead of {signed(robustness, 3)}"
         why = f"a second monitor does not confirm it{told}"
     text = f"this does not count as a violation, it is {confirmation.outcome}: {why}"
     if again is None or again < 0:

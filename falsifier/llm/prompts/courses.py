@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from falsifier.llm.prompts.numbers import decimals_for, plain
 from falsifier.llm.prompts.shapes import Course, Points, Swing
+from falsifier.stl.margins import is_on_limit
 
 Array = NDArray[np.float64]
 
@@ -158,7 +159,7 @@ def _swing(swing: Swing, decimals: int, clock: int) -> str:
 def column_decimals(column: Array, *, margin: float | None = None) -> int:
     """Decimals needed to show a column's values, and a margin of this size between two of them."""
     usual = decimals_for(float(np.abs(column).max()))
-    if margin is None or margin == 0:
+    if margin is None or is_on_limit(margin):
         return usual
     limit = decimals_for(float(np.abs(column).max()), 9)
     return min(max(usual, decimals_for(margin, 3)), limit)

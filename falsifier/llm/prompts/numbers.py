@@ -33,15 +33,6 @@ def plain(value: float, decimals: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def signed(value: float, digits: int = 3) -> str:
-    """Robustness with its sign.
-
-    >>> signed(0.41874), signed(-12.0), signed(0.0)
-    ('+0.419', '-12', '0')
-    """
-    return f"{value:+.{digits}g}" if value else "0"
-
-
 def bounds(low: float, high: float) -> tuple[str, str]:
     """Bounds as text; rounded inward if rounded at all, so that a printed bound lies in the range.
 

@@ -16,11 +16,12 @@ from falsifier.llm.prompts.courses import (
     dwell_list,
     longest_stretch,
 )
-from falsifier.llm.prompts.numbers import decimals_for, number, plain, signed
+from falsifier.llm.prompts.numbers import decimals_for, number, plain
 from falsifier.llm.prompts.shapes import MOST_BREAKPOINTS, Course, course, oscillations
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
 from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
+from falsifier.stl.margins import shown, signed
 
 Array = NDArray[np.float64]
 
@@ -206,7 +207,7 @@ def _predicate(view: View, monitor: Monitor, predicate: Predicate, trajectory: T
 
 
 def _short(margin: float) -> str:
-    return f"{margin:.5g}"
+    return f"{shown(margin):.5g}"
 
 
 def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:

@@ -53,7 +53,10 @@ def _task(task: TaskBlock) -> str:
             f"Your task is to find {what} with which a system violates its specification. Each sample is "
             "judged by a number, its robustness: lower is better, and below 0 the specification is violated."
         )
-    sign = "A robustness below 0 is a violation; exactly 0 is not. Smaller values are closer to a violation."
+    sign = (
+        "A robustness below 0 is a violation. Exactly on the limit, -0 is a violation and +0 is not, as the "
+        "comparison says: > forbids its limit, >= allows it. Smaller values are closer to a violation."
+    )
     return (
         f"You search for a counterexample: a system is simulated with {task.chosen} that you choose, and a "
         "monitor returns the robustness, the margin by which the requirement is met. Find "

@@ -5,9 +5,10 @@ from typing import Any
 
 from falsifier.core.words import counted
 from falsifier.llm.messages import Tool
-from falsifier.llm.prompts.numbers import number, signed
+from falsifier.llm.prompts.numbers import number
 from falsifier.llm.prompts.variants import Variant
 from falsifier.stl import Verdict
+from falsifier.stl.margins import signed
 
 NAME = "predict"
 
@@ -34,7 +35,7 @@ def what_if_tool(parameters: dict[str, Any], *, calls: int) -> Tool:
 
 def predicted(variant: Variant, verdict: Verdict) -> str:
     """The prediction for one candidate, limited to what the variant shows of samples."""
-    parts = [f"predicted robustness {signed(verdict.robustness)}"]
+    parts = [f"predicted robustness {signed(verdict.robustness, 3)}"]
     if variant.has("critical"):
         by = f" by {verdict.predicate}" if variant.has("requirement") and verdict.predicate else ""
         parts.append(f"decided at about t = {number(verdict.critical_time, 4)} s{by}")

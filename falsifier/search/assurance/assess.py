@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.core.words import counted, margin_words
+from falsifier.core.words import counted
 from falsifier.engines.box import UnitBox
 from falsifier.engines.uniform import Uniform
 from falsifier.errors import SimulationError, SpecError
@@ -24,6 +24,7 @@ from falsifier.problem.problem import Problem, check_limits
 from falsifier.search.assurance.splitting import Splitting, least_budget, split
 from falsifier.search.findings import Finding
 from falsifier.search.vacuity import Vacuity
+from falsifier.stl.margins import margin_words, signed
 
 Progress = Callable[[int], None]
 
@@ -98,7 +99,7 @@ class Assurance:
             lines.append("That is true, but says little: a part of the requirement was not tested.")
         lines += [f"Note: {finding.text}" for finding in self.findings]
         smallest = _robustness(self.smallest)
-        lines.append(f"The smallest robustness of these was {smallest:+.6g} ({margin_words(smallest)}).")
+        lines.append(f"The smallest robustness of these was {signed(smallest)} ({margin_words(smallest)}).")
         if self.searched is not None:
             lines.append(self._searched_text(self.searched))
         if self.splitting is not None:

@@ -12,6 +12,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.parts import labels_of
 from falsifier.search.result import Result
+from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
 from falsifier.views.panels import Bound, Panel, panels
 from falsifier.views.plotting.axes import caption, figure_of, own_axes, whole_ticks, wrapped
@@ -110,7 +111,7 @@ def _title(problem: Problem, evaluation: Evaluation, verdict: Verdict) -> str:
 
 def _decided(verdict: Verdict) -> list[str]:
     by, at = verdict.predicate, f"{verdict.critical_time:.5g} s"
-    decided = f"robustness {verdict.robustness:+.5g}, decided by {by} at {at}"
+    decided = f"robustness {signed(verdict.robustness, 5)}, decided by {by} at {at}"
     if verdict.breach is not None:
         return [*verdict.breach.lines, decided]
     return [f"{'violated' if verdict.violated else 'not violated'}, {decided}"]

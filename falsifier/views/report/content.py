@@ -15,6 +15,7 @@ from falsifier.search.journal import read_journal, recorded_candidates, recorded
 from falsifier.search.levels import outcomes
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse
+from falsifier.stl.margins import is_on_limit, margin_words
 from falsifier.views.panels import Panel, panels
 
 
@@ -125,6 +126,8 @@ def _where(run: Run) -> str:
     values = "".join(f", {name} = {v:.6g}" for name, v in run.verdict.values.items() if name in signals)
     robustness, time = abs(run.verdict.robustness), run.verdict.critical_time
     what = f"by {robustness:.4g}" if run.falsified else f"{robustness:.4g} away from a violation"
+    if is_on_limit(robustness):
+        what = margin_words(run.verdict.robustness, run.verdict.predicate)
     return f": {what} at t = {time:.6g} s ({run.verdict.predicate}{values})"
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from falsifier.campaigns.analysis import Run
 from falsifier.core.words import counted
+from falsifier.stl.margins import shown
 from falsifier.views.html import Html, el, join
 from falsifier.views.panels import Bound, Panel
 from falsifier.views.report.plots import COLOURS, Plots, history_plot, rate_plot, simulation_plots
@@ -30,7 +31,7 @@ def history_figure(runs: Sequence[Run], label: str) -> Html:
         (
             f"{run.seed}",
             f"{run.simulations}",
-            "–" if np.isnan(run.robustness).all() else f"{np.nanmin(run.robustness):.6g}",
+            "–" if np.isnan(run.robustness).all() else f"{shown(np.nanmin(run.robustness)):.6g}",
             "–" if run.counterexample is None else f"{run.counterexample + 1}",
         )
         for run in runs

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import plain
 from falsifier.core.words import counted
+from falsifier.stl.margins import signed
 from falsifier.views.report.content import replay_command, run_command, searches
 from falsifier.views.text import broken_lines
 
@@ -51,7 +52,7 @@ def _case(label: str, run: Run) -> ElementTree.Element:
     if run.falsified and run.verdict is not None:
         count = counted(run.simulations, "simulation")
         broken = f"{run.verdict.breach.main.what}; " if run.verdict.breach else ""
-        message = f"{broken}robustness {run.verdict.robustness:+.6g} after {count}"
+        message = f"{broken}robustness {signed(run.verdict.robustness)} after {count}"
         failure = ElementTree.SubElement(case, "failure", message=plain(message), type="falsified")
         lines = (
             run.manifest.requirement.formula,

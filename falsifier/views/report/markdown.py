@@ -4,6 +4,7 @@ from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.core.words import counted
+from falsifier.stl.margins import signed
 from falsifier.views.report.content import (
     Content,
     Section,
@@ -41,7 +42,7 @@ def _section(section: Section) -> str:
     if run.verdict is not None:
         lines += [f"- {markdown_text(one_line(line))}" for line in broken_lines(run.verdict)]
         lines.append(
-            f"Robustness {run.verdict.robustness:+.6g} at t = {run.verdict.critical_time:.6g} s, "
+            f"Robustness {signed(run.verdict.robustness)} at t = {run.verdict.critical_time:.6g} s, "
             f"decided by {markdown_code(run.verdict.predicate)}, after "
             f"{counted(run.simulations, 'simulation')} with {markdown_text(run.method.label)}, "
             f"seed {run.seed}."

@@ -13,6 +13,7 @@ from falsifier.campaigns.analysis import Run, Table
 from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
 from falsifier.core.words import choices, counted
+from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join
 from falsifier.views.report.content import (
@@ -206,7 +207,7 @@ def _section(section: Section, fineness: int, most: int) -> Html:
 
 def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     run, verdict = shown.run, shown.run.verdict
-    robustness = f"robustness {verdict.robustness:+.6g}" if verdict else "no verdict"
+    robustness = f"robustness {signed(verdict.robustness)}" if verdict else "no verdict"
     heading = f"{run.method.label}, seed {run.seed}: {run.spent.simulations_text}, {robustness}"
     facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
     if verdict is not None:

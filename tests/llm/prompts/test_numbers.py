@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from falsifier.llm.prompts.numbers import bounds, runs, signed
+from falsifier.llm.prompts.numbers import bounds, runs
 
 floats = st.floats(-1e6, 1e6, allow_nan=False)
 
@@ -16,8 +16,3 @@ def test_printed_bounds_lie_inside_the_range(low: float, width: float) -> None:
 def test_runs_read_back() -> None:
     assert runs([1.0] * 20 + [2.0]) == '["1 x 20", 2]'
     assert runs([1.0] * 10) == f"[{', '.join(['1'] * 10)}]"
-
-
-def test_zero_has_no_sign() -> None:
-    assert signed(0.0) == "0"
-    assert signed(-1e-7) == "-1e-07"

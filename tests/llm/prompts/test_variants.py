@@ -38,10 +38,10 @@ def test_an_empty_history_is_not_described(variant: str) -> None:
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_zero_is_no_violation_and_ranges_are_told(variant: str) -> None:
+def test_what_a_violation_is_and_ranges_are_told(variant: str) -> None:
     standing, _ = told(transmission()[0], variant)
     assert (
-        "exactly 0 is not" if variant in ("MP5", "MP6") else "below 0 the specification is violated"
+        "> forbids its limit" if variant in ("MP5", "MP6") else "below 0 the specification is violated"
     ) in standing
     assert "from 0 to 325" in standing
 
