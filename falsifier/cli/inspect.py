@@ -23,7 +23,7 @@ from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems, load_source
 from falsifier.problem.models import is_system, make_system
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, held_text
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
@@ -205,6 +205,9 @@ def check(*, target: str, profile: str | None, template: str | None) -> None:
         say(_problem_line(problem))
     for note in dict.fromkeys(note for problem in problems for note in problem.notes):
         say(f"note: {note}")
+    for held in dict.fromkeys(held_text(problem.held_inputs) for problem in problems):
+        if held:
+            say(f"not searched: {held}")
 
 
 @click.command()

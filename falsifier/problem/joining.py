@@ -105,7 +105,7 @@ def join(
             file,
         ),
         fixed,
-        (*model.info.notes, *_notes(grid, model.info, known), *_rights(model)),
+        (*model.info.notes, *_notes(grid, model)),
     )
 
 
@@ -121,8 +121,9 @@ def join_fmu(
 
     The requirement gets the given name.
 
-    If no input or parameter is to be searched, all real inputs with a min and a max are searched. There must
-    be one, unless the problem is made for other things than a search.
+    If no input or parameter is to be searched, all inputs with a min and a max are searched, and those whose
+    type states them (Booleans, enumerations). There must be one, unless the problem is made for other things
+    than a search.
 
     Raises:
         SpecError: naming what is unknown and the option that specifies it.
@@ -222,12 +223,7 @@ def _join_formula(
             f"{did_you_mean('', inputs)}"
         )
     every = changes.model_copy(update={"inputs": bounded | changes.inputs})
-    joined = join(spec, name, path=path, changes=every, model=model, searches=searches)
-    unbounded = [v.name for v in info.inputs if v.name not in {*joined.space.names, *joined.parameters}]
-    if searched or not unbounded:
-        return joined
-    note = f"not searched, because the {info.noun} specifies no min and max: {', '.join(unbounded)}"
-    return replace(joined, notes=(*joined.notes, note))
+    return join(spec, name, path=path, changes=every, model=model, searches=searches)
 
 
 def _experiment(
@@ -291,16 +287,10 @@ def _grid(
         raise SpecError(str(error), file=file) from None
 
 
-def _notes(grid: Grid | None, info: ModelInfo, known: Collection[str]) -> Iterator[str]:
+def _notes(grid: Grid | None, model: Model) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
-    unset = [v.name for v in info.inputs if v.name not in known]
-    if unset:
-        yield f"inputs without a start value, left to the {info.noun}: {', '.join(unset)}"
-
-
-def _rights(model: Model) -> Iterator[str]:
-    """Say what a spec or an option lets the FMU do, which the user may not have written."""
+    # What a spec or an option lets the FMU do, which the user may not have written.
     for name, said in (("allow", "may also"), ("deny", "may not use")):
         if words := getattr(model, name, ()):
             yield f"the {model.info.noun} {said}: {', '.join(words)}"
@@ -465,8 +455,6 @@ def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:
 
 
 def _bounded_inputs(info: ModelInfo) -> dict[str, InputSection]:
-    return {
-        v.name: InputSection()
-        for v in info.inputs
-        if v.kind == "real" and v.low is not None and v.high is not None
-    }
+    """Return the inputs whose range the FMU or their type states."""
+    connected = {target for _, target in info.connections}
+    return {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}

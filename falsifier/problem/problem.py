@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite
-from falsifier.core.model import Experiment, Interface, Model, ModelInfo
+from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
@@ -20,6 +20,23 @@ from falsifier.problem.source import ProblemSource
 
 if TYPE_CHECKING:
     from falsifier.problem.joining import Joined
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """An input or a parameter of the model that is not searched.
+
+    Attributes:
+        name: its name.
+        causality: whether it is an input or a parameter.
+        value: the number or text at which it is held; None: the model's own, which it does not state.
+        reason: why it is not searched, in words.
+    """
+
+    name: str
+    causality: Literal["input", "parameter"]
+    value: float | str | None
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,6 +214,32 @@ class Problem:
         return self.model.info
 
     @property
+    def held(self) -> tuple[Held, ...]:
+        """The model's inputs and parameters that are not searched, with their values and the reason."""
+        given: dict[str, float | str] = {**dict(self.experiment.strings), **self.parameters}
+        searched = set(self.space.names)
+        connected = {target for _, target in self.info.connections}
+        listed = [v for v in (*self.info.inputs, *self.info.parameters) if v.name not in connected]
+        names = {v.name for v in listed}
+        # Start values and elements that are given belong to variables of other kinds.
+        listed += [v for v in self.info.variables if v.name in given and v.name not in names]
+        return tuple(
+            Held(
+                v.name,
+                "input" if v.causality == "input" else "parameter",
+                given.get(v.name, v.start),
+                _held_because(v, self.info, is_given=v.name in given),
+            )
+            for v in listed
+            if v.name not in searched
+        )
+
+    @property
+    def held_inputs(self) -> tuple[Held, ...]:
+        """The inputs among them: nobody expects a parameter without a range to be searched."""
+        return tuple(held for held in self.held if held.causality == "input")
+
+    @property
     def name(self) -> str:
         """The requirement's name."""
         return self.requirement.name
@@ -215,6 +258,29 @@ class Problem:
             sorted(self.parameters.items()),
         )
         return sha256(repr(content).encode()).hexdigest()
+
+
+def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str:
+    if is_given:
+        return "its value is given"
+    if variable.kind == "string":
+        return "a text has no range"
+    if variable.causality == "input" and not variable.is_bounded:
+        return f"no range is given, and the {info.noun} specifies no min and max"
+    return "no range is given"
+
+
+def held_text(held: Iterable[Held]) -> str:
+    """Say which inputs and parameters are not searched, by reason; empty if all are.
+
+    >>> held_text([Held("u", "input", 1.0, "its value is given"), Held("v", "input", None, "no range")])
+    'u = 1 (its value is given); v (no range)'
+    """
+    by_reason: dict[str, list[str]] = {}
+    for each in held:
+        value = each.value if isinstance(each.value, str | None) else f"{each.value:g}"
+        by_reason.setdefault(each.reason, []).append(each.name if value is None else f"{each.name} = {value}")
+    return "; ".join(f"{', '.join(values)} ({reason})" for reason, values in by_reason.items())
 
 
 def _check_variables(problem: Problem) -> None:

@@ -18,6 +18,8 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.search import manifest
+from falsifier.search.findings import Failure
+from falsifier.search.findings import failures as by_cause
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
 from falsifier.search.manifest import InputRecord, Manifest
 from falsifier.search.parts import (
@@ -161,7 +163,7 @@ class Coverage:
 
     Attributes:
         simulations: number of simulations with a verdict; others say nothing about the system.
-        failures: number of the others.
+        failures: why the others failed, by cause.
         trajectories: number of simulations whose trajectory was kept, from which outputs and modes are read.
         stop_time: end of each simulation in s.
         ranges: the inputs, then the parameters.
@@ -171,7 +173,7 @@ class Coverage:
     """
 
     simulations: int
-    failures: int
+    failures: tuple[Failure, ...]
     trajectories: int
     stop_time: float
     ranges: tuple[RangeCoverage, ...]
@@ -201,16 +203,17 @@ def coverage(directory: str | PathLike[str]) -> Coverage:
     ended = [r for r in records if isinstance(r, EvaluatedRecord)]
     judged = [r for r in ended if any(r.verdicts.values())]
     tried = ((candidates[r.index], recorded_trajectory(place, r.trajectory)) for r in judged)
-    return coverage_of(described, tried, failures=len(ended) - len(judged))
+    reasons = ((r.index, r.reason) for r in ended if not any(r.verdicts.values()))
+    return coverage_of(described, tried, failures=by_cause(reasons))
 
 
-def coverage_of(described: Manifest, tried: Tried, *, failures: int = 0) -> Coverage:
+def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, ...] = ()) -> Coverage:
     """Return the coverage of simulations.
 
     Args:
         described: what was searched.
         tried: each candidate with a verdict, and its trajectory if there is one.
-        failures: number of simulations without a verdict.
+        failures: why the simulations without a verdict failed.
     """
     count = _Count(described)
     for candidate, trajectory in tried:
@@ -324,7 +327,7 @@ class _Count:
                     values if known is None else np.maximum(known.highs, values),
                 )
 
-    def coverage(self, failures: int) -> Coverage:
+    def coverage(self, failures: tuple[Failure, ...]) -> Coverage:
         """Return what was counted."""
         return Coverage(
             simulations=self.simulations,

@@ -1,7 +1,12 @@
-"""What a search that found nothing could not show, so that its answer is not taken for more than it says."""
+"""What a search could not show, so that its answer is not taken for more than it says."""
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
+
+# A number that is not part of a name: two errors that differ only in such numbers have the same cause.
+_NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)", re.IGNORECASE)
 
 # parameterization: only fixed control points were searched; condition: that of an implication never held;
 # disjunct: one side of an ``or`` always held; threshold: a predicate was never near its threshold;
@@ -38,3 +43,43 @@ class Finding:
     def untested(self) -> bool:
         """Whether a part of the requirement never had a say, or nothing moved it; not: a wide margin."""
         return self.kind in ("condition", "disjunct", "constant")
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Simulations that failed for the same cause.
+
+    Attributes:
+        count: how many.
+        reason: of the first of them, in words.
+        simulation: index of the first of them.
+    """
+
+    count: int
+    reason: str
+    simulation: int
+
+    @property
+    def text(self) -> str:
+        """The cause, with an example."""
+        which = f"simulation {self.simulation + 1}"
+        if self.count == 1:
+            return f"{which} failed: {self.reason}"
+        return f"{self.count} simulations failed: {self.reason} (for example {which})"
+
+
+def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
+    """Group failed simulations by their cause; the most frequent first.
+
+    Args:
+        reasons: index of each failed simulation, and why it failed.
+
+    >>> [f.text for f in failures([(3, "index 0 is outside of 1..5"), (7, "index 9 is outside of 1..5")])]
+    ['2 simulations failed: index 0 is outside of 1..5 (for example simulation 4)']
+    """
+    found: dict[str, Failure] = {}
+    for index, reason in reasons:
+        cause = _NUMBER.sub("#", reason)
+        known = found.get(cause, Failure(0, reason, index))
+        found[cause] = Failure(known.count + 1, known.reason, known.simulation)
+    return tuple(sorted(found.values(), key=lambda failure: -failure.count))

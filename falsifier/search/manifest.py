@@ -3,12 +3,13 @@
 import platform
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -19,7 +20,7 @@ from falsifier.core.space import InputRange, ParameterRange, ValueKind
 from falsifier.errors import JournalError, rejected
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Searched
 from falsifier.search.journal import MANIFEST, read_manifest
@@ -44,6 +45,15 @@ class InputRecord(_Strict):
     description: str = ""
     kind: ValueKind = "real"
     items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
+
+
+class HeldRecord(_Strict):
+    """One input or parameter that is not searched."""
+
+    name: str
+    causality: Literal["input", "parameter"]
+    value: float | str | None = Field(description="At which it is held; null: the model's own.")
+    reason: str = Field(description="Why it is not searched.")
 
 
 class ModeRecord(_Strict):
@@ -101,6 +111,9 @@ class Manifest(_Strict):
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
+    not_searched: tuple[HeldRecord, ...] = Field(
+        description="The other inputs and the parameters, with the values at which they are held."
+    )
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
     stop_time: float = Field(description="End of each simulation in s.")
     hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec, by path.")
@@ -108,6 +121,11 @@ class Manifest(_Strict):
         {}, description="What the language model was told of context files, by requirement."
     )
     sum: str = Field("", description="Checksum of the file up to here.")
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """The inputs and parameters that were not searched."""
+        return tuple(Held(**record.model_dump()) for record in self.not_searched)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -178,6 +196,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         ),
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
+        not_searched=tuple(HeldRecord(**asdict(held)) for held in problem.held),
         modes=tuple(_modes(problem)),
         stop_time=space.stop_time,
         hashes=file_hashes(problem),

@@ -9,7 +9,7 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
-from falsifier.search.findings import Finding
+from falsifier.search.findings import Failure, Finding, failures
 from falsifier.search.levels import Level
 from falsifier.search.moves import Objective
 from falsifier.stl.margins import signed
@@ -67,6 +67,11 @@ class Result:
     def falsified(self) -> bool:
         """Whether a confirmed counterexample was found."""
         return self.counterexample is not None
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Why simulations failed, by cause."""
+        return failures((i, e.reason) for i, e in enumerate(self.evaluations) if e.status != "ok")
 
     @property
     def shown(self) -> Evaluation | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.llm.messages import Exchange
 from falsifier.search.budget import Spent
-from falsifier.search.findings import Finding
+from falsifier.search.findings import Failure, Finding, failures
 from falsifier.search.journal import JournalReader
 from falsifier.search.records import (
     AskedRecord,
@@ -58,7 +58,7 @@ class Tally:
         self._requirement = requirement
         self._spent = Spent()
         self._simulation_seconds = 0.0
-        self._failures = 0
+        self._failed: dict[int, str] = {}
         self._robustness: list[float] = []
         self._missing: set[int] = set()
         self._has_ended = False
@@ -71,8 +71,13 @@ class Tally:
             self._spent,
             simulations=len(self._robustness),
             simulation_seconds=self._simulation_seconds,
-            failures=self._failures,
+            failures=len(self._failed),
         )
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Why simulations failed, by cause."""
+        return failures(sorted(self._failed.items()))
 
     @property
     def robustness(self) -> NDArray[np.float64]:
@@ -149,7 +154,8 @@ class Tally:
         self._missing = (self._missing | set(gap)) - {record.index}
         self._robustness[record.index] = value
         self._simulation_seconds += record.seconds
-        self._failures += all(v is None for v in judged.values())
+        if all(v is None for v in judged.values()):
+            self._failed[record.index] = record.reason
 
 
 def read_tally(directory: Path, requirement: str | None = None) -> Tally:

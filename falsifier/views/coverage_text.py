@@ -1,6 +1,7 @@
 """What a run has tried, as a table for terminals or as JSON."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from falsifier.core.literals import one_line
@@ -19,8 +20,10 @@ def coverage_text(found: Coverage, name: str) -> str:
         found: what was tried.
         name: of the requirement or the run.
     """
-    failed = f", and {counted(found.failures, 'failed one')}" if found.failures else ""
+    count = sum(failure.count for failure in found.failures)
+    failed = f", and {counted(count, 'failed one')}" if count else ""
     lines = [f"{name}: what {counted(found.simulations, 'simulation')} tried{failed}"]
+    lines += [f"  {failure.text}" for failure in found.failures]
     if found.ranges:
         header = ("searched", "range", "tried", "parts tried", "changes")
         lines += _aligned([header, *map(_range_row, found.ranges)])
@@ -45,7 +48,7 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
     """Convert coverage to a value that can be dumped as one JSON object."""
     return {
         "simulations": found.simulations,
-        "failures": found.failures,
+        "failures": [asdict(failure) for failure in found.failures],
         "trajectories": found.trajectories,
         "searched": [
             {

@@ -107,6 +107,7 @@ def result_html(result: Result) -> str:
     if shown is not None:
         facts += _verdict_facts(shown.verdict) if shown.verdict else []
         facts += _candidate_facts(shown.candidate)
+    facts += [("failed", failure.text) for failure in result.failures]
     facts += [("fallback", remark) for remark in result.remarks]
     facts.append(("time", seconds_text(spent)))
     parts = [el("b", title), _facts(facts)]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
+from falsifier.problem.problem import held_text
 from falsifier.search.events import (
     Asked,
     Confirmed,
@@ -244,7 +245,9 @@ def _notes(event: RunStarted) -> list[str]:
     parameterization = parameterization_note(event.searched)
     if event.levels:
         parameterization = f"inputs are refined in {len(event.levels)} levels, from coarse to fine"
-    return [*([parameterization] if parameterization else []), *chosen]
+    held = held_text(event.problems[0].held_inputs)
+    unsearched = f"not searched: {held}" if held else ""
+    return [text for text in (parameterization, unsearched, *chosen) if text]
 
 
 def _confirmed(event: Confirmed) -> str:

@@ -10,7 +10,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, held_text
 from falsifier.search import manifest
 from falsifier.search.assurance import Assurance
 from falsifier.search.budget import Spent
@@ -40,6 +40,9 @@ def result_text(result: Result) -> str:
     elif result.counterexample is None and result.searched is not None and result.searched.inputs:
         lines.append(f"  inputs         {parameterization_note(result.searched)}")
     lines += [f"  note           {finding.text}" for finding in result.findings]
+    if held := held_text(result.problem.held_inputs):
+        lines.append(f"  not searched   {held}")
+    lines += [f"  failed         {failure.text}" for failure in result.failures]
     lines += [f"  fragile        {c.reason}" for c in result.fragile]
     lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
     lines += [f"  fallback       {remark}" for remark in result.remarks]
@@ -85,7 +88,10 @@ def results_text(results: Sequence[Result]) -> str:
             ]
         lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
+        lines += [f"{'':{width}}  failed: {failure.text}" for failure in result.failures]
         lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
+    held = dict.fromkeys(held_text(r.problem.held_inputs) for r in results)
+    lines += [f"not searched: {text}" for text in held if text]
     falsified = sum(result.counterexample is not None for result in results)
     total = max((result.spent for result in results), key=lambda spent: (spent.simulations, spent.seconds))
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
@@ -117,6 +123,8 @@ def result_json(result: Result) -> dict[str, Any]:
         else parameterization_of(result.searched or result.problem.space),
         "levels": _levels_json(result),
         "findings": [asdict(finding) for finding in result.findings],
+        "failures": [asdict(failure) for failure in result.failures],
+        "not_searched": [asdict(held) for held in result.problem.held],
         "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "remarks": list(result.remarks),
         "not_confirmed": [c.reason for c in result.refuted],
@@ -208,7 +216,7 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "confidence": found.confidence,
         "drawn": found.drawn,
         "violations": found.violations,
-        "failures": found.failures,
+        "failures": [asdict(failure) for failure in found.failures],
         "upper_bound": found.bound,
         "interval": found.interval,
         "smallest": evaluation_json(found.smallest),

@@ -2,12 +2,14 @@
 
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError, SpecError
 from falsifier.problem.joining import Joined, join, join_fmu
+from falsifier.problem.problem import Problem
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import path as fixture
@@ -104,6 +106,32 @@ def test_an_fmu_alone_is_searched_over_its_bounded_inputs() -> None:
         changes=changes_from_options(inputs=["brake=3"], parameters=["finalDrive=3:3.5"]),
     )
     assert (fixed.space.inputs, fixed.parameters) == ((), {"brake": 3.0})
+
+
+def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_the_reason_is_told(
+    tmp_path: Path,
+) -> None:
+    problem = Problem.from_fmu(fixture("Echo_2"), "G[0,1] (out_Real <= 1)")
+    assert [r.name for r in problem.space.inputs] == ["in_Boolean", "in_Enumeration"]
+    why = "no range is given, and the FMU specifies no min and max"
+    assert [(h.name, h.value, h.reason) for h in problem.held_inputs] == [
+        ("in_Real", 0.0, why),
+        ("in_Integer", 0.0, why),
+    ]
+    fmu = tmp_path / "Protocol.fmu"
+    with ZipFile(fixture("Echo_2")) as old, ZipFile(fmu, "w") as new:
+        for item in old.infolist():
+            stated = old.read(item).replace(
+                b'<Integer start="0"/>', b'<Integer start="0" min="0" max="5"/>', 1
+            )
+            new.writestr(item, stated)
+    problem = Problem.from_fmu(fmu, "G[0,1] (out_Real <= 1)")
+    found = {r.name: (r.low, r.high, r.kind, r.interpolation) for r in problem.space.inputs}
+    assert found["in_Integer"] == (0, 5, "integer", "constant")
+    chosen = Problem.from_fmu(fmu, "G[0,1] (out_Real <= 1)", inputs={"in_Real": (0, 1), "in_Boolean": 1.0})
+    held = {h.name: (h.value, h.reason) for h in chosen.held}
+    assert held["in_Integer"] == (0.0, "no range is given")
+    assert held["in_Boolean"] == (1.0, "its value is given")
 
 
 def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from falsifier.search.coverage import Coverage, coverage_of
 from falsifier.search.manifest import InputRecord, Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest
 from falsifier.testing import lag_problem
+from falsifier.views.coverage_text import coverage_json, coverage_text
+from tests.problems import mostly_broken
 
 TIMES = np.linspace(0.0, 10.0, 11)
 
@@ -87,7 +89,7 @@ def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> N
     result = falsify(lag_problem("G[0,10] (x <= 2)", inputs=2), "uniform", budget=6, directory=tmp_path)
     found = coverage(tmp_path)
     values = [v for e in result.evaluations for v in e.candidate.signals["u"].values]
-    assert (found.simulations, found.trajectories, found.failures) == (6, 6, 0)
+    assert (found.simulations, found.trajectories, found.failures) == (6, 6, ())
     assert found.ranges[0].low == pytest.approx(min(values))
     assert found.ranges[0].high == pytest.approx(max(values))
     assert [o.name for o in found.outputs] == ["x"]
@@ -96,3 +98,12 @@ def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> N
 def test_what_is_no_path_is_refused() -> None:
     with pytest.raises(SpecError, match="coverage: expected a run directory, got None"):
         coverage(None)  # type: ignore[arg-type]
+
+
+def test_causes_of_failed_simulations_are_counted(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 3)", response=mostly_broken)
+    result = falsify(problem, "uniform", budget=20, seed=1, directory=tmp_path)
+    found = coverage(tmp_path)
+    assert found.failures == result.failures and found.failures[0].count > 1
+    assert found.failures[0].text in coverage_text(found, "R")
+    assert coverage_json(found)["failures"][0]["simulation"] == found.failures[0].simulation

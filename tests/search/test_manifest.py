@@ -35,6 +35,7 @@ def test_a_problem_made_in_python_has_no_files() -> None:
     described = describe(RunRequest(problems=()), [lag_problem(free=FREE, parameters=[START])], "mine")
     assert (described.hashes, described.fmu_sha256, described.shared) == ({}, None, False)
     assert [p.name for p in described.parameters] == ["x0"]
+    assert [(h.name, h.value) for h in described.held] == [("gain", 1.0), ("bias", 0.0)]
     assert describe(RunRequest(problems=()), [lag_problem()], "mine").parameterization == "fixed"
 
 

@@ -14,6 +14,7 @@ from falsifier.search.findings import Finding
 from falsifier.search.levels import Level
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
+from falsifier.testing import lag_problem
 from falsifier.views.text import (
     counterexample_name,
     result_json,
@@ -21,7 +22,7 @@ from falsifier.views.text import (
     results_text,
     seconds_text,
 )
-from tests.problems import conditional, easy, hard, impossible, unusable
+from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
 
 
 @pytest.fixture(scope="module")
@@ -207,3 +208,20 @@ def test_a_level_counts_no_simulation_after_the_counterexample(found: Result) ->
     longer = replace(found, evaluations=(*found.evaluations[:count], *found.evaluations[:1]), levels=levels)
     assert result_json(longer)["levels"][0]["simulations"] == count
     assert f"level 1 of 1   falsified after {count} simulation" in result_text(longer)
+
+
+def test_why_simulations_failed_and_what_was_not_searched_is_told() -> None:
+    problem = lag_problem("G[0,10] (x <= 3)", response=mostly_broken, inputs=2)
+    space = replace(problem.space, inputs=problem.space.inputs[:1])
+    problem = replace(problem, space=space, parameters={"bias": 0.25})
+    result = falsify(problem, "uniform", budget=20, seed=1)
+    (cause,) = result.failures
+    assert cause.count == result.spent.failures > 1 and not result.evaluations[cause.simulation].verdict
+    for text in (result_text(result), results_text([result, replace(result, problem=problem)])):
+        assert f"{cause.count} simulations failed: {cause.reason} (for example simulation" in text
+        assert "v = 0 (no range is given)" in text
+        assert "bias" not in text  # nobody expects a parameter without a range to be searched
+    data = result_json(result)
+    assert data["failures"][0]["count"] == cause.count
+    held = {each["name"]: (each["value"], each["reason"]) for each in data["not_searched"]}
+    assert held["v"] == (0.0, "no range is given") and held["bias"] == (0.25, "its value is given")

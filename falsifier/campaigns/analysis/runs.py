@@ -18,7 +18,7 @@ from falsifier.errors import JournalError
 from falsifier.problem.defaults import STL_NAME
 from falsifier.search import manifest as manifests
 from falsifier.search.budget import Spent
-from falsifier.search.findings import Finding
+from falsifier.search.findings import Failure, Finding
 from falsifier.search.manifest import Manifest
 from falsifier.search.tally import RunStatus, read_tally
 from falsifier.stl.verdict import Verdict
@@ -46,6 +46,7 @@ class Run:
         trajectories: names of kept trajectory files, by index.
         spent: what it has spent.
         findings: what the search could not show; empty before it has ended.
+        failures: why simulations failed, by cause.
         requirement: name of the requirement; numbered if another run has another formula of the same name.
     """
 
@@ -63,6 +64,7 @@ class Run:
     trajectories: dict[int, str]
     spent: Spent
     findings: tuple[Finding, ...] = ()
+    failures: tuple[Failure, ...] = ()
     requirement: str
 
     @property
@@ -167,6 +169,7 @@ def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
         trajectories=tally.trajectories,
         spent=tally.spent,
         findings=tally.findings,
+        failures=tally.failures,
         requirement=manifest.requirement.name,
     )
 

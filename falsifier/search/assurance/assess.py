@@ -22,7 +22,8 @@ from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem, check_limits
 from falsifier.search.assurance.splitting import Splitting, least_budget, split
-from falsifier.search.findings import Finding
+from falsifier.search.findings import Failure, Finding
+from falsifier.search.findings import failures as by_cause
 from falsifier.search.vacuity import Vacuity
 from falsifier.stl.margins import margin_words, signed
 
@@ -56,7 +57,7 @@ class Assurance:
         confidence: confidence of the bound and the intervals.
         drawn: number of simulations drawn independently.
         violations: how many of them violate the requirement, as simulated, without confirmation.
-        failures: how many of them failed; the bounds count them as violations where that is worse.
+        failures: why simulations among them failed; the bounds count them as violations where that is worse.
         bound: upper confidence bound on the probability of a violation, exact.
         interval: exact two-sided confidence interval of that probability; from 0 without violations.
         smallest: the drawn evaluation with the smallest robustness, without its trajectory.
@@ -71,7 +72,7 @@ class Assurance:
     confidence: float
     drawn: int
     violations: int
-    failures: int
+    failures: tuple[Failure, ...]
     bound: float
     interval: tuple[float, float]
     smallest: Evaluation
@@ -92,9 +93,8 @@ class Assurance:
             low, high = self.interval
             lines.append(f"With {share} confidence, it is between {low:.3g} and {high:.3g}.")
         if self.failures:
-            lines.append(
-                f"{counted(self.failures, 'simulation')} failed; the bound counts them as violations."
-            )
+            lines += [f"{failure.text}." for failure in self.failures]
+            lines.append("The bound counts failed simulations as violations.")
         if any(finding.untested for finding in self.findings):
             lines.append("That is true, but says little: a part of the requirement was not tested.")
         lines += [f"Note: {finding.text}" for finding in self.findings]
@@ -196,7 +196,7 @@ def assess(
         confidence=confidence,
         drawn=len(drawn),
         violations=violations,
-        failures=failures,
+        failures=by_cause((i, e.reason) for i, e in enumerate(drawn) if e.robustness is None),
         bound=upper_bound(violations + failures, len(drawn), confidence),
         interval=(
             lower_bound(violations, len(drawn), each),

@@ -9,6 +9,7 @@ from falsifier.campaigns.analysis import Published, Run, Table, load, main_table
 from falsifier.campaigns.progress import total
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
+from falsifier.problem.problem import held_text
 from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
@@ -131,13 +132,16 @@ def _where(run: Run) -> str:
     return f": {what} at t = {time:.6g} s ({run.verdict.predicate}{values})"
 
 
-def findings_lines(section: Section) -> list[str]:
+def unshown(run: Run) -> list[str]:
+    """Return what a search could not show, one line each."""
+    texts = [*(finding.text for finding in run.findings), *(failure.text for failure in run.failures)]
+    held = held_text(h for h in run.manifest.held if h.causality == "input")
+    return [*texts, *([f"not searched: {held}"] if held else [])]
+
+
+def unshown_lines(section: Section) -> list[str]:
     """Return what the searches of a requirement could not show, one line each."""
-    return [
-        f"{run.method.label}, seed {run.seed}: {finding.text}"
-        for run in section.runs
-        for finding in run.findings
-    ]
+    return [f"{run.method.label}, seed {run.seed}: {text}" for run in section.runs for text in unshown(run)]
 
 
 def level_facts(run: Run) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import plain
 from falsifier.core.words import counted
 from falsifier.stl.margins import signed
-from falsifier.views.report.content import replay_command, run_command, searches
+from falsifier.views.report.content import replay_command, run_command, searches, unshown
 from falsifier.views.text import broken_lines
 
 
@@ -73,6 +73,7 @@ def _case(label: str, run: Run) -> ElementTree.Element:
         for finding in run.findings:
             name = plain(f"falsifier.{finding.kind}")
             ElementTree.SubElement(properties, "property", name=name, value=plain(finding.text))
+    if told := unshown(run):
         note = ElementTree.SubElement(case, "system-out")
-        note.text = plain("\n".join(f"what this does not show: {finding.text}" for finding in run.findings))
+        note.text = plain("\n".join(f"what this does not show: {line}" for line in told))
     return case

@@ -8,10 +8,10 @@ from falsifier.stl.margins import signed
 from falsifier.views.report.content import (
     Content,
     Section,
-    findings_lines,
     gather,
     replay_command,
     run_command,
+    unshown_lines,
 )
 from falsifier.views.text import broken_lines
 
@@ -25,13 +25,13 @@ def markdown_report(directory: Path) -> str:
     content = gather(directory)
     parts = [f"# Falsification report: {markdown_text(content.title)}", content.table.markdown().rstrip()]
     parts += [_section(section) for section in content.sections if any(r.falsified for r in section.runs)]
-    parts += [_unshown(section) for section in content.sections if findings_lines(section)]
+    parts += [_unshown(section) for section in content.sections if unshown_lines(section)]
     return "\n\n".join([*parts, _environment(content)]) + "\n"
 
 
 def _unshown(section: Section) -> str:
     """What the searches of a requirement could not show."""
-    items = [f"- {markdown_text(one_line(line))}" for line in findings_lines(section)]
+    items = [f"- {markdown_text(one_line(line))}" for line in unshown_lines(section)]
     return "\n".join([f"## {markdown_text(section.heading)}: what this does not show", "", *items])
 
 

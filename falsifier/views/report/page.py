@@ -13,6 +13,7 @@ from falsifier.campaigns.analysis import Run, Table
 from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
 from falsifier.core.words import choices, counted
+from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join
@@ -20,13 +21,13 @@ from falsifier.views.report.content import (
     Content,
     Section,
     Shown,
-    findings_lines,
     gather,
     level_facts,
     outcome,
     replay_command,
     run_command,
     searches,
+    unshown_lines,
 )
 from falsifier.views.report.figures import history_figure, rate_figure, simulation_figures
 from falsifier.views.report.plots import columns, scripts
@@ -221,6 +222,7 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     if run.simulations:
         facts.append(("time per iteration", _time(run)))
     facts += level_facts(run)
+    facts += [("not searched", held_text(run.manifest.held))] if run.manifest.held else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
         commands.insert(0, ("replay the counterexample", replay_command(run)))
@@ -251,7 +253,7 @@ def _facts(facts: list[tuple[str, str]]) -> Html:
 
 def _findings(section: Section) -> Html:
     """What the searches could not show."""
-    items = [el("li", line) for line in findings_lines(section)]
+    items = [el("li", line) for line in unshown_lines(section)]
     return join(el("h3", "What this does not show"), el("ul", *items)) if items else Html("")
 
 

@@ -1,12 +1,18 @@
+from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.search.run import falsify
+from falsifier.testing import lag_problem
+from falsifier.views.report import junit_report, markdown_report
 from falsifier.views.report.content import gather, run_command
 from falsifier.views.report.page import html_report
 from tests.campaigns.support import record_ad_hoc
+from tests.problems import mostly_broken
 
 
 def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) -> None:
@@ -42,3 +48,14 @@ def test_a_models_search_can_be_repeated_too() -> None:
         "falsifier run AT1 --llm openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
         "--budget 100 --seed 0"
     )
+
+
+def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 3)", response=mostly_broken, inputs=2)
+    problem = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
+    result = falsify(problem, "uniform", budget=12, seed=1, directory=tmp_path)
+    for report in (html_report(tmp_path), markdown_report(tmp_path), junit_report(tmp_path)):
+        plain = unescape(report).replace("\\", "")
+        assert result.failures[0].text in plain
+        assert "not searched: v = 0 (no range is given)" in plain
+    assert "gain = 1" in html_report(tmp_path)
