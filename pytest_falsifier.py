@@ -213,7 +213,10 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
 
     problem, found = checked.problem, checked.counterexample
     assert found is not None
-    pictures = item.config.cache.mkdir("falsifier") if item.config.cache else item.config.rootpath
+    # With -p no:cacheprovider pytest has no cache, and its configuration not even the attribute.
+    cache = getattr(item.config, "cache", None)
+    kept = item.config.rootpath if checked.file is None else checked.file.parent
+    pictures = cache.mkdir("falsifier") if cache else kept
     picture = pictures / f"{file_name(problem.name)}.png"
     save_figure(plot_evaluation(problem, found.evaluation), picture)
     how = "stored counterexample" if checked.result is None else "counterexample found by a search"

@@ -50,6 +50,8 @@ class SpecError(FalsifierError):
     """A spec file or an option is wrong; the message starts with ``file: key:`` if they are known."""
 
     def __init__(self, message: str, *, file: str | None = None, key: str | None = None) -> None:
+        # Names in keys come from files; a message is one line.
+        file, key = (part and " ".join(part.splitlines()) for part in (file, key))
         self.file = file
         self.key = key
         super().__init__(": ".join(part for part in (file, key, message) if part))

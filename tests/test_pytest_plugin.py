@@ -74,7 +74,8 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     stored = list((repository / "counterexamples").rglob("*.json"))
     assert [p.parent.name for p in stored] == ["car.fast"]
     assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
-    second = run_pytest(repository, "--falsifier", "specs", "-k", "fast")
+    second = run_pytest(repository, "--falsifier", "specs", "-k", "fast", "-p", "no:cacheprovider")
+    assert f"picture        {stored[0].parent.relative_to(repository)}/fast.png" in second.out
     assert "fast is violated by a stored counterexample" in second.out
     assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").code == 5
 

@@ -25,18 +25,17 @@ from falsifier.views.terminal import warn
 # Exit code that a shell reports for a program whose pipe was closed: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
 _FAILED = 3
-# What a machine has run out of: disk, quota, memory, files, processes.
-_EXHAUSTED = frozenset(
-    (
-        errno.ENOSPC,
-        errno.EDQUOT,
-        errno.EFBIG,
-        errno.ENOMEM,
-        errno.EMFILE,
-        errno.ENFILE,
-        errno.EAGAIN,
-    )
-)
+# What a machine has run out of, and what to do.
+_ELSEWHERE = "or choose a location on another disk, for example with --out DIR"
+_EXHAUSTED = {
+    errno.ENOSPC: f"free some space, {_ELSEWHERE}",
+    errno.EDQUOT: f"delete files of yours, {_ELSEWHERE}",
+    errno.EFBIG: "raise the limit on the size of files (ulimit -f)",
+    errno.ENOMEM: "free memory, or raise the limit (ulimit -v)",
+    errno.EMFILE: "raise the limit on open files (ulimit -n)",
+    errno.ENFILE: "the machine has too many open files: end other programs",
+    errno.EAGAIN: "end other processes, or raise the limit on them (ulimit -u)",
+}
 
 # name: (module, summary in --help)
 _COMMANDS = {
@@ -161,7 +160,7 @@ def _report_refusal(error: OSError) -> int:
     """Print what the operating system refused; return the exit code."""
     where = "" if error.filename is None else f"{error.filename}: "
     if error.errno in _EXHAUSTED:
-        warn(f"falsifier: {where}{error.strerror}; free some, then run the command again")
+        warn(f"falsifier: {where}{error.strerror}; {_EXHAUSTED[error.errno]}")
         return _FAILED
     if error.filename is None:
         warn(f"falsifier: {error}")

@@ -51,18 +51,43 @@ def write_whole(path: Path, content: str | bytes) -> Path:
     the content is on disk when the function returns.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")  # remove_partial knows this form
     try:
         with partial.open("wb") as file:
             file.write(content.encode() if isinstance(content, str) else content)
             file.flush()
             os.fsync(file.fileno())
         operating_system.replace(partial, path)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):  # the first error says what is wrong
             partial.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno is not None:
+            error.filename = str(
+                path
+            )  # writing does not know which file it was, and nobody knows the partial one
         raise
     return path
+
+
+def remove_partial(folder: Path, names: str) -> None:
+    """Remove what processes that were killed within ``write_whole`` have left in a folder.
+
+    Only for a folder in which no other thread of this process writes.
+
+    Args:
+        folder: the folder; what is below it stays.
+        names: regular expression of the whole names of the files that they meant to write.
+    """
+    form = re.compile(rf"(?:{names})\.([1-9]\d*)\.partial")
+    with suppress(OSError):  # what is left takes room and does no harm
+        for path in folder.iterdir():
+            found = form.fullmatch(path.name)
+            if found is None or path.is_symlink() or not path.is_file():
+                continue
+            pid = int(found[1])
+            # Numbers are used again, in containers often at once: an own one is of an earlier process.
+            if pid == os.getpid() or not operating_system.is_running(pid):
+                path.unlink()
 
 
 def own_temporary_folder(name: str) -> Path | None:

@@ -24,6 +24,7 @@ exit_text = _system.exit_text
 flush_lines = _system.flush_lines
 guarded_memory = _system.guarded_memory
 interpreter = _system.interpreter
+is_running = _system.is_running
 limit_resources = _system.limit_resources
 limit_sending = _system.limit_sending
 memory_limits = _system.memory_limits

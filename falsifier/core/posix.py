@@ -151,6 +151,17 @@ def kill(pid: int) -> None:
         os.kill(pid, signal.SIGKILL)
 
 
+def is_running(pid: int) -> bool:
+    """Whether there is a process with this number, of whichever user."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True
+
+
 def end_group(group: int) -> None:
     """Kill a process group: what a process has started, where its descendants cannot be found otherwise."""
     with contextlib.suppress(OSError):

@@ -19,7 +19,18 @@ def sealed_file(size: int) -> IO[bytes]:
     """Open a file without a name whose size no process can change, in memory if the system supports that.
 
     A process that maps a file dies when another one shortens it, and a file that grows fills the memory.
+
+    Raises:
+        OSError: if it is larger than files of this process may be, or there is no room.
     """
+    try:
+        return _sealed_file(size)
+    except OSError as error:
+        error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
+        raise
+
+
+def _sealed_file(size: int) -> IO[bytes]:
     if sys.platform == "linux" and hasattr(os, "memfd_create"):
         file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
         file.truncate(size)

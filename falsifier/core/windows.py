@@ -40,6 +40,8 @@ _CRASHES = {
 # How often to look whether a process still lives: one cannot wait for that and for a socket together.
 _LOOKING_SECONDS = 0.1
 
+# ERROR_INVALID_PARAMETER, which OpenProcess reports for a number without a process.
+_NO_SUCH_PROCESS = 87
 _kernel = ctypes.WinDLL("kernel32", use_last_error=True)
 _kernel.CreateJobObjectW.restype = wintypes.HANDLE
 _kernel.OpenProcess.restype = wintypes.HANDLE
@@ -210,6 +212,14 @@ def open_life(pid: int) -> int | None:
 def close_life(life: int) -> None:
     """Close what ``open_life`` has opened."""
     _kernel.CloseHandle(wintypes.HANDLE(life))
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is a process with this number; also if it is another user's, or cannot be asked."""
+    life = open_life(pid)
+    if life is not None:
+        close_life(life)
+    return life is not None or ctypes.get_last_error() != _NO_SUCH_PROCESS
 
 
 def exit_text(code: int) -> str:

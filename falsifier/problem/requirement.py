@@ -4,10 +4,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from falsifier.core.arguments import instance
+from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean
 from falsifier.problem.grid import fitting_interval
-from falsifier.problem.spec import Spec
+from falsifier.problem.spec import NAME_IN_LINES, Spec
 from falsifier.problem.template_arguments import TemplateError
 from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
@@ -24,7 +25,7 @@ class Requirement:
         description: its meaning in words.
 
     Raises:
-        SpecError: if the name or description is no text, or the formula is not parsed.
+        SpecError: if the name is no text of one line, the description no text, or the formula not parsed.
     """
 
     name: str
@@ -34,6 +35,8 @@ class Requirement:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise SpecError(f"requirement: expected a name, got {self.name!r}")
+        if one_line(self.name) != self.name:  # it stands in messages, tables and titles
+            raise SpecError(f"requirement {self.name!r}: {NAME_IN_LINES}")
         instance(f"requirement {self.name!r}: description", self.description, str, "text")
         if not isinstance(self.formula, Formula):
             raise SpecError(f"requirement {self.name!r}: expected a formula; use parse({self.formula!r})")

@@ -198,7 +198,9 @@ def _parameter(option: str) -> tuple[str, dict[str, object]]:
         return name, {"value": numbers[0]}
     if len(numbers) == 2:
         return name, {"range": (numbers[0], numbers[1])}
-    raise SpecError(f"--param {option}: expected NAME=VALUE or NAME=LOW:HIGH")
+    raise SpecError(
+        f"--param {option}: expected NAME=VALUE or NAME=LOW:HIGH, for example --param {name}=1000:1500"
+    )
 
 
 def named_file(text: str, folder: Path) -> str:
@@ -214,7 +216,9 @@ def named_file(text: str, folder: Path) -> str:
 def _split(option: str, flag: str) -> tuple[str, list[str]]:
     name, equals, rest = option.partition("=")
     if not equals or not name.strip() or not rest.strip():
-        raise SpecError(f"{flag} {option}: expected NAME=..., for example throttle=0:100:7")
+        ways = "NAME=LOW:HIGH:POINTS" if flag == "--input" else "NAME=VALUE or NAME=LOW:HIGH"
+        example = "throttle=0:100:7" if flag == "--input" else "mass=1200 or mass=1000:1500"
+        raise SpecError(f"{flag} {option}: expected {ways}, for example {flag} {example}")
     return name.strip(), rest.strip().split(":")
 
 

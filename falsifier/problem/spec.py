@@ -18,6 +18,7 @@ from pydantic import (
     ValidationError,
 )
 
+from falsifier.core.literals import one_line
 from falsifier.errors import SpecError
 from falsifier.fmu.ssp import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
@@ -52,6 +53,8 @@ from falsifier.problem.spec_errors import spec_error
 
 Section = TypeVar("Section", bound=BaseModel)
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
+# Names that we choose stand in messages, tables and titles.
+NAME_IN_LINES = "expected a name of one line without control characters"
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
 
@@ -147,6 +150,10 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
         spec = Spec.model_validate(data)
     except ValidationError as error:
         raise spec_error(error, file, Spec, _SECTIONS) from None
+    for section in ("requirements", "profiles", "components"):
+        for name in getattr(spec, section):
+            if one_line(name) != name:
+                raise SpecError(NAME_IN_LINES, file=file, key=f"{section}.{name!r}")
     _check_model(spec, file)
     return spec
 

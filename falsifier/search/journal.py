@@ -16,6 +16,7 @@ is noticed. Only search/repair.py, which drops what is damaged, touches these fi
 import errno
 import json
 import os
+import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +30,7 @@ from typing import Any, Literal
 from filelock import FileLock, Timeout
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import write_whole
+from falsifier.core.files import remove_partial, write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.sealing import check_seal, checksum, seal
 from falsifier.core.trajectory import Trajectory
@@ -62,6 +63,7 @@ _SYNC_PERIOD = 1.0
 # best: only the best one, for campaigns of very many runs.
 Keep = Literal["history", "best"]
 _KEPT_TRAJECTORIES = 200
+_TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
 # Errors of the operating system that say that a path can never be a folder.
 _NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 # Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
@@ -98,6 +100,8 @@ class Journal:
         try:
             _check_is_file(path)
             _drop_torn_line(path)
+            remove_partial(directory / TRAJECTORIES, _TRAJECTORY_NAMES)
+            remove_partial(directory, f"{re.escape(MANIFEST)}|{re.escape(JOURNAL)}")
             self.records = read_journal(directory)
             self._file = path.open("ab", buffering=0)
         except BaseException:
@@ -161,9 +165,11 @@ class Journal:
             if at_once or monotonic() - self._synced > _SYNC_PERIOD:
                 os.fsync(self._file.fileno())
                 self._synced = monotonic()
-        except BaseException:
+        except BaseException as error:
             with suppress(OSError):
                 self._file.truncate(size)
+            if isinstance(error, OSError) and error.errno is not None:
+                error.filename = str(self._file.name)
             raise
         self._lines += 1
 

@@ -225,6 +225,16 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     assert "Traceback" not in done.err
 
 
+def test_a_parameter_that_is_not_understood_is_told_with_a_parameter_as_example(tmp_path: Path) -> None:
+    for given in ("mass", "mass=", "mass=1:2:3"):
+        done = falsifier("run", "AT1", "--param", given, cwd=tmp_path)
+        assert done.code == 2
+        assert (
+            "NAME=VALUE or NAME=LOW:HIGH, for example --param mass=" in done.err
+            and "throttle" not in done.err
+        )
+
+
 def test_an_input_of_the_formula_need_not_be_searched(tmp_path: Path) -> None:
     arguments = (
         "--stl",

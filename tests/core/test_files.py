@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.files import bundled, own_temporary_folder, write_whole
+from falsifier.core.files import bundled, own_temporary_folder, remove_partial, write_whole
 
 
 def test_text_and_bytes_are_written_into_folders_that_are_made(tmp_path: Path) -> None:
@@ -40,6 +40,28 @@ def test_a_full_disk_leaves_nothing_partial(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="No space left on device"):
         write_whole(path, "new")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("pid", [os.getpid(), 2**22 + 7], ids=["own", "dead"])
+def test_what_a_killed_process_has_left_is_removed_by_its_exact_name(tmp_path: Path, pid: int) -> None:
+    running = os.getppid()
+    kept = [
+        tmp_path / name
+        for name in (
+            f"1-ab.npz.{running}.partial", "1-ab.npz.partial", f"notes.npz.{pid}.partial", "1-ab.npz",
+            f"1-ab.npz.{pid}.partial.bak", f"1-ab.npz.0{pid}.partial",
+        )
+    ]  # fmt: skip
+    link = tmp_path / f"2-cd.npz.{pid}.partial"
+    folder = tmp_path / f"3-ef.npz.{pid}.partial"
+    left = tmp_path / f"1-ab.npz.{pid}.partial"
+    for path in (*kept, left):
+        path.touch()
+    link.symlink_to(kept[0])
+    folder.mkdir()
+    remove_partial(tmp_path, r"\d+-[0-9a-f]+\.npz")
+    assert {*tmp_path.iterdir()} == {*kept, link, folder}
+    remove_partial(tmp_path / "none", r"\d+")
 
 
 def test_specs_and_fmus_come_with_the_package() -> None:

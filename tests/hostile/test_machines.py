@@ -78,7 +78,13 @@ def test_simulations_need_no_open_streams_and_no_folder_for_temporary_files(
     assert run(tmp_path, before=close, TMPDIR=str(tmp_path / "none"))[0] == 0
 
 
-def test_a_file_system_without_room_is_a_failure_of_the_machine(tmp_path: Path) -> None:
-    code, said = run(tmp_path, before=limited(resource.RLIMIT_FSIZE, 2000))
+@pytest.mark.parametrize(
+    ("most", "where"), [(500, "run/manifest.json"), (200_000, "memory shared with the processes of FMUs")]
+)
+def test_a_limit_on_the_size_of_files_is_told_with_the_file_and_the_cure(
+    most: int, where: str, tmp_path: Path
+) -> None:
+    code, said = run(tmp_path, before=limited(resource.RLIMIT_FSIZE, most), PYTHONDONTWRITEBYTECODE="1")
     assert code == 3
-    assert "File too large" in said and said.count("\n") == 1
+    assert f"{where}: File too large" in said and said.count("\n") == 1
+    assert "ulimit -f" in said and "free" not in said

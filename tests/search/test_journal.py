@@ -58,3 +58,17 @@ def test_a_damaged_line_is_named(tmp_path: Path) -> None:
     path.write_text("\n".join([lines[0], "{broken", *lines[2:]]) + "\n")
     with pytest.raises(JournalError, match="line 2 is damaged"):
         read_journal(tmp_path)
+
+
+def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(tmp_path: Path) -> None:
+    dead = 2**22 + 7
+    folder = tmp_path / "trajectories"
+    folder.mkdir()
+    left = [folder / f"3-0123456789abcdef.npz.{dead}.partial", tmp_path / f"journal.jsonl.{dead}.partial"]
+    others = [folder / f"mine.npz.{dead}.partial", folder / "3-0123456789abcdef.npz.1.partial.txt"]
+    for path in (*left, *others):
+        path.touch()
+    with open_journal(tmp_path):
+        pass
+    assert not any(path.exists() for path in left)
+    assert all(path.exists() for path in others)
