@@ -157,9 +157,10 @@ class Disguise:
         verdict, trajectory = evaluation.verdict, evaluation.trajectory
         shown = trajectory and Trajectory(trajectory.times, self._hidden_columns(trajectory))
         if verdict is not None:
-            verdict = (
-                self.hidden_verdict(verdict) if shown is None else monitor_for(self.view).evaluate(shown)
-            )
+            told = self.hidden_verdict(verdict) if shown is None else monitor_for(self.view).evaluate(shown)
+            if is_on_limit(verdict.robustness):  # scaled limits are rounded
+                told = replace(told, robustness=verdict.robustness)
+            verdict = told
         return replace(
             evaluation,
             candidate=self.hidden_candidate(evaluation.candidate),

@@ -91,7 +91,7 @@ def formula_times(formulas: Iterable[str]) -> list[float]:
 
 def fitting_interval(formula: Formula, stop_time: float, fmu_step: float | None) -> float | None:
     """Return the step in s of a grid on which the formula can be evaluated; None if there is none."""
-    if formula.horizon() > stop_time:
+    if exact(formula.horizon()) > exact(stop_time):
         return None
     try:
         return choose_grid(stop_time, times=_bounds(formula), fmu_step=fmu_step).interval

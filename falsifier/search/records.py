@@ -42,7 +42,10 @@ class AskedRecord(_Record):
 class VerdictRecord(_Record):
     """Robustness, and what decided it."""
 
-    robustness: float = Field(allow_inf_nan=False)
+    robustness: float = Field(
+        allow_inf_nan=False,
+        description="Below 0: violated. Exactly on the limit, -1e-300 if that is a violation, else 1e-300.",
+    )
     critical_time: float
     predicate: str
     values: dict[str, float]

@@ -80,10 +80,11 @@ class Shortfall:
         """The comparison, the interval and the value, without the context."""
         over, sought = _over(self.start, self.end), self.sought and f"{self.sought}, but there "
         at = "" if self.start == self.end else f" at {seconds(self.time)}"
+        limit = ", exactly on its limit" if self.value == self.limit else ""
         if self.never and at:
-            nearest = f"; nearest was {self.reading}{at}" if " = " in self.reading else ""
+            nearest = f"; nearest was {self.reading}{at}{limit}" if " = " in self.reading else ""
             return f"{sought}{self.part} held at no time {over}{nearest}"
-        return f"{sought}{self.part} was violated {over}: {self.reading}{at}"
+        return f"{sought}{self.part} was violated {over}: {self.reading}{at}{limit}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ time. A signal on its own is Boolean: ``b`` means ``b >= 0.5``. Names: see ``fal
 
 import math
 from collections.abc import Callable
+from decimal import Decimal
 from typing import NoReturn, cast
 
 from falsifier.errors import FormulaError, did_you_mean
@@ -39,7 +40,6 @@ from falsifier.stl.expression import (
     Negative,
     Number,
     Operator,
-    number_text,
 )
 from falsifier.stl.formula import (
     COMPARISON,
@@ -70,7 +70,11 @@ from falsifier.stl.names import FUNCTIONS, RESERVED
 MAX_DEPTH = 100
 # Maximum number of characters of a formula.
 MAX_LENGTH = 20_000
-UNITS = {"us": (1, 1_000_000), "ms": (1, 1000), "s": (1, 1), "min": (60, 1), "h": (3600, 1)}  # seconds
+UNITS = {
+    "us": Decimal("1e-6"), "ms": Decimal("1e-3"), "s": Decimal(1), "min": Decimal(60), "h": Decimal(3600),
+}  # fmt: skip
+# Bounds in different units that differ relatively by less are equal but for rounding.
+_ROUNDED = 1e-5
 
 _LEVELS = {
     "<->": EQUIVALENCE, "->": IMPLICATION, "or": DISJUNCTION, "and": CONJUNCTION, "U": UNTIL,
@@ -281,21 +285,26 @@ class _Parser:
             self._fail("open windows are not supported", bracket.position, _CLOSED)
         if not self._accept("["):
             return None
-        start, start_unit = self._bound()
+        start_text, start_unit = self._bound()
         if not self._accept(","):
             self._fail("expected ',' between the bounds", self._next.position, _CLOSED)
         end_token = self._next
-        end, end_unit = self._bound()
+        end_text, end_unit = self._bound()
         if not self._accept("]"):
             self._fail(f"expected ']' before {self._next.shown}", self._next.position, _CLOSED)
-        if start > 0 and bool(start_unit) != bool(end_unit):
+        if float(start_text) > 0 and bool(start_unit) != bool(end_unit):
             self._fail(
                 "one bound has a unit, the other does not",
                 bracket.position,
-                f"give both a unit, for example [{number_text(start)}{start_unit or end_unit},"
-                f"{number_text(end)}{end_unit or start_unit}]",
+                f"give both a unit, for example [{start_text}{start_unit or end_unit},"
+                f"{end_text}{end_unit or start_unit}]",
             )
-        window = Window(_seconds(start, start_unit), _seconds(end, end_unit))
+        window = Window(_seconds(start_text, start_unit), _seconds(end_text, end_unit))
+        is_rounded = start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=_ROUNDED)
+        if window.start > window.end and is_rounded:
+            # [1.3333333s,0.0222222min] is one moment; the bound in the smaller unit is the more exact one.
+            moment = window.start if _factor(start_unit) < _factor(end_unit) else window.end
+            window = Window(moment, moment)
         if window.start > window.end:
             self._fail(
                 f"the window {window} ends before it starts",
@@ -306,7 +315,7 @@ class _Parser:
             self._fail("the bound is too large", end_token.position, "omit the window")
         return window
 
-    def _bound(self) -> tuple[float, str]:
+    def _bound(self) -> tuple[str, str]:
         token = self._take()
         if token.kind != "number":
             hint = {
@@ -320,7 +329,7 @@ class _Parser:
             unit = word.text
             if unit not in UNITS:
                 self._fail(f"unknown unit {unit!r}", word.position, did_you_mean(unit, UNITS))
-        return float(token.text), unit
+        return token.text, unit
 
     def _looks_like_open_window(self) -> bool:
         following = self.tokens[self.index + 1 : self.index + 3]
@@ -398,9 +407,14 @@ def _hint_for(token: Token) -> str:
     return _HINTS.get(word) or (f"write operators in lower case: {word}" if word in RESERVED else "")
 
 
-def _seconds(bound: float, unit: str) -> float:
-    numerator, denominator = UNITS[unit or "s"]
-    return bound * numerator / denominator
+def _factor(unit: str) -> Decimal:
+    return UNITS[unit or "s"]
+
+
+def _seconds(bound: str, unit: str) -> float:
+    """Return a bound in s without the rounding of a product: 0.29 min are 17.4 s."""
+    value = float(bound)
+    return float(Decimal(bound) * _factor(unit)) if 0.0 < value < math.inf else value
 
 
 def _depth(formula: Formula) -> int:

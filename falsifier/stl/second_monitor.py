@@ -62,7 +62,8 @@ def robustness(formula: Formula, trajectory: Trajectory) -> float:
     if len(trajectory) == 0:
         raise MonitorError("the trajectory is empty")
     end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
-    if needed > end + 1e-6 * trajectory.step:
+    # In samples, as each bound may be off its sample by a little, and their sum by more.
+    if round(needed / (trajectory.step or 1.0)) >= len(trajectory):
         raise MonitorError(f"the formula needs {needed:g} s, but the trajectory ends at {end:g} s")
     found = _evaluate(formula, _Translation(trajectory))
     if found == 0:  # on the limit, it depends on the comparisons: rtamt evaluates their truth, 1 or -1

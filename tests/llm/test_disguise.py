@@ -119,6 +119,9 @@ def test_robustness_is_that_of_the_scaled_formula() -> None:
         ("G[0,10] (x >= 0)", "G[0,10] (0.5 <= y1)"),
         ("G[0,10] (abs(x) >= 0.1)", "G[0,10] (0.5 <= z1)"),
         ("G[0,10] (2*x <= 1)", "G[0,10] (z1 <= 0.5)"),
+        ("G[0,10] (x > 0)", "G[0,10] (y1 > 0.5)"),
+        ("G[0,10] (3*x - u != 0)", "G[0,10] (z1 != 0.5)"),
+        ("G[0,10] (x < 0 or x <= -0.35)", "G[0,10] (y1 < 0.730769231 or y1 <= 0.269230769)"),
         ("G[0,10] (x^2 <= 1 -> abs(x - u) < 3)", "G[0,10] (z1 <= 0.5 -> z2 < 0.5)"),
     ],
 )
@@ -126,7 +129,7 @@ def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
     problem = lag_problem(formula)
     disguise = disguised(problem)
     assert str(disguise.view.requirement.formula) == hidden
-    for value in (-1.0, -0.3, 0.95, 1.0):
+    for value in (-1.0, -0.3, 0.0, 0.95, 1.0):
         real = evaluate(problem, problem.space.decode([value] * 4))
         settled = disguise.fitted([real])
         assert str(settled.view.requirement.formula) == hidden

@@ -99,6 +99,15 @@ def test_each_operator(formula: str, told: str) -> None:
     assert broken(formula).text == told
 
 
+def test_what_is_exactly_on_its_limit_is_told_as_such() -> None:
+    assert broken("G[0,2] (x > 0)", x=[1.0, 0.0, 0.0]).text == (
+        "x > 0 was violated from 1 to 2 s: x = 0 at 1 s, exactly on its limit"
+    )
+    assert broken("F[0,1] (x != 0)", x=[0.0, 0.0]).text == (
+        "x != 0 held at no time from 0 to 1 s; nearest was x = 0 at 0 s, exactly on its limit"
+    )
+
+
 def test_a_boolean_signal_is_true_or_false() -> None:
     assert broken("G[0,3] not b", b=[0.0, 0.0, 1.0, 1.0]).text == (
         "not b was violated from 2 to 3 s: b was true at 2 s"

@@ -66,6 +66,13 @@ def test_what_cannot_be_judged_is_an_error() -> None:
         second_monitor.robustness(parse("x <= 3"), Trajectory(np.empty(0), {"x": np.empty(0)}))
 
 
+def test_windows_that_are_each_a_little_off_the_grid_fit_together() -> None:
+    off = 1 + 8e-7  # of the first sample, so within the tolerance
+    formula = parse(f"G[0,{off}] F[0,{off}] G[0,{off}] (x <= 3)")
+    t = Trajectory(np.arange(4.0), {"x": np.ones(4)})
+    assert Monitor(formula, 1.0, 4).evaluate(t).robustness == second_monitor.robustness(formula, t) == 2.0
+
+
 def test_a_comparison_of_constants_needs_no_signal() -> None:
     assert second_monitor.robustness(parse("G (1 <= 3)"), Trajectory(np.arange(3.0), {})) == 2.0
 
