@@ -226,9 +226,12 @@ def check_request(request: CampaignRequest, *, executor: str | None) -> dict[Pro
         check_names(run)
     if executor is None:
         from falsifier.llm.connect import preflight
+        from falsifier.llm.model_file import is_model_file, served
 
         for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
             preflight(llm.name, api_base=llm.api_base, options=llm.options)
+            if is_model_file(llm.name):
+                served(llm.name)  # by this process, so that those that it starts share the server
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
         told_problems(run, [problems[run.problems[0]]], {})

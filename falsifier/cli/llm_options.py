@@ -19,7 +19,7 @@ _PRICE = "expected SENT:RECEIVED in US dollars per million tokens sent and recei
 
 
 def llm_option(*, multiple: bool = False) -> Decorator:
-    text = "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b."
+    text = "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b, or a model file (.gguf)."
     return click.option(
         "--llm",
         "llms" if multiple else "llm",

@@ -66,6 +66,11 @@ class CachedChat:
 
 
 def default_cache_directory() -> Path:
-    """Directory of stored replies: ``falsifier/replies`` in the user's cache directory."""
+    """Directory of stored replies: ``replies`` in this tool's cache directory."""
+    return cache_directory() / "replies"
+
+
+def cache_directory() -> Path:
+    """This tool's directory in the user's cache directory."""
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "falsifier" / "replies"
+    return Path(base) / "falsifier"

@@ -33,6 +33,8 @@ class LiteLLMChat:
         timeout: seconds to wait for a complete reply.
         price: price stated by the user; None: litellm's table.
         mode: how to ask for a reply that follows a schema.
+        content: what the server serves, if it was started for a model file; records then say this instead
+            of the server's address, which is another one each time.
     """
 
     llm: str
@@ -42,11 +44,17 @@ class LiteLLMChat:
     timeout: float = DEFAULT_TIMEOUT
     price: Price | None = None
     mode: Mode = MODES[0]
+    content: str = ""
 
     @property
     def parameters(self) -> Mapping[str, Any]:
         """What is sent in addition to the messages, without secrets."""
-        stated = {"effort": self.effort, "api_base": self.api_base and redact(self.api_base)}
+        address = (
+            {"content": self.content}
+            if self.content
+            else {"api_base": self.api_base and redact(self.api_base)}
+        )
+        stated = {"effort": self.effort, **address}
         return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
     def complete(self, request: ChatRequest) -> ChatReply:

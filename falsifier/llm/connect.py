@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from falsifier.errors import ChatSetupError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.litellm_import import check_name, check_options, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
+from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode, key_variable
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate, RetryingChat
 from falsifier.llm.usage import Price
@@ -23,6 +25,11 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
     Raises:
         ChatError: saying what to set or change.
     """
+    if is_model_file(llm):
+        check_model_file(llm)
+        if api_base is not None:
+            raise ChatSetupError(f"--llm {llm}: a model file has a server of its own; drop --api-base")
+        return
     check_name(llm)
     check_address(llm, api_base)
     find_key(llm, api_base=api_base)
@@ -42,10 +49,10 @@ def connect(
     attempts: int = DEFAULT_ATTEMPTS,
     cache: Path | None = None,
 ) -> Chat:
-    """Make a chat with an LLM; nothing is sent yet.
+    """Make a chat with an LLM; nothing is sent yet. The server of a model file is started.
 
     Args:
-        llm: PROVIDER/MODEL as litellm names it.
+        llm: PROVIDER/MODEL as litellm names it, or the path of a model file (GGUF).
         effort: reasoning effort: ``none``, ``minimal``, ``low``, ``medium`` or ``high``; what the LLM does
             not take is left out, and the record says so.
         api_base: address of the server, if it is not the provider's own.
@@ -61,6 +68,9 @@ def connect(
         ChatError: for an unknown provider, an unknown option, a missing key, or an address with a password.
     """
     preflight(llm, api_base=api_base, options=options)
+    own = served(llm) if is_model_file(llm) else None
+    if own is not None:
+        llm, api_base, price = own.name, own.address, price or Price(0.0, 0.0)
     client = LiteLLMChat(
         llm=llm,
         effort=effort,
@@ -69,6 +79,7 @@ def connect(
         timeout=timeout,
         price=price,
         mode=mode or first_mode(llm),
+        content="" if own is None else own.content,
     )
     chat: Chat = RetryingChat(LadderChat(client), gate or Gate(), attempts=attempts)
     return chat if cache is None else CachedChat(chat, cache)
@@ -110,7 +121,7 @@ def check_llm(
     """
     chat = connect(llm, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
     reply = chat.complete(_HELLO)
-    listed = listed_price(llm, api_base=api_base)
+    listed = Price(0.0, 0.0) if is_model_file(llm) else listed_price(llm, api_base=api_base)
     return LLMCheck(
         llm=llm,
         key=key_variable(llm),

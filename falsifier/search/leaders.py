@@ -161,9 +161,12 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
 def price_of(llm: LLMSettings) -> "Price | None":
     """Return what a language model costs: as stated, otherwise as listed; None if unknown."""
     from falsifier.llm.litellm_import import listed_price
+    from falsifier.llm.model_file import is_model_file
     from falsifier.llm.usage import Price
 
-    return Price(*llm.price) if llm.price else listed_price(llm.name, api_base=llm.api_base)
+    if llm.price:
+        return Price(*llm.price)
+    return Price(0.0, 0.0) if is_model_file(llm.name) else listed_price(llm.name, api_base=llm.api_base)
 
 
 def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: int, chat: Chat) -> Engine:

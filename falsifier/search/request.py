@@ -1,5 +1,6 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -7,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.llm.messages import ReplyKind
 from falsifier.llm.providers import check_address
+from falsifier.llm.model_file import is_model_file
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
@@ -52,6 +54,11 @@ class LLMSettings(_Strict):
     def _without_password(self) -> Self:
         check_address(self.name, self.api_base)
         return self
+    @field_validator("name")
+    @classmethod
+    def _whole_path(cls, name: str) -> str:
+        """The whole path of a model file, so that a run can be resumed from any folder."""
+        return str(Path(name).expanduser().absolute()) if is_model_file(name) else name
 
     @field_validator("options")
     @classmethod

@@ -1,7 +1,6 @@
 """llama.cpp's own OpenAI-compatible server on 127.0.0.1, in a process of its own, with a tiny model."""
 
 import importlib.util
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -28,7 +27,7 @@ def llama_server(model: Path, *, context: int) -> Iterator[str]:
         model: a GGUF file.
         context: maximum number of tokens of prompt and reply together.
     """
-    command = [sys.executable, "-m", "tests.llm.llama_server", str(model), str(context)]
+    command = [sys.executable, "-m", "falsifier.llm.model_file", str(model), str(context)]
     with (
         model.with_suffix(f".{context}.log").open("w+") as log,
         subprocess.Popen(
@@ -43,25 +42,3 @@ def llama_server(model: Path, *, context: int) -> Iterator[str]:
             yield f"{told.removeprefix(LISTENING).strip()}/v1"
         finally:
             process.kill()
-
-
-def _serve(model: str, context: int) -> None:
-    """Serve until the standard input is closed, which is also when the tests die."""
-    import xllamacpp
-
-    settings = xllamacpp.CommonParams()
-    settings.model.path = model
-    settings.n_ctx = context
-    settings.port = 0
-    settings.n_gpu_layers = 0
-    settings.cpuparams.n_threads = settings.cpuparams_batch.n_threads = 1
-    settings.warmup = settings.fit_params = False
-    settings.sampling.seed = 1
-    server = xllamacpp.Server(settings)
-    print(f"{LISTENING}{server.listening_address}", flush=True)
-    sys.stdin.read()
-    os._exit(0)  # the server's own end waits for replies that are being written
-
-
-if __name__ == "__main__":
-    _serve(sys.argv[1], int(sys.argv[2]))

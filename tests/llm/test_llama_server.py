@@ -1,6 +1,8 @@
 """All ways of asking, against llama.cpp's own server, with a language model that answers rubbish."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -8,10 +10,14 @@ from typing import Any
 
 import pytest
 
+from falsifier.errors import ChatSetupError
+from falsifier.llm import model_file
 from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.connect import connect
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import UNREADABLE, ChatRequest, Exchange, Mode, ToolCall
+from tests import patience
 from tests.command import falsifier
 from tests.llm.llama_server import llama_server, needs_llama_server
 from tests.llm.support import PLAIN, QUESTION, add
@@ -121,3 +127,72 @@ def test_a_prompt_beyond_the_servers_context_is_never_cut(model: Path, tmp_path:
     for part in ("the prompt is too long", "llama.cpp: --ctx-size", "(256 tokens)"):
         assert part in done.out, part
     assert "litellm" not in done.out
+
+
+class TestModelFile:
+    def test_a_file_is_served_for_a_run_and_recorded_by_its_path(self, model: Path, tmp_path: Path) -> None:
+        done = falsifier(
+            *("run", "python:tests.problems:impossible", "--llm", str(model), "--max-cost", "1"),
+            *("--variant", "MP1", "--budget", "2", "--out", "run", "--llm-option", "max_tokens=200"),
+            cwd=tmp_path,
+            env={"XDG_CACHE_HOME": str(tmp_path / "cache")},
+        )
+        assert done.code == 0, done.err
+        assert "not falsified after 2 simulations" in done.out
+        recorded = (tmp_path / "run" / "manifest.json").read_text()
+        assert json.loads(recorded)["request"]["llm"]["name"] == str(model)
+        assert "127.0.0.1" not in recorded + (tmp_path / "run" / "journal.jsonl").read_text()
+        assert (tmp_path / "cache" / "falsifier" / "servers" / "tiny.log").stat().st_size
+        patience.wait_until(lambda: not servers_of(model))
+
+    def test_one_server_serves_this_process_and_those_that_it_starts(
+        self, model: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(model_file, "_SERVERS", {})
+        first = model_file.served(str(model))
+        try:
+            assert model_file.served(str(model)) == first
+            code = f"from falsifier.llm.model_file import served; print(served({str(model)!r}).address)"
+            child = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+            assert child.stdout.strip() == first.address
+            assert len(servers_of(model)) == 1
+        finally:
+            model_file._end_all()
+        again = model_file.served(str(model))
+        assert again.address != first.address and again.content == first.content
+        model_file._end_all()
+        monkeypatch.delenv(model_file._variable_of(model))
+
+    def test_what_cannot_be_served_is_told(self, model: Path, tmp_path: Path) -> None:
+        with pytest.raises(ChatSetupError, match=r"none\.gguf: cannot read"):
+            connect(str(tmp_path / "none.gguf"))
+        (tmp_path / "text.gguf").write_text("hello")
+        with pytest.raises(ChatSetupError, match="not a GGUF file"):
+            connect(str(tmp_path / "text.gguf"))
+        with pytest.raises(ChatSetupError, match="drop --api-base"):
+            connect(str(model), api_base="http://127.0.0.1:1/v1")
+        odd = tmp_path / "odd.gguf"
+        odd.write_bytes(model.read_bytes().replace(b"llama", b"lxama"))
+        with pytest.raises(ChatSetupError, match="architecture 'lxama'"):
+            connect(str(odd))
+
+    def test_too_little_memory_and_a_missing_server_are_told_before_loading(
+        self, model: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(model_file, "_available_memory", lambda: 1 << 20)
+            with pytest.raises(ChatSetupError, match="of memory"):
+                connect(str(model))
+        monkeypatch.setattr(model_file, "find_spec", lambda name: None)
+        with pytest.raises(ChatSetupError, match=r"falsifier\[llama\]"):
+            connect(str(model))
+
+
+def servers_of(model: Path) -> list[int]:
+    """Processes that serve a model file."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            if {"falsifier.llm.model_file", str(model)} <= set(place.read_text().split("\0")):
+                found.append(int(place.parent.name))
+    return found

@@ -1,0 +1,196 @@
+"""A language model in a file (GGUF), served by llama.cpp's own server on this machine.
+
+The server comes from the wheel of xllamacpp (the extra ``llama``). It is a program of its own: it starts when
+the file is first asked for, serves all runs of this process and of those that it starts, and ends with it.
+"""
+
+import atexit
+import os
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+
+from falsifier.core.printable import printable
+from falsifier.core.secrets import scrubbed
+from falsifier.errors import ChatSetupError
+from falsifier.llm.cache import cache_directory
+
+SUFFIX = ".gguf"
+# Tokens of prompt and reply together: prompts have up to 6,000, and reasoning takes most of the rest.
+CONTEXT = 32_768
+
+_MAGIC = b"GGUF"
+_LISTENING = "listening at "
+# Address of a server that an ancestor of this process has started, by the file that it serves.
+_VARIABLE = "FALSIFIER_SERVER_"
+# Beyond the file itself: the context and the working memory of a model of middle size.
+_MORE_BYTES = 1 << 30
+_HASHED_BYTES = 1 << 20
+_SHOWN_LINES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class ServedModel:
+    """A model file and the server that serves it.
+
+    Attributes:
+        name: name of the language model, as the client library calls it.
+        address: address of the server.
+        content: size of the file and hash of its beginning, which identify what answers.
+    """
+
+    name: str
+    address: str
+    content: str
+
+
+def is_model_file(llm: str) -> bool:
+    """Whether the name of a language model is the path of a file."""
+    return llm.lower().endswith(SUFFIX)
+
+
+def check_model_file(llm: str) -> Path:
+    """Check a model file as far as that is possible without loading it; return its path.
+
+    Raises:
+        ChatSetupError: if it is not a model, the server is not installed, or memory is too small.
+    """
+    path = Path(llm).expanduser().absolute()
+    try:
+        with path.open("rb") as file:
+            begins_well = file.read(len(_MAGIC)) == _MAGIC
+        size = path.stat().st_size
+    except OSError as error:
+        raise ChatSetupError(f"--llm {llm}: cannot read the file ({error.strerror or error})") from None
+    if not begins_well:
+        raise ChatSetupError(f"--llm {llm}: not a GGUF file; download or convert the model in that format")
+    if find_spec("xllamacpp") is None:
+        raise ChatSetupError(
+            f"--llm {llm}: serving a model file needs llama.cpp's server: pip install 'falsifier[llama]'"
+        )
+    available = _available_memory()
+    if available is not None and size + _MORE_BYTES > available and _address_of(path) is None:
+        raise ChatSetupError(
+            f"--llm {llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and "
+            f"{available / 2**30:.1f} GiB are free; use a smaller model or a stronger quantization"
+        )
+    return path
+
+
+def served(llm: str) -> ServedModel:
+    """Return the server of a model file; start it if that has not happened.
+
+    Raises:
+        ChatSetupError: as for ``check_model_file``, or if the model cannot be loaded.
+    """
+    path = check_model_file(llm)
+    with _LOCK:
+        address = _address_of(path) or _start(path)
+    with path.open("rb") as file:
+        beginning = sha256(file.read(_HASHED_BYTES)).hexdigest()[:16]
+    return ServedModel(f"llamafile/{path.stem}", address, f"{path.stat().st_size}-{beginning}")
+
+
+_LOCK = threading.Lock()
+_SERVERS: dict[str, subprocess.Popen[str]] = {}
+
+
+def _variable_of(path: Path) -> str:
+    return _VARIABLE + sha256(str(path.resolve()).encode("utf-8", "replace")).hexdigest()[:16].upper()
+
+
+def _address_of(path: Path) -> str | None:
+    """Address of a running server for a file, started by this process or one that started it."""
+    variable = _variable_of(path)
+    own = _SERVERS.get(variable)
+    if own is not None and own.poll() is not None:  # it has crashed
+        del _SERVERS[variable]
+        os.environ.pop(variable, None)
+    return os.environ.get(variable)
+
+
+def _start(path: Path) -> str:
+    folder = cache_directory() / "servers"
+    folder.mkdir(parents=True, exist_ok=True)
+    log = folder / f"{path.stem}.log"
+    command = [sys.executable, "-m", "falsifier.llm.model_file", str(path), str(CONTEXT)]
+    with log.open("w", encoding="utf-8") as errors:
+        process = subprocess.Popen(
+            command,
+            env=scrubbed(os.environ),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+        )
+    assert process.stdout is not None
+    try:
+        told = next((line for line in process.stdout if line.startswith(_LISTENING)), "")
+    except BaseException:
+        process.kill()
+        raise
+    if not told:
+        process.wait()
+        raise ChatSetupError(f"{path}: {_cause(log)}; the server's log: {log}")
+    if not _SERVERS:
+        atexit.register(_end_all)
+    variable = _variable_of(path)
+    _SERVERS[variable] = process
+    os.environ[variable] = f"{told.removeprefix(_LISTENING).strip()}/v1"
+    return os.environ[variable]
+
+
+def _end_all() -> None:
+    for process in _SERVERS.values():
+        process.kill()
+        process.wait()
+
+
+def _cause(log: Path) -> str:
+    """Why llama.cpp's server did not start, from its log."""
+    lines = [printable(line).strip() for line in log.read_text("utf-8", "replace").splitlines()]
+    said = [line for line in lines if "error" in line.lower() or "failed" in line.lower()]
+    unknown = next((line for line in said if "unknown model architecture" in line), "")
+    if unknown:
+        architecture = unknown.rpartition(":")[2].strip()
+        return f"this llama.cpp does not know the architecture {architecture}; update xllamacpp"
+    if any("alloc" in line for line in said):
+        return "not enough memory for this model; use a smaller one or a stronger quantization"
+    return f"llama.cpp's server cannot load the model ({'; '.join((said or lines)[-_SHOWN_LINES:])})"
+
+
+def _available_memory() -> int | None:
+    """Bytes of memory that programs can get without swapping; None if unknown (only Linux tells it)."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    found = next((line for line in lines if line.startswith("MemAvailable:")), None)
+    return None if found is None else int(found.split()[1]) << 10
+
+
+def _serve(model: str, context: int) -> None:
+    """Serve until the standard input is closed, which is also when the process that asked for it ends."""
+    import xllamacpp
+
+    settings = xllamacpp.CommonParams()
+    settings.model.path = model
+    settings.n_ctx = context
+    settings.n_parallel = 1
+    settings.port = 0
+    settings.use_jinja = True  # the model's own template
+    settings.sampling.seed = 1  # the same questions get the same answers
+    server = xllamacpp.Server(settings)
+    print(f"{_LISTENING}{server.listening_address}", flush=True)
+    sys.stdin.read()
+    os._exit(0)  # the server's own end waits for replies that are being written
+
+
+if __name__ == "__main__":
+    _serve(sys.argv[1], int(sys.argv[2]))
