@@ -147,9 +147,11 @@ def _start(path: Path) -> str:
 
 
 def _end_all() -> None:
-    for process in _SERVERS.values():
+    for variable, process in _SERVERS.items():
+        os.environ.pop(variable, None)
         process.kill()
         process.wait()
+    _SERVERS.clear()
 
 
 def _cause(log: Path) -> str:
@@ -184,6 +186,9 @@ def _serve(model: str, context: int) -> None:
     settings.n_ctx = context
     settings.n_parallel = 1
     settings.port = 0
+    # One core is left for simulations; threads that outnumber the cores wait for each other.
+    threads = max(1, (os.cpu_count() or 2) - 1)
+    settings.cpuparams.n_threads = settings.cpuparams_batch.n_threads = threads
     settings.use_jinja = True  # the model's own template
     settings.sampling.seed = 1  # the same questions get the same answers
     server = xllamacpp.Server(settings)

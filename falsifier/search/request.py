@@ -7,8 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.llm.messages import ReplyKind
-from falsifier.llm.providers import check_address
 from falsifier.llm.model_file import is_model_file
+from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
@@ -54,6 +54,7 @@ class LLMSettings(_Strict):
     def _without_password(self) -> Self:
         check_address(self.name, self.api_base)
         return self
+
     @field_validator("name")
     @classmethod
     def _whole_path(cls, name: str) -> str:

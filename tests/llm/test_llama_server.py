@@ -161,7 +161,6 @@ class TestModelFile:
         again = model_file.served(str(model))
         assert again.address != first.address and again.content == first.content
         model_file._end_all()
-        monkeypatch.delenv(model_file._variable_of(model))
 
     def test_what_cannot_be_served_is_told(self, model: Path, tmp_path: Path) -> None:
         with pytest.raises(ChatSetupError, match=r"none\.gguf: cannot read"):
