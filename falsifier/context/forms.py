@@ -1,30 +1,22 @@
 """What may be told of a file: several forms of it, the fullest first, and thresholds found in it."""
 
+import html
 import json
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from html.parser import HTMLParser
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import PurePosixPath
+from types import MappingProxyType
 
-from falsifier.context.c_source import CSource, c_conditions, c_slice, c_text, read_c
+from falsifier.context import modelica
 from falsifier.context.levels import Definitions
-from falsifier.context.modelica import (
-    ModelicaClass,
-    class_for,
-    class_text,
-    conditions,
-    modified_values,
-    read_modelica,
-    slice_of,
-    used_classes,
-    with_bases,
-)
 from falsifier.context.simulink import Diagram, names_text, structure_text
-from falsifier.context.simulink.conditions import chart_names, comparisons, constants
+from falsifier.context.simulink.conditions import diagram_thresholds
 from falsifier.context.simulink.definitions import definitions
 from falsifier.context.simulink.upstream import upstream
-from falsifier.context.statements import Slice, Statement, assignments
+from falsifier.context.sources import Source, constants_of, read_source
+from falsifier.context.statements import Statement, assignments, lines_told, reached
 from falsifier.context.thresholds import Threshold, thresholds, within
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
@@ -32,11 +24,29 @@ from falsifier.errors import SpecError
 C_SUFFIXES = (".c", ".h", ".cpp", ".hpp")
 MODELICA_SUFFIXES = (".mo",)
 HTML_SUFFIXES = (".html", ".htm", ".xhtml")
-_SKIPPED_TAGS = ("script", "style", "head")
+# A page's parts: comments, what scripts and styles have, tags, other text. A tag ends at the latest where the
+# next one begins, so that time grows with the length of a page.
+_PAGE = re.compile(
+    r"""<!--.*?(?:-->|\Z)
+    | <(?P<skipped>script|style|head)\b[^<>]*+>
+    | </?(?P<tag>[a-z][\w-]*+)(?:[^<>"']|"[^"<]*+"|'[^'<]*+')*+>
+    | <[!?][^<>]*+>
+    | (?P<text>[^<]++|<)""",
+    re.VERBOSE | re.DOTALL | re.IGNORECASE,
+)
+_SKIPPED_TO = {
+    "script": re.compile("</script", re.IGNORECASE),
+    "style": re.compile("</style", re.IGNORECASE),
+    "head": re.compile("</head|<body", re.IGNORECASE),  # a head may stay open
+}
 _BLOCK_TAGS = ("p", "br", "li", "tr", "div", "h1", "h2", "h3", "h4", "h5", "h6", "table", "pre")
+_ENTITY = re.compile(r"&#?\w{1,32};?")
+_MEMBER = re.compile(r"(?:->|\.)\s*(\w+)")
 _HEADING = re.compile(r"(#{1,6}\s|=+\s|\d+(\.\d+)*\s+[A-Z])")
 _SHOWN_NAMES = 60
 _LONGEST_NAME = 200
+# JSON that is longer than this does not fit, however it is written.
+_LONGEST_WHOLE = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,18 +82,26 @@ class Readable:
 def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     """Return the forms of a Simulink file: its structure before a requirement's signals, or names."""
     only = upstream(diagram, seeds)
-    found = [
-        within(threshold, chart_names(diagram, place))
-        for text, place in comparisons(diagram, only)
-        for threshold in thresholds([(text, 0)], constants(diagram, place), f"{diagram.name}/{place}")
-    ]
     whole = "structure" if only is None else "structure, as far as the requirement depends on it"
     forms = (
         Form(whole, lambda: structure_text(diagram, only)),
         Form("names only", lambda: names_text(diagram)),
         Form("name only", lambda: _short(diagram.name)),
     )
-    return Readable(forms, tuple(found), tuple(_modes(diagram)), Definitions(definitions(diagram)))
+    found = tuple(diagram_thresholds(diagram, only))
+    return Readable(forms, found, tuple(_modes(diagram)), Definitions(definitions(diagram)))
+
+
+def parsed(text: str, shown: str) -> Source | None:
+    """Return what a source says, by the ending of its name; None if it is no source.
+
+    Raises:
+        SpecError: if it is too long.
+    """
+    suffix = PurePosixPath(shown).suffix.lower()
+    if suffix not in (*MODELICA_SUFFIXES, *C_SUFFIXES):
+        return None
+    return read_source(text, shown, is_modelica=suffix in MODELICA_SUFFIXES)
 
 
 def of_source(
@@ -93,7 +111,7 @@ def of_source(
     signals: Collection[str],
     *,
     is_named: bool = True,
-    library: Sequence[ModelicaClass] = (),
+    library: Mapping[str, Source] = MappingProxyType({}),
 ) -> Readable:
     """Return the forms of a text file, by the ending of its name.
 
@@ -103,19 +121,22 @@ def of_source(
         seeds: the requirement's signals.
         signals: all signals of the model.
         is_named: whether the user named this file; others are told only as far as they concern the signals.
-        library: classes of all Modelica files that were named, which a class in this one may extend or use.
+        library: what all sources that were named say, by their text: a Modelica class may extend or use
+            others, C files may define each other's structures and macros.
 
-    A source that is not understood is told as text, and its form says so.
+    A source that is too long is told as text, and its form says so.
     """
-    suffix = PurePosixPath(shown).suffix.lower()
     try:
-        if suffix in MODELICA_SUFFIXES:
-            return _of_modelica(text, shown, seeds, signals, library)
-        if suffix in C_SUFFIXES:
-            return _of_c(text, shown, seeds, is_named=is_named)
+        source = library.get(text) or parsed(text, shown)
     except SpecError as error:
         found = _not_understood(text, f"not understood: {str(error).removeprefix(f'{shown}: ')}", signals)
         return found if is_named else Readable(found.forms[-1:])
+    if source is not None:
+        others = [s for s in library.values() if s.is_modelica == source.is_modelica] or [source]
+        if source.is_modelica:
+            return _of_modelica(source, others, seeds, signals)
+        return _of_c(source, others, seeds, signals, is_named=is_named)
+    suffix = PurePosixPath(shown).suffix.lower()
     if suffix in HTML_SUFFIXES:
         return _of_document(_without_tags(text), signals)
     if suffix == ".json":
@@ -124,47 +145,70 @@ def of_source(
 
 
 def _of_modelica(
-    text: str,
-    shown: str,
+    source: Source,
+    library: Sequence[Source],
     seeds: Collection[str],
     signals: Collection[str],
-    library: Sequence[ModelicaClass],
 ) -> Readable:
-    own = read_modelica(text, shown)
-    classes = (*library, *own)  # of the same name, those of the file itself count
-    found = class_for((with_bases(each, classes) for each in own), _roots((*seeds, *signals)))
-    if found is None:
-        return _not_understood(text, "no class declares a signal of the model", signals)
-    roots = _roots(seeds) & found.names
-    kept = slice_of(found, roots) if roots else None
-    others = used_classes(found, kept, classes)
-    changed = modified_values(text, shown)
-    limits = list(thresholds(conditions(found, kept), _possible(found.constants, changed), shown))
-    for other in others:  # its variables are not the signals of the same name
-        inner = thresholds(conditions(other, None), _possible(other.constants, changed), shown)
+    shown = source.shown
+    main = modelica.class_for(source, library, _roots((*seeds, *signals)))
+    if not main:
+        return _not_understood(source.text, "no class declares a signal of the model", signals)
+    files: dict[str, Source] = {}  # of the same name, the class of the file itself counts
+    by_class: dict[str, list[Statement]] = {}
+    for each in (*(s for s in library if s is not source), source):
+        for name, found in groupby(sorted(each.statements, key=lambda s: s.scope), key=lambda s: s.scope):
+            files[name], by_class[name] = each, list(found)
+    declared = {n: c for name in main for n, c in files[name].components[name].items()}
+    leading = {port: text for name in main for port, text in files[name].leading[name].items()}
+    statements = [s for name in main for s in by_class[name]]
+    roots = _roots(seeds) & declared.keys()
+    names, kept = reached(statements, roots, ()) if roots else (set(declared), set(statements))
+    types = {declared[n].kind.rpartition(".")[2] for n in names & declared.keys()}
+    others = modelica.used_classes(names | types, main, library)
+    constants = _constants(main, files, library)
+    compared = [(s.text, s.line) for s in statements if s in kept and s.is_told]
+    compared += modelica.comparisons(declared, leading, names)
+    limits = [*thresholds(compared, constants, shown, is_dotted=True)]
+    limits += modelica.tables(declared, leading, names, constants, shown)
+    for name in others:  # its variables are not the signals of the same name
+        texts = ((s.text, s.line) for s in by_class[name] if s.is_told)
+        inner = thresholds(texts, _constants([name], files, library), shown, is_dotted=True)
         limits += [within(threshold, dict.fromkeys(threshold.names, "")) for threshold in inner]
-    of_main = class_text(found, kept)
-    stated = {n: v for n, v in found.constants.items() if kept is None or n in kept.names}
-    form = "what the requirement depends on" if roots else f"class {found.name}"
+    form = "what the requirement depends on" if roots else f"class {main[0]}"
+    used = {n: v for n, v in constants.items() if n in names}
+
+    def told(*, whole: bool) -> str:
+        lines = [line for name in main for line in lines_told(by_class[name], kept)]
+        more = [line for name in others for line in lines_told(by_class[name], None)] if whole else []
+        return "\n".join([*lines, *_left_out(statements, kept, "//"), *more])
+
     forms = (
-        Form(form, lambda: "\n".join([of_main, *(class_text(other, None) for other in others)])),
-        Form(f"{form}, without other classes", lambda: of_main),
-        Form("parameters and comparisons", lambda: _parameters(stated, limits)),
+        Form(form, lambda: told(whole=True)),
+        Form(f"{form}, without other classes", lambda: told(whole=False)),
+        Form("parameters and comparisons", lambda: _parameters(used, limits)),
         Form("comparisons", lambda: _parameters({}, limits)),
-        Form("name only", lambda: _short(f"{found.kind} {found.name}")),
+        Form("name only", lambda: _short(f"class {main[0]}")),
     )
-    known = _known(found.statements)
-    declared = {d.name: d.value for d in found.declarations if d.value and d.name not in found.constants}
-    return Readable(forms, tuple(limits), known=replace(known, equal={**declared, **known.equal}))
+    equal, fed = assignments(statements)
+    made = dict(modelica.outputs(declared, leading))
+    known = Definitions({**made, **leading, **equal}, fed)
+    return Readable(forms, tuple(limits), known=known)
 
 
-def _known(statements: Collection[Statement]) -> Definitions:
-    return Definitions(*assignments(statements))
+def _left_out(statements: Iterable[Statement], kept: Collection[Statement], comment: str) -> Iterator[str]:
+    left = sum(s.is_told and s not in kept for s in statements)
+    if left:
+        yield f"{comment} {counted(left, 'statement')} left out: not met from the requirement's signals on"
 
 
-def _possible(constants: Mapping[str, str], changed: Mapping[str, Sequence[str]]) -> dict[str, str]:
+def _constants(main: Iterable[str], files: Mapping[str, Source], library: Iterable[Source]) -> dict[str, str]:
     """Return values of parameters with those that modifiers give them: which holds is not told apart."""
-    return {n: " or ".join(dict.fromkeys((v, *changed.get(n, ())))) for n, v in constants.items()}
+    found = {n: dict.fromkeys(v) for name in main for n, v in files[name].constants[name].items()}
+    for source in library:
+        for name in found.keys() & source.modified.keys():
+            found[name] |= dict.fromkeys(source.modified[name])
+    return {name: " or ".join(values) for name, values in found.items()}
 
 
 def _roots(names: Collection[str]) -> set[str]:
@@ -172,38 +216,52 @@ def _roots(names: Collection[str]) -> set[str]:
     return {part for name in names for part in (name.partition(".")[0], name.rpartition(".")[2])}
 
 
-def _of_c(text: str, shown: str, seeds: Collection[str], *, is_named: bool) -> Readable:
-    found = read_c(text, shown)
-    roots = {name.rpartition(".")[2] for name in seeds} & found.names
+def _of_c(
+    source: Source,
+    library: Sequence[Source],
+    seeds: Collection[str],
+    signals: Collection[str],
+    *,
+    is_named: bool,
+) -> Readable:
+    constants = constants_of(library, signals)
+    functions = [s.text for s in source.statements if s.scope and s.outer is None and not s.follows]
+    statements = source.statements
+    roots = {name.rpartition(".")[2] for name in seeds} & {name for s in statements for name in s.sets}
+    names, kept = reached(statements, roots, {s.scope for s in statements})
+    relevant = [s for s in statements if s in kept] if roots else statements
+    limits = [
+        _of_function(limit, source.own.get(scope, set()))
+        for scope, found in groupby(relevant, key=lambda s: s.scope)
+        for limit in thresholds(((s.text, s.line) for s in found), constants, source.shown)
+    ]
+    limits = list({limit.text: limit for limit in reversed(limits)}.values())[::-1]
+    known = Definitions(*assignments(statements))
+    size = Form("size only", lambda: counted(len(functions), "function"))
     if not roots:
-        functions = [f.head for f in found.functions]
-        limits = _c_limits(found, None, shown)
         whole = (
-            Form("whole, since no function sets a signal of the requirement", lambda: c_text(found, None)),
+            Form("whole, since no function sets a signal of the requirement", source.text.strip),
             Form("functions", lambda: "\n".join(functions[:_SHOWN_NAMES])),
-            Form("size only", lambda: counted(len(functions), "function")),
+            size,
         )
-        known = _known(found.statements)
         return Readable(whole, tuple(limits), known=known) if is_named else Readable(whole[2:])
-    kept = c_slice(found, roots)
-    limits = _c_limits(found, kept, shown)
-    used = {name: value for name, value in found.constants.items() if name in kept.names}
+    used = {name: value for name, value in constants.items() if name in names}
     forms = (
-        Form("what the requirement depends on", lambda: c_text(found, kept)),
+        Form(
+            "what the requirement depends on",
+            lambda: "\n".join([*lines_told(statements, kept), *_left_out(statements, kept, "//")]),
+        ),
         Form("constants and comparisons", lambda: _parameters(used, limits)),
         Form("comparisons", lambda: _parameters({}, limits)),
-        Form("size only", lambda: counted(len(found.functions), "function")),
+        size,
     )
-    return Readable(forms, tuple(limits), known=_known(found.statements))
+    return Readable(forms, tuple(limits), known=known)
 
 
-def _c_limits(found: CSource, kept: Slice | None, shown: str) -> list[Threshold]:
-    own = found.own
-    limits = thresholds(c_conditions(found, kept), found.constants, shown)
-    return [
-        within(limit, {n: "" for n in limit.names & own if not re.search(rf"(->|\.)\s*{n}\b", limit.text)})
-        for limit in limits
-    ]
+def _of_function(limit: Threshold, own: Collection[str]) -> Threshold:
+    """Return a comparison as it is seen from outside a function that declares some variables."""
+    inner = limit.names.intersection(own).difference(_MEMBER.findall(limit.text))
+    return within(limit, dict.fromkeys(inner, ""))
 
 
 def _of_document(text: str, signals: Collection[str]) -> Readable:
@@ -229,7 +287,7 @@ def _of_json(text: str, signals: Collection[str]) -> Readable:
         return _of_document(text, signals)
     keys = list(content) if isinstance(content, dict) else [counted(len(content), "element")]
     forms = (
-        Form("whole", lambda: json.dumps(content, indent=1)),
+        Form("whole", lambda: json.dumps(content, indent=1) if len(text) <= _LONGEST_WHOLE else text),
         Form("keys", lambda: ", ".join(map(str, keys))),
         Form("size only", lambda: counted(len(keys), "key")),
     )
@@ -252,12 +310,11 @@ def _parameters(values: Mapping[str, str], limits: Sequence[Threshold]) -> str:
 
 def _naming(text: str, signals: Collection[str]) -> Iterator[str]:
     """Return the paragraphs of a document that name a signal."""
-    names = [re.escape(name.rpartition(".")[2]) for name in signals if len(name) > 1]
-    if not names:
-        return
-    pattern = re.compile(rf"\b({'|'.join(names)})\b")
+    names = {name.rpartition(".")[2] for name in signals if len(name) > 1}
+    words = {name for name in names if name.isidentifier()}
+    others = names - words
     for paragraph in re.split(r"\n\s*\n", text):
-        if pattern.search(paragraph):
+        if not words.isdisjoint(re.findall(r"\w+", paragraph)) or any(name in paragraph for name in others):
             yield " ".join(paragraph.split())
 
 
@@ -273,30 +330,18 @@ def _modes(diagram: Diagram) -> Iterator[tuple[str, str]]:
 
 
 def _without_tags(text: str) -> str:
-    parser = _Text()
-    parser.feed(text)
-    parser.close()
-    return re.sub(r"\n{3,}", "\n\n", "".join(parser.found))
-
-
-class _Text(HTMLParser):
-    """Keeps the text of a page."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: list[str] = []
-        self._skipped = 0
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._skipped = 0 if tag == "body" else self._skipped + (tag in _SKIPPED_TAGS)  # a head may stay open
-        if tag in _BLOCK_TAGS:
-            self.found.append("\n")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._skipped -= tag in _SKIPPED_TAGS and self._skipped > 0
-        if tag in _BLOCK_TAGS:
-            self.found.append("\n")
-
-    def handle_data(self, data: str) -> None:
-        if not self._skipped:
-            self.found.append(re.sub(r"[ \t\r\f]+", " ", data))
+    found: list[str] = []
+    at = 0
+    while at < len(text):
+        part = _PAGE.match(text, at)
+        assert part is not None
+        at = part.end()
+        if part["skipped"]:
+            end = _SKIPPED_TO[part["skipped"].lower()].search(text, at)
+            at = len(text) if end is None else end.start()
+        elif part["tag"] and part["tag"].lower() in _BLOCK_TAGS:
+            found.append("\n")
+        elif part["text"]:
+            found.append(re.sub(r"[ \t\r\f]+", " ", part["text"]))
+    plain = _ENTITY.sub(lambda entity: html.unescape(entity[0]), "".join(found))
+    return re.sub(r"\n{3,}", "\n\n", plain)

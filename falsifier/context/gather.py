@@ -1,6 +1,7 @@
 """Reads what a user named as context, refuses secrets, and tells as much of each file as fits."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -8,13 +9,13 @@ from types import MappingProxyType
 
 from falsifier.context.decoding import text_of
 from falsifier.context.fmu_files import NAME_THEM, inside
-from falsifier.context.forms import MODELICA_SUFFIXES, Form, Readable, of_diagram, of_source
+from falsifier.context.forms import Form, Readable, of_diagram, of_source, parsed
 from falsifier.context.levels import levels_of
-from falsifier.context.modelica import ModelicaClass, read_modelica
 from falsifier.context.sentry import Sentry
 from falsifier.context.simulink import SUFFIXES as SIMULINK
-from falsifier.context.simulink import read_diagram
+from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.parts import read_parts
+from falsifier.context.sources import Source
 from falsifier.context.thresholds import Threshold
 from falsifier.context.values import Compared, Context, Excerpt, Level
 from falsifier.core.words import counted
@@ -29,29 +30,35 @@ _LEAVE_OUT = "remove it, or leave the file out"
 
 
 @dataclass(frozen=True, slots=True)
-class _Source:
-    """One file with its forms."""
+class _File:
+    """One file as it was read.
+
+    Attributes:
+        path: as it was named.
+        name: as it is told. Only the name of a file: folders often have names of people and customers.
+        sha256: of its content.
+        content: its text, or diagram.
+        is_named: whether the user named it; it lies inside an FMU otherwise.
+    """
 
     path: str
     name: str
     sha256: str
-    readable: Readable
-    otherwise: str = _LEAVE_OUT
+    content: str | Diagram
+    is_named: bool
+
+    @property
+    def otherwise(self) -> str:
+        """What to do if it has a secret."""
+        return _LEAVE_OUT if self.is_named else NAME_THEM
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
-    """What the files are read for."""
+class _Source:
+    """One file with its forms."""
 
-    seeds: Collection[str]
-    signals: Collection[str]
-    sentry: Sentry | None
-    library: tuple[ModelicaClass, ...] = ()
-
-    def look(self, text: str, shown: str, file: str, otherwise: str) -> None:
-        """Refuse a text that looks like a secret, if it is to be told."""
-        if self.sentry is not None:
-            self.sentry.look(text, shown, file, otherwise)
+    file: _File
+    readable: Readable
 
 
 def gather(
@@ -81,32 +88,35 @@ def gather(
             checked file that is not told.
         ModelError: if an archive is damaged or dangerous.
     """
-    named = tuple(dict.fromkeys(files))
-    wanted = _Wanted(seeds, signals, Sentry(checked) if is_told else None, tuple(_library(named)))
-    sources = [_read(Path(name), name, wanted) for name in named]
+    sentry = Sentry(checked) if is_told else None
+    found = [_read(Path(name), name, sentry) for name in dict.fromkeys(files)]
     left_out = []
     for fmu in fmus:
-        for name, content in inside(fmu):
-            found = _of_fmu(content, f"{fmu.name}: {name}", wanted)
-            if found is None:
-                left_out.append(f"context {fmu.name}: {name} is left out, because it is not text")
-            elif len(found.readable.forms) > 1:  # otherwise it says nothing about the signals
-                sources.append(found)
-    if wanted.sentry is None:
+        for entry, content in inside(fmu):
+            inner = _of_fmu(content, f"{fmu.name}: {entry}", sentry)
+            if inner is None:
+                left_out.append(f"context {fmu.name}: {entry} is left out, because it is not text")
+            else:
+                found.append(inner)
+    library = _library(found)
+    sources = [_Source(file, _readable(file, seeds, signals, library)) for file in found]
+    # Of the files inside an FMU, those with one form say nothing about the signals.
+    sources = [s for s in sources if s.file.is_named or len(s.readable.forms) > 1]
+    if sentry is None:
         return Context(levels=_levels(sources, ranges))
     compared = tuple(_limited(_compared(sources, signals)))
     chosen = _fitting(sources, MAX_TOTAL - sum(_size(each) for each in compared))
     for source, (_, text) in zip(sources, chosen, strict=True):
-        _look_again(source, text, wanted.sentry)
-    wanted.sentry.refuse_unused()
+        _look_again(source, text, sentry)
+    sentry.refuse_unused()
     return Context(
         tuple(
-            Excerpt(s.path, s.name, s.sha256, _shortened(s.readable.forms, i), text)
+            Excerpt(s.file.path, s.file.name, s.file.sha256, _shortened(s.readable.forms, i), text)
             for s, (i, text) in zip(sources, chosen, strict=True)
         ),
         compared,
         _levels(sources, ranges),
-        (*left_out, *wanted.sentry.notes),
+        (*left_out, *sentry.notes),
     )
 
 
@@ -115,25 +125,35 @@ def _levels(sources: Iterable[_Source], ranges: Mapping[str, tuple[float, float]
     return tuple(dict.fromkeys(level for each in found for level in each))
 
 
-def _library(names: Sequence[str]) -> Iterator[ModelicaClass]:
-    """Return the classes of several Modelica files; what is wrong with one is said when it is read."""
-    paths = [Path(name) for name in names if Path(name).suffix.lower() in MODELICA_SUFFIXES]
-    for path in paths if len(paths) > 1 else ():
-        try:
-            if path.is_file() and path.stat().st_size <= _MAX_BYTES:
-                yield from read_modelica(text_of(path.read_bytes()) or "", path.name)
-        except (OSError, SpecError):
-            continue
+def _library(files: Iterable[_File]) -> Mapping[str, Source]:
+    """Return what sources say, by their text; of one that cannot be read, its form says why."""
+    found: dict[str, Source] = {}
+    for file in files:
+        if isinstance(file.content, str):
+            with suppress(SpecError):
+                source = parsed(file.content, file.name)
+                if source is not None:
+                    found[file.content] = source
+    return found
+
+
+def _readable(
+    file: _File, seeds: Collection[str], signals: Collection[str], library: Mapping[str, Source]
+) -> Readable:
+    if not isinstance(file.content, str):
+        return of_diagram(file.content, seeds)
+    return of_source(file.content, file.name, seeds, signals, is_named=file.is_named, library=library)
 
 
 def _look_again(source: _Source, text: str, sentry: Sentry) -> None:
     """Refuse what encodings may have hidden before."""
     beside = [t.text for t in source.readable.found] + [told for _, told in source.readable.modes]
     told = "\n".join((text, *beside))
-    sentry.look(told, f"{source.path}, as it is told", source.path, source.otherwise)
+    file = source.file
+    sentry.look(told, f"{file.path}, as it is told", file.path, file.otherwise)
 
 
-def _read(path: Path, name: str, wanted: _Wanted) -> _Source:
+def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
     try:
         if not path.is_file() and path.exists():  # a pipe or device might never end
             raise SpecError(f"context {name}: expected a file; name the files of a folder one by one")
@@ -145,33 +165,34 @@ def _read(path: Path, name: str, wanted: _Wanted) -> _Source:
         content = path.read_bytes()
     except OSError as error:
         raise SpecError(f"context {name}: cannot be read ({error.strerror or error})") from None
+    read: str | Diagram | None
     if path.suffix.lower() in SIMULINK:
         parts = read_parts(path) if path.suffix.lower() == ".slx" else {"": content}
         for part, packed in parts.items():
             shown = f"{name}: {part}" if part else name
-            wanted.look(packed.decode("utf-8", "replace"), shown, name, _LEAVE_OUT)
-        readable = of_diagram(read_diagram(path), wanted.seeds)
+            if sentry is not None:
+                sentry.look(packed.decode("utf-8", "replace"), shown, name, _LEAVE_OUT)
+        read = read_diagram(path)
     else:
-        text = text_of(content)
-        if text is None:
+        read = text_of(content)
+        if read is None:
             raise SpecError(
                 f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
                 "UTF-8, or leave it out"
             )
-        wanted.look(text, name, name, _LEAVE_OUT)
-        # Only the name is told: folders often have names of people and customers.
-        readable = of_source(text, path.name, wanted.seeds, wanted.signals, library=wanted.library)
-    return _Source(name, path.name, sha256(content).hexdigest(), readable)
+        if sentry is not None:
+            sentry.look(read, name, name, _LEAVE_OUT)
+    return _File(name, path.name, sha256(content).hexdigest(), read, is_named=True)
 
 
-def _of_fmu(content: bytes, name: str, wanted: _Wanted) -> _Source | None:
+def _of_fmu(content: bytes, name: str, sentry: Sentry | None) -> _File | None:
     """Return a file of an FMU; None if it is not text."""
     text = text_of(content)
     if text is None:
         return None
-    wanted.look(text, name, name, NAME_THEM)
-    readable = of_source(text, name, wanted.seeds, wanted.signals, is_named=False)
-    return _Source(name, name, sha256(content).hexdigest(), readable, NAME_THEM)
+    if sentry is not None:
+        sentry.look(text, name, name, NAME_THEM)
+    return _File(name, name, sha256(content).hexdigest(), text, is_named=False)
 
 
 def _size(compared: Compared) -> int:
@@ -198,7 +219,7 @@ def _fitting(sources: list[_Source], room: int) -> list[tuple[int, str]]:
         texts = ((i, form.text()) for i, form in enumerate(forms))
         last = len(forms) - 1
         chosen.append(next((i, t) for i, t in texts if 0 < len(t) <= MAX_CHARACTERS or i == last))
-    around = sum(len(s.name) + max(len(f.name) for f in s.readable.forms) for s in sources)
+    around = sum(len(s.file.name) + max(len(f.name) for f in s.readable.forms) for s in sources)
     while sum(len(text) for _, text in chosen) + around > room:
         shrinkable = [k for k, (i, _) in enumerate(chosen) if i + 1 < len(sources[k].readable.forms)]
         if not shrinkable:
@@ -220,7 +241,9 @@ def _compared(sources: list[_Source], signals: Collection[str]) -> Iterator[Comp
     """Return all thresholds, those of signals of the model first."""
     ends: dict[str, list[str]] = {}  # components of a system may have signals of the same name
     for name in signals:
-        ends.setdefault(name.rpartition(".")[2].strip("'"), []).append(name)
+        words = name.split(".")
+        for i in range(len(words)):
+            ends.setdefault(".".join(words[i:]).strip("'"), []).append(name)
     modes = [m for s in sources for m in s.readable.modes if m[0] in ends]
     yield from (Compared(tuple(ends[name]), text, "") for name, text in modes)
     found = [t for s in sources for t in s.readable.found]

@@ -2,8 +2,9 @@
 
 import ast
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import islice, product
 
 import numpy as np
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 # Values of an input at which both sides of a comparison are compared, and halvings of what lies between two.
 _SAMPLES, _HALVINGS = 257, 40
 # A constant that is given twice, "5 or 9", has two values; of several constants, so many combinations count.
-_MAX_COMBINATIONS = 8
+_MAX_COMBINATIONS = 24
 _MAX_DEPTH = 12
 _MAX_LEVELS = 24
 _MAX_THRESHOLDS = 2000
@@ -147,14 +148,15 @@ class _Scope:
         """
         if depth > _MAX_DEPTH or len(text) > _MAX_LENGTH:
             raise _UnknownError(text)
-        names: list[str] = []
+        tree, names = _parsed(text)
+        if tree is None:
+            raise _UnknownError(text)
         try:
-            tree = ast.parse(_as_python(text, names), mode="eval").body
             return self._of(tree, names, depth)
-        except (SyntaxError, MemoryError, RecursionError, ArithmeticError):
+        except (RecursionError, ArithmeticError):
             raise _UnknownError(text) from None
 
-    def _of(self, node: ast.expr, names: list[str], depth: int) -> Array:
+    def _of(self, node: ast.expr, names: Sequence[str], depth: int) -> Array:
         match node:
             case ast.Constant(value=int() | float() as number):
                 return np.asarray(float(number))
@@ -168,7 +170,7 @@ class _Scope:
                 sides = (self._of(side, names, depth) for side in (left, right))
                 return _BINARY[type(op)](*sides)
             case ast.Call(func=ast.Name(id=placeholder), args=[_, *_] as args, keywords=[]):
-                function = names[int(placeholder[1:])]
+                function = names[int(placeholder[1:])].rpartition(".")[2]
                 values = [self._of(a, names, depth) for a in args]
                 if function in _UNCHANGED:
                     return values[-1]
@@ -188,6 +190,8 @@ class _Scope:
         return value
 
     def _named(self, name: str, depth: int) -> Array:
+        if name not in self.constants and name not in self.known.equal:
+            name = name.rpartition(".")[2]  # of a.b, what is known of b
         if name in self.constants and (self.constants[name] or name not in self.known.equal):
             return self.value(self.constants[name], depth + 1)
         if name == self.signal and name not in self.constants:
@@ -202,12 +206,28 @@ class _Scope:
         raise _UnknownError(name)
 
 
+@lru_cache(maxsize=10_000)
+def _parsed(text: str) -> tuple[ast.expr | None, tuple[str, ...]]:
+    """Return an expression, or None if it is not understood, with placeholders for its names."""
+    names: list[str] = []
+    try:
+        return ast.parse(_as_python(text, names), mode="eval").body, tuple(names)
+    except (SyntaxError, MemoryError, RecursionError, ValueError):
+        return None, ()
+
+
 def _as_python(text: str, names: list[str]) -> str:
-    """Return an expression with placeholders for its names; of ``a->b.c`` only the last one counts."""
+    """Return an expression with placeholders for its names; of ``a->b`` only the last one counts."""
     words: list[str] = []
+    is_member = False
     for token in tokens_of(text, "an expression"):
-        if token.text in ("->", ".") and words:
+        if token.text == "->" and words:
             words.pop()
+        elif token.text == "." and words and words[-1].startswith("_"):
+            is_member = True
+            continue
+        elif token.kind == "name" and is_member:
+            names[-1] += f".{token.text}"
         elif token.kind == "name":
             words.append(f"_{len(names)}")
             names.append(token.text.strip("'"))
@@ -216,4 +236,5 @@ def _as_python(text: str, names: list[str]) -> str:
             words.append(token.text if number is None else f"{number:.17g}")
         else:
             words.append(token.text)
+        is_member = False
     return " ".join(words)

@@ -1,23 +1,23 @@
 """Which constants are compared with which signals, in conditions of any of the languages that are read."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, pairwise
 from math import isinf
 
-from falsifier.context.tokens import Token, tokens_of, written
+from falsifier.context.tokens import CLOSING, OPENING, Token, tokens_of, written
 
 _RELATIONS = ("<", "<=", ">", ">=", "==", "!=", "<>")
 _SIGNS = ("<", ">", "==", "!=")
 # What ends an operand at its own depth of brackets.
 _BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop , ; ? : = := { } return"
 _BOUNDARIES = frozenset(_BOUNDING.split())
-_OPENING, _CLOSING = "([{", ")]}"
-_DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_HEXADECIMAL = r"0[xX][0-9a-fA-F]+(?:\.?[0-9a-fA-F]*[pP][-+]?\d+)?"
+_DECIMAL = r"(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
+_HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
 _NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
 _MAX_LENGTH = 160
-_MAX_CONDITION = 10_000
+_SHOWN_VALUES = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Threshold:
 
 
 def thresholds(
-    texts: Iterable[tuple[str, int]], constants: Mapping[str, str], file: str
+    texts: Iterable[tuple[str, int]], constants: Mapping[str, str], file: str, *, is_dotted: bool = False
 ) -> Iterator[Threshold]:
     """Return the comparisons of variables with numbers or named constants.
 
@@ -51,19 +51,36 @@ def thresholds(
         texts: conditions and statements, with their lines.
         constants: values of named constants, as written.
         file: name of the file, for places.
+        is_dotted: whether ``a.b`` is a variable of this name, as in Modelica, and not the member ``b``.
     """
     seen = set()
     for text, line in texts:
-        if len(text) > _MAX_CONDITION or not any(sign in text for sign in _SIGNS):
+        if not any(sign in text for sign in _SIGNS):
             continue
-        tokens = tokens_of(text, file)
+        tokens = list(tokens_of(text, file))
         for i, token in enumerate(tokens):
             if token.text in _RELATIONS:
-                left, right = _before(tokens, i), _behind(tokens, i)
-                found = _threshold(text, left, token, right, constants, f"{file}:{line}" if line else file)
+                first, last = _first(tokens, i), _last(tokens, i)
+                if first is None or last is None:
+                    continue
+                place = f"{file}:{line}" if line else file
+                found = _threshold(
+                    text, tokens[first : last + 1], i - first, constants, place, is_dotted=is_dotted
+                )
                 if found is not None and found.text not in seen:
                     seen.add(found.text)
                     yield found
+
+
+def at_breakpoints(signal: str, values: Sequence[str], place: str) -> Threshold:
+    """Return what the breakpoints of a table say of the signal that leads to it."""
+    told = ", ".join(values[:_SHOWN_VALUES]) + (
+        f", ... ({len(values)})" if len(values) > _SHOWN_VALUES else ""
+    )
+    name = "its breakpoint"
+    constants = {name: " or ".join(values)}
+    return Threshold(frozenset([signal]), f"{signal} leads to a table with the breakpoints {told}", signal,
+                     f"'{name}'", constants, place)  # fmt: skip
 
 
 def within(found: Threshold, names: Mapping[str, str]) -> Threshold:
@@ -102,57 +119,71 @@ def number_in(text: str) -> float | None:
 
 def _threshold(
     text: str,
-    left: list[Token],
-    relation: Token,
-    right: list[Token],
+    tokens: Sequence[Token],
+    at: int,
     constants: Mapping[str, str],
     place: str,
+    *,
+    is_dotted: bool,
 ) -> Threshold | None:
+    """Return the comparison that some tokens are, the relation being at a place among them."""
+    left, right = tokens[:at], tokens[at + 1 :]
     if not left or not right:
         return None
-    tokens = [*left, relation, *right]
-    names = {t.text for t in _variables(tokens)}
-    known = {name: constants[name] for name in sorted(names) if name in constants}
-    named = {name: value for name, value in known.items() if len(value) <= _MAX_LENGTH}
+    paths = dict(_variables(tokens, is_dotted=is_dotted))
+    known = {path: constants[name] for path, name in sorted(paths.items()) if name in constants}
+    named = {paths[path]: value for path, value in known.items() if len(value) <= _MAX_LENGTH}
     values = [value for t in tokens if t.kind == "number" and (value := number_in(t.text)) is not None]
     values += [
         value for s in named.values() for each in s.split(" or ") if (value := number_in(each)) is not None
     ]
-    variables = names - known.keys()
+    variables = paths.keys() - known.keys()
     if not variables or not values:
         return None
-    shown = written(text, tokens)
+    shown = written(text, tokens[0].start, tokens[-1].end)
     if len(shown) > _MAX_LENGTH:
         return None
     stated = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
-    sides = written(text, left), written(text, right)
-    return Threshold(frozenset(variables), f"{shown}{stated}", *sides, named, place)
+    before, behind = (written(text, side[0].start, side[-1].end) for side in (left, right))
+    return Threshold(frozenset(variables), f"{shown}{stated}", before, behind, named, place)
 
 
-def _variables(tokens: list[Token]) -> Iterator[Token]:
-    """Names that are no functions and, of ``a.b`` and ``a->b``, the last ones."""
-    for token, after in zip(tokens, [*tokens[1:], None], strict=True):
-        if token.kind == "name" and (after is None or after.text not in ("(", ".", "->")):
-            yield token
+def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[str, str]]:
+    """Names that are no functions, with the last part of each: of ``a->b`` the name is ``b``, too."""
+    path = ""
+    for token, after in pairwise(chain(tokens, (None,))):
+        if token is None or token.kind != "name":
+            path = f"{path}." if token is not None and token.text == "." and path and is_dotted else ""
+        elif after is None or after.text not in ("(", ".", "->"):
+            yield f"{path}{token.text}", token.text
+            path = ""
+        else:
+            path = f"{path}{token.text}" if after.text == "." else ""
 
 
-def _behind(tokens: list[Token], i: int) -> list[Token]:
-    return list(_operand(tokens[i + 1 :], _OPENING, _CLOSING))
+def _first(tokens: Sequence[Token], i: int) -> int | None:
+    """Return where the operand before a sign begins; None if it is long."""
+    depth, first = 0, i
+    while first and not _ends(tokens[first - 1], depth, OPENING):
+        first -= 1
+        depth += (tokens[first].text in CLOSING) - (tokens[first].text in OPENING)
+        if tokens[i].start - tokens[first].start > _MAX_LENGTH:
+            return None
+    return first
 
 
-def _before(tokens: list[Token], i: int) -> list[Token]:
-    return list(_operand(tokens[:i][::-1], _CLOSING, _OPENING))[::-1]
+def _last(tokens: Sequence[Token], i: int) -> int | None:
+    """Return where the operand behind a sign ends; None if it is long."""
+    depth, last = 0, i
+    while last + 1 < len(tokens) and not _ends(tokens[last + 1], depth, CLOSING):
+        last += 1
+        depth += (tokens[last].text in OPENING) - (tokens[last].text in CLOSING)
+        if tokens[last].end - tokens[i].end > _MAX_LENGTH:
+            return None
+    return last
 
 
-def _operand(tokens: list[Token], opening: str, closing: str) -> Iterator[Token]:
-    depth = 0
-    for token in tokens:
-        if token.text in closing and len(token.text) == 1:
-            depth -= 1
-            if depth < 0:
-                return
-        if depth == 0 and (token.text in _BOUNDARIES or token.text in _RELATIONS):
-            return
-        if token.text in opening and len(token.text) == 1:
-            depth += 1
-        yield token
+def _ends(token: Token, depth: int, closing: Collection[str]) -> bool:
+    """Whether an operand ends before a token."""
+    text = token.text
+    return depth == 0 and (text in closing or text in _BOUNDARIES or text in _RELATIONS)

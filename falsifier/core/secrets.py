@@ -35,7 +35,7 @@ _KEY_SHAPES = (
     r"(?<![\w-])eyJ[\w-]{10,}+\.[\w-]{10,}(?:\.[\w-]*)?",
 )
 # Passwords may contain an unescaped @ themselves.
-_CREDENTIALS_IN_ADDRESS = r"(?<=://)[^\s/?#'\"]+(?=@)"
+_CREDENTIALS_IN_ADDRESS = r"(?<!mailto://)(?<=://)[^\s/?#'\"]+(?=@)"
 _VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS)))
 # The same for an address alone: without a scheme too, and a password may contain a slash; a port is none.
 _CREDENTIALS = re.compile(r"(?:.*?://)?(?:[^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$))[^@]*@)")
@@ -54,18 +54,28 @@ _IN_TEXT = re.compile(
 _ASSIGNED = re.compile(
     r"""(?ix) \b (?:\w*[_-])? (?:(?:client|shared)?secret|(?:shared)?access[_-]?key|(?:secret|account|api
     |private|encryption)[_-]?key|password|passwd|passphrase|(?:auth|access|api|bearer|refresh)[_-]?token
-    |credentials?|authorization) ["']? (?:\s* (?::?=|:) \s* | >) ["']? [^\s"',;(){}<]{6,}"""
+    |credentials?|authorization) ["']? (?:\s*+ (?::?=|:) \s*+ | >) (?!mailto:)
+    # A value that a program reads elsewhere is none: argv[1], os.environ, config.password.
+    (?!(?:argv|args|options|params|config|settings|self|this|os|env|environ|process|getenv)\b\s*+(?:[.\[(]|->))
+    ["']? [^\s"',;(){}<]{6,}"""
 )
 # The same without a sign: a macro, or a sentence.
 _STATED = re.compile(
-    r"""(?ix) \#[ ]*define[ ]+\w*(?:passw(?:or)?d|secret|token|_key) \s+ ["'][^\s"']{6,}
+    r"""(?ix) \#[ ]*define[ ]+(?!instantiation_?token\b)\w*(?:passw(?:or)?d|secret|token|_key)
+    \s+ ["'][^\s"']{6,}
     | \bpassword[ ]is \s+ ["']? (?=[^\s"']*\d) [^\s"',;(){}]{6,}"""
 )
 # A line of an environment file: names in capitals, nothing around the sign.
 _ENVIRONMENT = re.compile(
-    r"\s*(?:export\s+)?[A-Z][A-Z0-9_]*(?:_KEY|TOKEN|SECRET|PASSWORD|PASSWD|_PASS|_PWD|_PAT)=[\"']?[^\s\"'(){};]{6,}"
+    r"\s*(?:export\s+)?(?!INSTANTIATION_TOKEN=)[A-Z][A-Z0-9_]*(?:_KEY|TOKEN|SECRET|PASSWORD|PASSWD|_PASS|_PWD|_PAT)=[\"']?[^\s\"'(){};]{6,}"
 )
 _UNNAMED = (_VALUE, _ASSIGNED, _STATED)
+# Whatever the patterns above find has one of these: a file of some MB is searched for them in much less time.
+_LISTED_HINTS = """
+    sk- pk- rk- hf gsk pplx nvapi xai aiza github_pat_ gho_ ghp_ ghs_ ghu_ ghr_ glpat- xox akia asia
+    _live_ _test_ npm_ key :// eyj secret pass token credential authorization _pwd _pat
+"""
+_HINTS = tuple(_LISTED_HINTS.split())
 # Environment variables whose values are removed from texts: fewer than those that are kept from FMUs, because
 # the values of others, such as a region or a path, may be part of any text.
 _KEY_VARIABLE = re.compile(
@@ -139,8 +149,13 @@ def line_of_secret(text: str) -> int | None:
     >>> line_of_secret("api_key = abcdef123"), line_of_secret("gain = 3")
     (1, None)
     """
-    for number, line in enumerate(text.splitlines(), start=1):
-        if any(pattern.search(line) for pattern in _UNNAMED) or _ENVIRONMENT.match(line):
+    folded = text.casefold()
+    hints = [hint for hint in _HINTS if hint in folded]
+    for number, line in enumerate(text.splitlines() if hints else (), start=1):
+        folded = line.casefold()
+        if any(hint in folded for hint in hints) and (
+            any(pattern.search(line) for pattern in _UNNAMED) or _ENVIRONMENT.match(line)
+        ):
             return number
     return None
 
@@ -148,8 +163,8 @@ def line_of_secret(text: str) -> int | None:
 def line_of_held_secret(text: str) -> int | None:
     """Return the number of the first line, from 1, with a secret of this process's environment, or None."""
     held = [v.strip() for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
-    held = [value for value in held if len(value) >= _SHORTEST]
-    for number, line in enumerate(text.splitlines(), start=1):
+    held = [value for value in held if len(value) >= _SHORTEST and value in text]
+    for number, line in enumerate(text.splitlines() if held else (), start=1):
         if any(value in line for value in held):
             return number
     return None

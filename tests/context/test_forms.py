@@ -1,5 +1,6 @@
 import pytest
 
+from falsifier.context import tokens
 from falsifier.context.forms import Readable, of_source
 from falsifier.context.levels import levels_of
 
@@ -24,7 +25,7 @@ def test_modelica_has_shorter_and_shorter_forms() -> None:
     assert "y = if u > p" in told["what the requirement depends on"]
     assert told["parameters and comparisons"] == "p = 3\nu > p (p = 3)  [a.mo:6]"
     assert told["comparisons"] == "u > p (p = 3)  [a.mo:6]"
-    assert told["name only"] == "model M"
+    assert told["name only"] == "class M"
     assert [t.text for t in readable.found] == ["u > p (p = 3)"]
 
 
@@ -41,10 +42,14 @@ def test_c_that_sets_no_signal_is_told_only_if_it_is_named() -> None:
     assert [f.name for f in of_source(source, "a.c", ["o"], ["o"], is_named=False).forms] == ["size only"]
 
 
-def test_a_source_that_is_not_understood_is_text_and_that_is_said() -> None:
-    source = "#ifdef A\nvoid f(int a) {\n#else\nvoid f(void) {\n#endif\n  speed = 3;\n}\n"
+def test_a_source_that_is_too_long_is_text_and_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = "void f(void) { speed = 3; }"
+    monkeypatch.setattr(tokens, "_MAX_CHARACTERS", 10)
     first = of_source(source, "a.c", ["speed"], ["speed"]).forms[0]
-    assert first.name == "whole; not understood: the brace of line 2 is not closed"
+    assert (
+        first.name
+        == "whole; not understood: has 27 characters, more than 10; split it, and name the part that matters"
+    )
     assert "speed = 3;" in first.text()
     hidden = of_source(source, "m.fmu: a.c", ["speed"], ["speed"], is_named=False)
     assert len(hidden.forms) == 1

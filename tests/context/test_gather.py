@@ -191,7 +191,7 @@ def test_long_names_are_shortened(tmp_path: Path) -> None:
     name = "M" * 50_000
     (tmp_path / "a.mo").write_text(f"model {name}\n  Real trips;\nequation\n  trips = 1;\nend {name};\n")
     (excerpt,) = read(tmp_path / "a.mo").excerpts
-    assert excerpt.text == f"model {'M' * 194}... (50,006 characters)"
+    assert excerpt.text == f"class {'M' * 194}... (50,006 characters)"
 
 
 def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:

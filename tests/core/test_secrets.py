@@ -109,6 +109,13 @@ def test_secrets_of_settings_sources_and_key_files_are_found(line: str) -> None:
         "#define KEY_STATE_KEY (BASE + 100000)",
         "BlockKey = 12345678",
         "secret > threshold",
+        '#define INSTANTIATION_TOKEN "{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"',
+        "INSTANTIATION_TOKEN=8c4e810f-3df3-4a00-8276-176fa3c9f9e0",
+        "password=argv[1];",
+        "password = getenv(NAME);",
+        "const char *password = config->password;",
+        "Authorization: mailto:someone@example.org",
+        '<a href="mailto://someone@example.org">',
     ],
 )
 def test_code_that_only_speaks_of_keys_is_no_secret(line: str) -> None:

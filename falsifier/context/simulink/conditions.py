@@ -3,56 +3,85 @@
 import re
 from collections.abc import Collection, Iterator, Mapping
 
-from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram
+from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram
 from falsifier.context.simulink.upstream import Place
+from falsifier.context.thresholds import Threshold, at_breakpoints, thresholds, within
 
 # Of an If block, u1 is what leads to its first port, not a signal of that name.
 _PORT = re.compile(r"\bu(\d+)\b")
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
+_NUMBER = re.compile(r"[-+]?(\d++\.?\d*+|\.\d++)([eE][-+]?\d++)?$")
+# Tables by type: the parameter that has the breakpoints of each input.
+_TABLES: Mapping[str, Mapping[str, str]] = {
+    "Lookup": {"1": "InputValues"},
+    "Lookup2D": {"1": "RowIndex", "2": "ColumnIndex"},
+    "Lookup_n-D": {str(i): f"BreakpointsForDimension{i}" for i in range(1, 6)},
+}
 # A constant may state its type: single(5), int8(3).
 _CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\)$")
 
 
-def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[tuple[str, str]]:
-    """Return comparisons as text with the block or chart that makes them.
+def diagram_thresholds(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[Threshold]:
+    """Return the comparisons with constants, and the breakpoints of tables.
 
     Args:
         diagram: the model.
         only: paths of the blocks to look at; None: all.
     """
     fed = feeding(diagram)
-    for path, system in diagram.root.walk():
-        leading = sources(system, fed.get(path, {}))
-        for block in system.blocks:
-            place = (*path, block.name)
-            if not block.is_off and (only is None or place in only):
-                for text in _compared(block, leading.get(block.name, {})):
-                    yield text, "/".join(place)
+    names = {chart.name: _chart_names(chart, fed) for chart in diagram.charts}
+    constants = {chart.name: _chart_constants(chart) for chart in diagram.charts}
+    for text, place in comparisons(diagram, only):
+        told = f"{diagram.name}/{place}"
+        for threshold in thresholds([(text, 0)], constants.get(place, {}), told):
+            yield within(threshold, names.get(place, {}))
+    for path, block, inputs in _reached(diagram, only):
+        for signal, values in _breakpoints(block, inputs):
+            yield at_breakpoints(signal, values, f"{diagram.name}/{'/'.join(path)}")
+
+
+def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[tuple[str, str]]:
+    """Return comparisons as text with the block or chart that makes them."""
+    for place, block, inputs in _reached(diagram, only):
+        for text in _compared(block, inputs):
+            yield text, "/".join(place)
     for chart in diagram.charts:
         if only is None or tuple(chart.name.split("/")) in only:
             texts = [t.label for t in chart.transitions] + [s.actions for s in chart.states] + [chart.script]
             yield from ((text, chart.name) for text in texts if text)
 
 
-def constants(diagram: Diagram, place: str) -> Mapping[str, str]:
-    """Return the values of the variables of the chart at a place that do not change; none of a block."""
-    return {
-        data.name: data.initial
-        for chart in diagram.charts
-        for data in chart.data
-        if chart.name == place and data.initial and data.scope in ("constant", "parameter")
-    }
+def _reached(
+    diagram: Diagram, only: Collection[Place] | None
+) -> Iterator[tuple[Place, Block, Mapping[str, str]]]:
+    """Return the blocks to look at, with their paths and what leads to each of their inputs."""
+    fed = feeding(diagram)
+    for path, system in diagram.root.walk():
+        leading = sources(system, fed.get(path, {}))
+        for block in system.blocks:
+            place = (*path, block.name)
+            if not block.is_off and (only is None or place in only):
+                yield place, block, leading.get(block.name, {})
 
 
-def chart_names(diagram: Diagram, place: str) -> Mapping[str, str]:
-    """Return what the variables of the chart at a place stand for outside it; empty text for its own ones."""
-    chart = next((chart for chart in diagram.charts if chart.name == place), None)
-    if chart is None:
-        return {}
-    fed = feeding(diagram).get(tuple(place.split("/")), {})
+def _chart_constants(chart: Chart) -> Mapping[str, str]:
+    """Return the values of the variables of a chart that do not change."""
+    return {d.name: d.initial for d in chart.data if d.initial and d.scope in ("constant", "parameter")}
+
+
+def _chart_names(chart: Chart, feeding: Mapping[Place, Mapping[str, str]]) -> Mapping[str, str]:
+    """Return what the variables of a chart stand for outside it; empty text for its own ones."""
+    fed = feeding.get(tuple(chart.name.split("/")), {})
     own = {d.name: "" for d in chart.data if d.scope in ("local", "temporary")}
     inputs = {d.name: fed[d.name] for d in chart.data if d.scope == "input" and d.name in fed}
     return own | {name: text for name, text in inputs.items() if text != name}
+
+
+def _breakpoints(block: Block, inputs: Mapping[str, str]) -> Iterator[tuple[str, list[str]]]:
+    """Return what leads to each input of a table, with its breakpoints if they are numbers."""
+    for port, name in _TABLES.get(block.type, {}).items():
+        values = block.parameter(name).strip("[] ").replace(",", " ").split()
+        if port in inputs and values and all(_NUMBER.match(value) for value in values):
+            yield inputs[port], values
 
 
 def feeding(diagram: Diagram, *, named: bool = True) -> Mapping[Place, Mapping[str, str]]:

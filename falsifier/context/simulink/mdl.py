@@ -8,9 +8,9 @@ from falsifier.context.simulink.tree import Node
 from falsifier.errors import SpecError
 
 _MAX_DEPTH = 200
-_OPENING = re.compile(r"([\w.$:/+-]+)\s*\{$")
-_STRING = re.compile(r'"((?:[^"\\]|\\.)*)"$')
-_VALUE = re.compile(r"([\w.$:/+-]+)\s+(.*)$")
+_OPENING = re.compile(r"([\w.$:/+-]++)\s*+\{$")
+_STRING = re.compile(r'"((?:[^"\\]|\\.)*+)"$')
+_VALUE = re.compile(r"([\w.$:/+-]++)\s++(.*)$")
 _ESCAPE = re.compile(r"\\(.)")
 _PACKAGE = "__MWOPC_PACKAGE_BEGIN__"
 _PART = "__MWOPC_PART_BEGIN__"
@@ -21,7 +21,7 @@ _END = "__MWOPC_PACKAGE_END__"
 class _Section:
     kind: str
     line: int
-    values: dict[str, str] = field(default_factory=dict)
+    values: dict[str, list[str]] = field(default_factory=dict)  # pieces of each
     children: list[Node] = field(default_factory=list)
     last: str = ""
 
@@ -42,14 +42,19 @@ def parse_mdl(text: str, shown: str) -> Node:
             if len(stack) == 1:
                 raise SpecError(f"{shown}: line {number}: a section is closed that was not opened")
             closed = stack.pop()
-            stack[-1].children.append(Node(closed.kind, closed.values, tuple(closed.children)))
+            stack[-1].children.append(_node(closed))
         elif not _add(stack[-1], line):
             raise SpecError(f"{shown}: line {number}: expected NAME VALUE, NAME {{ or }}, got {line[:60]!r}")
     if len(stack) > 1:
         raise SpecError(
             f"{shown}: the section {stack[-1].kind} of line {stack[-1].line} is not closed; it ends too early"
         )
-    return Node("file", stack[0].values, tuple(stack[0].children))
+    return _node(stack[0])
+
+
+def _node(closed: _Section) -> Node:
+    values = {name: "".join(pieces) for name, pieces in closed.values.items()}
+    return Node(closed.kind, values, tuple(closed.children))
 
 
 def is_text_package(text: str) -> bool:
@@ -85,7 +90,7 @@ def _add(section: _Section, line: str) -> bool:
         piece = _STRING.match(line)
         if piece is None or not section.last:
             return False
-        section.values[section.last] += _unescaped(piece[1])
+        section.values[section.last].append(_unescaped(piece[1]))
         return True
     found = _VALUE.match(line)
     if found is None:
@@ -94,7 +99,7 @@ def _add(section: _Section, line: str) -> bool:
     quoted = _STRING.match(value)
     if value.startswith('"') and quoted is None:
         return False
-    section.values[name] = _unescaped(quoted[1]) if quoted else value
+    section.values[name] = [_unescaped(quoted[1]) if quoted else value]
     section.last = name if quoted else ""
     return True
 

@@ -91,6 +91,7 @@ _DRAWN_NAMES = """
     ReferencedSubsystem PreCopyFcn CopyFcn OpenFcn LoadFcn
 """
 _DRAWN = frozenset(_DRAWN_NAMES.split())
+_TYPES = ("DataTypeStr", "DataType", "DataTypeName", "ParamMin", "ParamMax")
 # Values that say nothing: inherited sample times, no limits, off.
 _EMPTY = frozenset(("", "[]", "-1", "off", "none"))
 _KEPT_EVEN_IF_EMPTY = frozenset(
@@ -111,8 +112,7 @@ def meaningful(
     """
     names = _MEANINGFUL.get(kind)
     if names is None:
-        shown = tuple(name for name in stated if name not in _DRAWN and not name.startswith("Mask"))
-        found = {name: stated[name] for name in shown}
+        found = {name: value for name, value in stated.items() if not _is_drawn(name, value)}
     else:
         everything = {**defaults, **stated}
         found = {name: everything[name] for name in names if name in everything}
@@ -126,6 +126,11 @@ def meaningful(
         for name, value in found.items()
         if value.strip() not in _EMPTY or (name in _KEPT_EVEN_IF_EMPTY and value.strip())
     )
+
+
+def _is_drawn(name: str, value: str) -> bool:
+    """Whether a parameter says how a block is drawn or which types it has; library blocks state dozens."""
+    return name in _DRAWN or name.startswith("Mask") or name.endswith(_TYPES) or value.startswith("Inherit")
 
 
 def _cut(value: str) -> str:

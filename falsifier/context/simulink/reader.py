@@ -1,6 +1,5 @@
 """From a file's sections to a diagram: blocks, lines, charts and settings."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,6 @@ from falsifier.errors import SpecError
 SUFFIXES = (".slx", ".mdl")
 _MAX_TEXT_BYTES = 128 << 20
 _SETTINGS = ("StartTime", "StopTime", "Solver", "SolverName", "FixedStep", "MaxStep", "SampleTime")
-# 5#out:1, 7#in:2, 7#enable
-_END = re.compile(r"(?P<block>.+?)#(?P<kind>\w+)(?::(?P<port>.+))?$")
 
 
 def read_diagram(path: Path) -> Diagram:
@@ -165,9 +162,9 @@ def _targets(line: Node, names: Mapping[str, str]) -> Iterator[End]:
 
 def _end(line: Node, side: str, names: Mapping[str, str]) -> End | None:
     """One end of a line: ``SID#out:1`` in newer files, a name and a port in older ones."""
-    if found := _END.match(line.get(side)):
-        sid = found["block"]
-        return End(names.get(sid, f"SID {sid}"), found["port"] or found["kind"])
+    sid, sign, port = line.get(side).partition("#")  # 5#out:1, 7#in:2, 7#enable
+    if sid and sign:
+        return End(names.get(sid, f"SID {sid}"), port.partition(":")[2] or port)
     block = line.get(f"{side}Block")
     return End(in_one_line(block), line.get(f"{side}Port") or "1") if block else None
 

@@ -4,6 +4,7 @@ Everything is checked before or after a tree is built, not while: a builder in P
 again for a description of 100,000 variables.
 """
 
+from contextlib import suppress
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -14,11 +15,14 @@ from falsifier.errors import ModelError, SpecError
 _MAX_DEPTH = 400
 # A description of 100,000 variables has some 400,000 signs, two or three per element.
 _MAX_SIGNS = 6_000_000
-_CHUNK = 1 << 16
 
 
 class _RefusedError(ValueError):
     """The document has something that is not read."""
+
+
+class _BegunError(Exception):
+    """The first element begins."""
 
 
 def read_xml(text: bytes, shown: str, wrong: type[ModelError] | type[SpecError]) -> Element:
@@ -53,21 +57,22 @@ def _refuse_size(text: bytes) -> None:
 def _refuse_document_type(text: bytes) -> None:
     """Look at what stands before the first element, before any entity is read."""
     parser = expat.ParserCreate()
-    declared: list[str] = []
-    begun: list[str] = []
-    parser.StartDoctypeDeclHandler = lambda name, *_: declared.append(name)
-    parser.StartElementHandler = lambda name, _: begun.append(name)
-    try:
-        for start in range(0, len(text), _CHUNK):
-            parser.Parse(text[start : start + _CHUNK])
-            if declared or begun:
-                break
-    except (expat.ExpatError, LookupError, ValueError):
-        pass  # the same fault is reported when the tree is built
-    if declared:
-        raise _RefusedError(
-            f"it declares a document type ({declared[0]}), which can define entities; remove the declaration"
-        )
+    parser.StartDoctypeDeclHandler = _declared
+    parser.StartElementHandler = _begun
+    # In one piece: in several, a long tag or comment would be looked at from its beginning with each of them.
+    # A fault is reported when the tree is built.
+    with suppress(_BegunError, expat.ExpatError, LookupError):
+        parser.Parse(text, True)  # noqa: FBT003
+
+
+def _declared(name: str, *_: object) -> None:
+    raise _RefusedError(
+        f"it declares a document type ({name}), which can define entities; remove the declaration"
+    )
+
+
+def _begun(_name: str, _attributes: object) -> None:
+    raise _BegunError
 
 
 def _refuse_depth(root: Element) -> None:

@@ -2,8 +2,18 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.context.simulink.conditions import chart_names, comparisons, constants
-from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, ChartData, Diagram, End, Wire
+from falsifier.context.levels import Definitions, levels_of
+from falsifier.context.simulink.conditions import comparisons, diagram_thresholds
+from falsifier.context.simulink.diagram import (
+    Block,
+    BlockSystem,
+    Chart,
+    ChartData,
+    Diagram,
+    End,
+    Transition,
+    Wire,
+)
 from falsifier.context.simulink.reader import read_diagram
 from falsifier.context.simulink.upstream import upstream
 from tests.fixtures import simulink
@@ -32,12 +42,13 @@ def test_constants_and_names_of_several_words() -> None:
         Wire(End("my gain", "1"), (End("r", "1"), End("cmp", "1"))),
         Wire(End("c", "1"), (End("r", "2"),)),
     )
-    chart = Chart("C", data=(ChartData("limit", "constant", "3"), ChartData("x", "local", "1")))
-    other = Chart("D", data=(ChartData("limit", "constant", "4"),))
+    leave = (Transition("", "On", "[y > limit]"),)
+    chart = Chart("C", (), leave, (ChartData("limit", "constant", "3"), ChartData("x", "local", "1")))
+    other = Chart("D", (), leave, (ChartData("limit", "constant", "4"),))
     diagram = Diagram("m", BlockSystem(blocks, wires), (chart, other))
-    assert list(comparisons(diagram)) == [("'my gain' != 2.5", "r"), ("'my gain' <= 7", "cmp")]
-    assert constants(diagram, "C") == {"limit": "3"}
-    assert constants(diagram, "r") == {}, "blocks do not see the variables of charts"
+    assert [t.text for t in diagram_thresholds(diagram)] == [
+        "'my gain' != 2.5", "'my gain' <= 7", "y > limit (limit = 3)", "y > limit (limit = 4)"
+    ]  # fmt: skip
 
 
 def test_ports_in_expressions_are_named_by_what_leads_to_them() -> None:
@@ -77,7 +88,8 @@ def test_names_within_a_subsystem_or_chart_are_those_of_what_leads_there() -> No
         (Block("Inport", "u", number=1), Block("Relay", "Trip", (("OnSwitchValue", "3"),))),
         (Wire(End("u", "1"), (End("Trip", "1"),)),),
     )
-    chart = Chart("Logic", data=(ChartData("d", "input"), ChartData("u", "local"), ChartData("y", "output")))
+    data = (ChartData("d", "input"), ChartData("u", "local"), ChartData("y", "output"))
+    chart = Chart("Logic", (), (Transition("", "On", "[d > 4 && u > 5]"),), data)
     ports = BlockSystem((Block("Inport", "d", number=1),))
     blocks = (
         Block("Inport", "u", number=1),
@@ -87,6 +99,18 @@ def test_names_within_a_subsystem_or_chart_are_those_of_what_leads_there() -> No
     )
     wires = (Wire(End("speed", "1"), (End("Guard", "1"), End("Logic", "1")), "v"),)
     diagram = Diagram("m", BlockSystem(blocks, wires), charts=(chart,))
-    assert ("speed >= 3", "Guard/Trip") in list(comparisons(diagram))
-    assert chart_names(diagram, "Logic") == {"d": "speed", "u": ""}
-    assert chart_names(diagram, "Guard") == {}
+    found = [(t.text, set(t.names)) for t in diagram_thresholds(diagram)]
+    assert found == [("speed >= 3", {"speed"}), ("d > 4 (d = speed)", {"speed"}), ("u > 5", set())]
+
+
+def test_breakpoints_of_tables_are_levels_of_what_leads_there() -> None:
+    blocks = (
+        Block("Inport", "u", number=1),
+        Block("Lookup_n-D", "map", (("BreakpointsForDimension1", "[0 2.5, 1e1]"), ("Table", "[1 2 3]"))),
+        Block("Lookup_n-D", "unknown", (("BreakpointsForDimension1", "bp"),)),
+    )
+    wires = (Wire(End("u", "1"), (End("map", "1"), End("unknown", "1"))),)
+    (found,) = diagram_thresholds(Diagram("m", BlockSystem(blocks, wires)))
+    assert found.text == "u leads to a table with the breakpoints 0, 2.5, 1e1"
+    levels = levels_of([found], Definitions(), {"m.u": (1.0, 20.0)})
+    assert [level.value for level in levels] == [2.5, 10.0]

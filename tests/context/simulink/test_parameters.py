@@ -26,3 +26,9 @@ def test_long_values_say_how_long_they_are() -> None:
     ((_, value),) = meaningful("Constant", {"Value": "1 " * 2000}, {})
     assert value.endswith("(3,999 characters)")
     assert len(value) < 2100
+
+
+def test_of_library_blocks_types_and_how_they_are_inherited_are_left_out() -> None:
+    types = {f"{name}DataTypeStr": "Inherit: Inherit via internal rule" for name in ("P", "I", "D", "SumOut")}
+    stated = {"Controller": "PI", "P": "5", "I": "0.2", **types, "PParamMin": "[]", "AccumMode": "Inherited"}
+    assert dict(meaningful("Reference", stated, {})) == {"Controller": "PI", "P": "5", "I": "0.2"}

@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram, End, Wire
+from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, ChartData, Diagram, End, Wire
 from falsifier.context.simulink.reader import read_diagram
 from falsifier.context.simulink.upstream import upstream
 from tests.fixtures import simulink
@@ -27,6 +27,24 @@ def test_tags_lead_from_goto_to_from() -> None:
     )
     diagram = Diagram("m", BlockSystem(blocks, (Wire(End("f", "1"), (End("y", "1"),)),)))
     assert upstream(diagram, ["y"]) == frozenset({("y",), ("f",), ("s",), ("s", "g"), ("s", "c")})
+
+
+def test_what_enables_a_system_and_what_a_chart_writes_count() -> None:
+    inner = BlockSystem(
+        (Block("Constant", "c"), Block("EnablePort", "e"), Block("Outport", "y")),
+        (Wire(End("c", "1"), (End("y", "1"),), "value"),),
+    )
+    read = Block("DataStoreRead", "r", (("DataStoreName", "store"),))
+    blocks = (
+        read,
+        Block("SubSystem", "s", system=inner),
+        Block("SubSystem", "C", is_chart=True),
+        Block("Gain", "k"),
+    )
+    wires = (Wire(End("r", "1"), (End("s", "enable"),)),)
+    chart = Chart("C", data=(ChartData("store", "data_store_memory"),))
+    found = upstream(Diagram("m", BlockSystem(blocks, wires), (chart,)), ["value"])
+    assert found == frozenset({("s",), ("s", "c"), ("s", "e"), ("r",), ("C",)})
 
 
 def test_without_the_signal_nothing_can_be_left_out() -> None:
