@@ -52,8 +52,6 @@ class Counter:
         assert isinstance(problem.model, FmuModel)
         self._short = replace(
             problem,
-            # In this process: the bundled FMUs can be trusted, and a simulation takes milliseconds.
-            model=replace(problem.model, isolate=False),
             space=replace(problem.space, stop_time=end),
             experiment=replace(problem.experiment, stop_time=end),
         )

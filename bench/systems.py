@@ -69,7 +69,7 @@ def main() -> None:
         chain = System({"a": lag, "b": lag}, chained, isolate=isolate)
         closed = System({"a": lag, "b": lag}, {"b.u": "a.y", "a.u": "b.y"}, isolate=isolate)
         runs = {
-            "one FMU": ours(FmuModel(lag, isolate=isolate), "u", "y"),
+            "one FMU": ours(FmuModel(lag), "u", "y"),
             "two FMUs, one after the other": ours(chain, "a.u", "a.y", "b.y"),
             "two FMUs in a loop": ours(closed, "", "a.y", "b.y"),
             "two FMUs of FMI 3, one after the other": ours(

@@ -1,75 +1,56 @@
-"""How long a worker takes to start, forked and spawned, with a warm cache of compiled loops.
+"""How long a worker takes to start, until its first simulation has ended; how soon its crash is noticed.
 
 ``python -m bench.worker_start [--rounds N]``
-
-For each round and way: seconds until a worker has loaded an FMU, with a nursery that is ready, and with no
-program waiting in advance. For spawned ones also the processor time, which other programs change less.
 """
 
 import argparse
 import os
-import resource
 import time
+from collections.abc import Callable
 from statistics import median
 
 from falsifier.core.model import Experiment
+from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.forking import Nursery
-from falsifier.fmu.isolation import IsolatedFmu
-from falsifier.fmu.simulator import _order, _task
-from falsifier.fmu.spawning import Spawner
-from falsifier.fmu.starting import Starter
 from tests.fmu.fixtures import path
+from tests.fmu.support import CRASH
+
+EXPERIMENT = Experiment(1.0, 0.1, ("y",))
 
 
-def started(starter: Starter) -> float:
-    """Return the seconds until a worker has loaded the FMU."""
-    model = FmuModel(path("Lag_2"))
-    fmu = IsolatedFmu(lambda: starter, _order(model))
+def timed(action: Callable[[], object]) -> float:
+    """Return the milliseconds that a call takes."""
     began = time.perf_counter()
-    fmu.load(_task(model, Experiment(1.0, 0.1, ("y",)), (), (), 1).plan)
-    seconds = time.perf_counter() - began
-    fmu.close()
-    return seconds
+    action()
+    return 1e3 * (time.perf_counter() - began)
 
 
-def spawned() -> tuple[float, float]:
-    """Return the seconds, and those of processor time, of a spawned worker without a program in advance."""
-    began, before = time.perf_counter(), used()
-    spawner = Spawner()
-    started(spawner)
-    seconds = time.perf_counter() - began
-    spawner.close()
-    return seconds, used() - before
-
-
-def used() -> float:
-    """Return the processor time of all processes that this one has started and that have ended, in s."""
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
+def crash(model: FmuModel) -> None:
+    """Let a worker crash."""
+    try:
+        model.simulate({}, {"misdeed": CRASH}, EXPERIMENT)
+    except SimulationError:
+        return
+    raise AssertionError("it did not crash")
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--rounds", type=int, default=20)
     rounds = parser.parse_args().rounds
-    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; minimum (median) of {rounds} in s")
-    nursery = Nursery()
-    started(nursery)
-    spawned()
-    forked, found = [], []
-    for _ in range(rounds):
-        forked.append(started(nursery))
-        found.append(spawned())
-    nursery.close()
-    rows = {
-        "forked": forked,
-        "spawned": [seconds for seconds, _ in found],
-        "spawned, processor time": [processor for _, processor in found],
-    }
-    for name, values in rows.items():
-        print(f"{name:24} {min(values):.3f} ({median(values):.3f})")
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; minimum (median) of {rounds} in ms")
+    lag, misdeeds = FmuModel(path("Lag_2")), FmuModel(path("Misdeeds_2"), logging=True)
+    starts, crashes = [], []
+    for _ in range(rounds + 1):
+        starts.append(timed(lambda: lag.simulate({}, {}, EXPERIMENT)))
+        lag.close()
+        misdeeds.load()
+        misdeeds.simulate({}, {}, EXPERIMENT)
+        crashes.append(timed(lambda: crash(misdeeds)))
+        misdeeds.close()
+    for name, values in {"start and first simulation": starts[1:], "crash, noticed": crashes[1:]}.items():
+        print(f"{name:30} {min(values):.1f} ({median(values):.1f})")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from falsifier.fmu import wine_process
 from tests.command import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -61,7 +60,10 @@ def test_the_wheel_holds_the_licence_the_types_and_every_bundled_problem(wheel: 
     assert len(bundled) > 10
     for path in bundled:
         assert files[f"falsifier/{path.relative_to(ROOT)}"] == path.read_bytes()
-    assert files["falsifier/fmu/worker/bin/x86_64-windows/worker.exe"] == wine_process.WORKER.read_bytes()
+    assert (
+        files["falsifier/fmu/worker/bin/x86_64-windows/worker.exe"]
+        == (ROOT / "falsifier/fmu/worker/bin/x86_64-windows/worker.exe").read_bytes()
+    )
     assert "falsifier/py.typed" in files and "pytest_falsifier.py" in files
     (metadata,) = (Parser().parsestr(files[n].decode()) for n in files if n.endswith(".dist-info/METADATA"))
     assert metadata["License-Expression"] == PROJECT["license"] == "Apache-2.0"

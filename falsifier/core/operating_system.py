@@ -16,6 +16,7 @@ else:
     from falsifier.core import posix_files as _files
 
 Child = _system.Child
+Program = _system.Program
 FORKS_BY_DEFAULT = _system.FORKS_BY_DEFAULT
 HAS_FORK = _system.HAS_FORK
 SENDS_FILES = _system.SENDS_FILES
@@ -26,6 +27,7 @@ guarded_memory = _system.guarded_memory
 interpreter = _system.interpreter
 is_running = _system.is_running
 limit_resources = _system.limit_resources
+machine_memory = _system.machine_memory
 limit_sending = _system.limit_sending
 memory_limits = _system.memory_limits
 most_memory_used = _system.most_memory_used
@@ -39,14 +41,17 @@ start_silent_tracker = _system.start_silent_tracker
 wait_readable = _system.wait_readable
 yield_processor = _system.yield_processor
 
+can_seal = _files.can_seal
 is_own = _files.is_own
 is_private = _files.is_private
+is_root = _files.is_root
 lock_file = _files.lock_file
 read_at = _files.read_at
 remove_tree = _files.remove_tree
 replace = _files.replace
 sealed_file = _files.sealed_file
 user = _files.user
+write_at = _files.write_at
 
 adopt_orphans = _kept_apart.adopt_orphans
 can_confine = _kept_apart.can_confine

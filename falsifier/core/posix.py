@@ -5,6 +5,7 @@ Each function does as much as the system offers; what only Linux has is in ``lin
 
 import contextlib
 import ctypes
+import fcntl
 import mmap
 import os
 import resource
@@ -14,7 +15,10 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from uuid import uuid4
 
 from falsifier.core import linux
@@ -27,6 +31,9 @@ FORKS_BY_DEFAULT = sys.platform == "linux"
 # What a child and its descendants have in their environment.
 _MARK = "FALSIFIER_PROCESS"
 _LINE_BUFFERED = 1  # _IOLBF of glibc, musl and Darwin
+# A program's end is waited for at most this long; then the process that watches it is killed.
+_ENDING_SECONDS = 5.0
+_MOST_TOLD = 1 << 16
 _TIMEVAL = struct.Struct("@ll")
 # Filter in the format of python -W: warnings whose message starts with this word.
 _TRACKER_FILTER = "ignore:resource_tracker"
@@ -98,6 +105,191 @@ class Child:
         """Leave the process to another one, of which this is a copy."""
         self._line.close()
         self._process.returncode = 0  # not this process's child, so it cannot be waited for
+
+
+class Program:
+    """A program that answers requests, and the process that watches it, which is the one that is started.
+
+    It has the requests on descriptor 0, prints to 1 and 2, and sends its replies to 3; 4 is shared memory. It
+    ends with all that it has started, and the process that watches it ends in the same way; 5 is the line to
+    that one.
+
+    Args:
+        command: program and arguments; the path of the program is absolute.
+        environment: its environment.
+        output: descriptor of a file for what it prints.
+        policy: what the process that watches it is told.
+        shared: descriptor of memory that it shares.
+        replies: path of a named pipe for its replies, which is made here; None: they come from descriptor 3.
+
+    Attributes:
+        pid: its process id.
+        replies_place: what the program must be told of where its replies go.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        output: int,
+        policy: bytes,
+        shared: int,
+        replies: Path | None = None,
+    ) -> None:
+        theirs, self._requests = os.pipe()
+        self._line, end_of_line = socket.socketpair()
+        if replies is None:
+            self._replies, answers = os.pipe()
+        else:
+            os.mkfifo(replies, 0o600)
+            # Open for writing too, so that it has no end before the program opens it.
+            self._replies, answers = os.open(replies, os.O_RDWR | os.O_CLOEXEC), -1
+        os.set_blocking(self._requests, False)
+        os.set_blocking(self._replies, False)
+        self._life: int | None = None
+        places = {0: theirs, 1: output, 2: output, 3: answers, 4: shared, 5: end_of_line.fileno()}
+        try:
+            self.pid = _spawn(command, environment, places)
+        except BaseException:
+            self._close()
+            raise
+        finally:
+            end_of_line.close()
+            for descriptor in (theirs, answers):
+                if descriptor >= 0:
+                    os.close(descriptor)
+        with contextlib.suppress(OSError):  # it has ended already
+            self._line.sendall(policy)
+        self.replies_place = str(replies or "")
+        self._life = open_life(self.pid)
+        self._waiting = select.poll()
+        for watched in (self._replies, self._life):
+            if watched is not None:
+                self._waiting.register(watched, select.POLLIN)
+        self._code: int | None = None
+        self._lock = threading.Lock()
+
+    def send(self, data: bytes, seconds: float) -> None:
+        """Send a request.
+
+        Raises:
+            ConnectionError: if the program does not read it, or not within this time.
+        """
+        left, until = memoryview(data), time.monotonic() + seconds
+        while left:
+            try:
+                left = left[os.write(self._requests, left) :]
+            except BlockingIOError:
+                waiting = select.poll()
+                waiting.register(self._requests, select.POLLOUT)
+                if not waiting.poll(max(0.0, until - time.monotonic()) * 1e3):
+                    raise ConnectionError("the program does not read its requests") from None
+
+    def receive_now(self, most: int) -> bytes:
+        """Return at most this many bytes of replies that are there; none if the program has closed its end.
+
+        Raises:
+            BlockingIOError: if nothing is there.
+        """
+        return os.read(self._replies, most)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until there is something to receive; return False if the program has ended instead.
+
+        Raises:
+            TimeoutError: if neither happens in this time.
+        """
+        ready = [descriptor for descriptor, _ in self._waiting.poll(seconds * 1e3)]
+        if not ready:
+            raise TimeoutError
+        return self._replies in ready
+
+    def ends_within(self, seconds: float) -> bool:
+        """Whether the program ends by itself within this time."""
+        until = time.monotonic() + seconds
+        if self._life is not None:
+            waiting = select.poll()
+            waiting.register(self._life, select.POLLIN)
+            waiting.poll(seconds * 1e3)
+        while self.is_alive:
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.0005)
+        return True
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the program is running."""
+        if self._code is None:
+            try:
+                return os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None
+            except ChildProcessError:
+                pass
+        return False
+
+    def stop(self) -> None:
+        """Let the program be ended while another thread waits for it."""
+        with self._lock:
+            if self._code is None:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(self.pid, signal.SIGTERM)
+
+    def told(self) -> bytes:
+        """Return what the process that watches the program has told since the last call."""
+        try:
+            return self._line.recv(_MOST_TOLD, socket.MSG_DONTWAIT)
+        except OSError:
+            return b""
+
+    def end(self) -> int:
+        """End the program and what it has started; return its exit code, negative for a signal.
+
+        A program that has already ended keeps its own exit code.
+        """
+        self.stop()
+        if not self.ends_within(_ENDING_SECONDS):
+            kill(self.pid)
+        code = self._reap(0)
+        self._close()
+        return code or 0
+
+    def forget(self) -> None:
+        """Leave the program to another process, of which this is a copy."""
+        self._code = 0
+        self._close()
+
+    def _reap(self, options: int) -> int | None:
+        with self._lock:
+            if self._code is None:
+                try:
+                    pid, status = os.waitpid(self.pid, options)
+                except ChildProcessError:  # somebody else has waited for it
+                    pid, status = self.pid, 0
+                self._code = os.waitstatus_to_exitcode(status) if pid else None
+            return self._code
+
+    def _close(self) -> None:
+        self._line.close()
+        for descriptor in (self._requests, self._replies, self._life):
+            if descriptor is not None:
+                os.close(descriptor)
+
+
+def _spawn(command: Sequence[str], environment: Mapping[str, str], places: Mapping[int, int]) -> int:
+    """Start a program with these open files by the descriptors that it is to have; return its process id."""
+    # Copies above all places, so that none is overwritten before it is copied.
+    copies = {
+        place: fcntl.fcntl(given, fcntl.F_DUPFD_CLOEXEC, 16) for place, given in places.items() if given >= 0
+    }
+    try:
+        actions = [(os.POSIX_SPAWN_DUP2, copy, place) for place, copy in copies.items()]
+        session = {"setsid": True} if sys.platform == "linux" else {"setpgroup": 0}
+        return os.posix_spawn(
+            command[0], list(command), environment, file_actions=actions, setsigmask=(), **session
+        )
+    finally:
+        for copy in copies.values():
+            os.close(copy)
 
 
 def interpreter() -> str:
@@ -297,6 +489,11 @@ def flush_lines() -> None:
     with contextlib.suppress(AttributeError, ValueError):
         stdout = ctypes.c_void_p.in_dll(libc, "stdout")
         libc.setvbuf(stdout, None, _LINE_BUFFERED, 0)
+
+
+def machine_memory() -> int:
+    """Return the memory of this machine in bytes; 0 if it is unknown."""
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
 def memory_limits() -> dict[str, int]:

@@ -15,26 +15,31 @@ from uuid import uuid4
 assert sys.platform != "win32"
 
 
-def sealed_file(size: int) -> IO[bytes]:
+def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
     """Open a file without a name whose size no process can change, in memory if the system supports that.
 
     A process that maps a file dies when another one shortens it, and a file that grows fills the memory.
+
+    Args:
+        size: in bytes.
+        may_grow: whether it can be enlarged.
 
     Raises:
         OSError: if it is larger than files of this process may be, or there is no room.
     """
     try:
-        return _sealed_file(size)
+        return _sealed_file(size, may_grow=may_grow)
     except OSError as error:
         error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
         raise
 
 
-def _sealed_file(size: int) -> IO[bytes]:
+def _sealed_file(size: int, *, may_grow: bool) -> IO[bytes]:
     if sys.platform == "linux" and hasattr(os, "memfd_create"):
         file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
         file.truncate(size)
-        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+        growth = 0 if may_grow else fcntl.F_SEAL_GROW
+        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | growth | fcntl.F_SEAL_SEAL)
         return file
     with tempfile.TemporaryFile() as named:
         file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
@@ -57,6 +62,16 @@ def lock_file(path: Path) -> int | None:
     return descriptor
 
 
+def can_seal() -> bool:
+    """Whether no process can shorten what ``sealed_file`` opens, so that it is safe to map."""
+    return sys.platform == "linux" and hasattr(os, "memfd_create")
+
+
+def write_at(descriptor: int, data: bytes, position: int) -> None:
+    """Write bytes to a position of a file, without moving the file's own."""
+    os.pwrite(descriptor, data, position)
+
+
 def read_at(descriptor: int, most: int, position: int) -> bytes:
     """Read at most this many bytes of a file from a position, without moving the file's own."""
     return os.pread(descriptor, most, position)
@@ -70,6 +85,11 @@ def replace(source: Path, target: Path) -> None:
 def user() -> str:
     """Return what tells this user's temporary folders from those of others."""
     return str(os.getuid())
+
+
+def is_root() -> bool:
+    """Whether this process may read all files."""
+    return os.geteuid() == 0
 
 
 def is_own(path: Path) -> bool:

@@ -7,6 +7,7 @@ import base64
 import contextlib
 import ctypes
 import mmap
+import msvcrt
 import os
 import select
 import socket
@@ -15,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from ctypes import wintypes
+from pathlib import Path
 
 assert sys.platform == "win32"
 
@@ -39,6 +41,9 @@ _CRASHES = {
 }
 # How often to look whether a process still lives: one cannot wait for that and for a socket together.
 _LOOKING_SECONDS = 0.1
+_PEEKING_SECONDS = 0.0005
+# Share of the machine's memory that a program may allocate.
+_MEMORY_SHARE = 0.8
 
 # ERROR_INVALID_PARAMETER, which OpenProcess reports for a number without a process.
 _NO_SUCH_PROCESS = 87
@@ -172,6 +177,134 @@ class Child:
 
     def forget(self) -> None:
         """Leave the process to another one, of which this is a copy; there are none here."""
+
+
+class Program:
+    """A program that answers requests, in a job that ends with this process.
+
+    It has the requests on its standard input, prints to the file of its output, and is told which handle its
+    replies go to.
+
+    Args:
+        command: program and arguments.
+        environment: its environment.
+        output: descriptor of a file for what it prints.
+        policy: not used here: nothing is enforced.
+        shared: not used here: memory is shared by its path.
+        replies: not used here.
+
+    Attributes:
+        pid: its process id.
+        replies_place: what the program must be told of where its replies go.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        output: int,
+        policy: bytes,
+        shared: int,
+        replies: Path | None = None,
+    ) -> None:
+        del policy, shared, replies
+        self._replies, theirs = os.pipe()
+        handle = msvcrt.get_osfhandle(theirs)
+        os.set_handle_inheritable(handle, True)  # noqa: FBT003
+        try:
+            self._process = subprocess.Popen(
+                command,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=output,
+                stderr=output,
+                startupinfo=subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]}),
+                creationflags=subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.CREATE_NO_WINDOW,
+                bufsize=0,
+            )
+        finally:
+            os.close(theirs)
+        self._job = _job(_KILL_WITH_JOB | _LIMIT_PROCESS_MEMORY, int(machine_memory() * _MEMORY_SHARE))
+        _kernel.AssignProcessToJobObject(wintypes.HANDLE(self._job), wintypes.HANDLE(_handle(self._process)))
+        assert self._process.stdin is not None, "it is a pipe"
+        self._requests = self._process.stdin
+        self.pid = self._process.pid
+        self.replies_place = str(handle)
+
+    def send(self, data: bytes, seconds: float) -> None:
+        """Send a request; see ``posix``. There is no limit in time here."""
+        del seconds
+        try:
+            self._requests.write(data)
+        except OSError as error:
+            raise ConnectionError from error
+
+    def receive_now(self, most: int) -> bytes:
+        """Return at most this many bytes of replies that are there; see ``posix``."""
+        count = wintypes.DWORD()
+        pipe = wintypes.HANDLE(msvcrt.get_osfhandle(self._replies))
+        if not _kernel.PeekNamedPipe(pipe, None, 0, None, ctypes.byref(count), None):
+            return b""
+        if not count.value:
+            raise BlockingIOError
+        return os.read(self._replies, min(most, count.value))
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until there is something to receive; see ``posix``."""
+        until = time.monotonic() + seconds
+        count = wintypes.DWORD()
+        pipe = wintypes.HANDLE(msvcrt.get_osfhandle(self._replies))
+        while True:
+            ended = not self.is_alive
+            # What the process sent before its end is still received.
+            is_open = _kernel.PeekNamedPipe(pipe, None, 0, None, ctypes.byref(count), None)
+            if count.value or not is_open:
+                return bool(count.value) or not ended
+            if ended:
+                return False
+            if time.monotonic() > until:
+                raise TimeoutError
+            time.sleep(_PEEKING_SECONDS)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the program is running."""
+        return self._process.poll() is None
+
+    def ends_within(self, seconds: float) -> bool:
+        """Whether the program ends by itself within this time."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        return not self.is_alive
+
+    def stop(self) -> None:
+        """Kill the program while another thread waits for it."""
+        _kernel.TerminateJobObject(wintypes.HANDLE(self._job), _KILLED)
+
+    def told(self) -> bytes:
+        """Return nothing: no process watches the program."""
+        return b""
+
+    def end(self) -> int:
+        """Kill the program and what it has started; return its exit code; see ``posix``."""
+        self.stop()
+        with contextlib.suppress(OSError):
+            self._process.kill()
+        code = self._process.wait()
+        _kernel.CloseHandle(wintypes.HANDLE(self._job))
+        self._requests.close()
+        os.close(self._replies)
+        return code
+
+    def forget(self) -> None:
+        """Leave the program to another process, of which this is a copy; there are none here."""
+
+
+def machine_memory() -> int:
+    """Return the memory of this machine in bytes; 0 if it is unknown."""
+    status = _MemoryStatus()
+    status.dwLength = ctypes.sizeof(status)
+    return int(status.ullTotalPhys) if _kernel.GlobalMemoryStatusEx(ctypes.byref(status)) else 0
 
 
 def interpreter() -> str:
@@ -337,11 +470,7 @@ def guarded_memory(size: int) -> memoryview:
 
 def limit_resources(memory_share: float) -> None:
     """Allow this process only this share of the machine's memory."""
-    status = _MemoryStatus()
-    status.dwLength = ctypes.sizeof(status)
-    if not _kernel.GlobalMemoryStatusEx(ctypes.byref(status)):
-        return
-    job = _job(_LIMIT_PROCESS_MEMORY, int(status.ullTotalPhys * memory_share))
+    job = _job(_LIMIT_PROCESS_MEMORY, int(machine_memory() * memory_share))
     _kernel.AssignProcessToJobObject(wintypes.HANDLE(job), wintypes.HANDLE(_kernel.GetCurrentProcess()))
 
 

@@ -18,8 +18,9 @@ assert sys.platform == "win32"
 _REPLACING_SECONDS = 2.0
 
 
-def sealed_file(size: int) -> IO[bytes]:
+def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
     """Open a temporary file of this size that is removed when it is closed; the size is not sealed here."""
+    del may_grow
     file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
     file.truncate(size)
     return file
@@ -40,6 +41,21 @@ def lock_file(path: Path) -> int | None:
         os.close(descriptor)
         return None
     return descriptor
+
+
+def can_seal() -> bool:
+    """Return False: see ``sealed_file``."""
+    return False
+
+
+def write_at(descriptor: int, data: bytes, position: int) -> None:
+    """Write bytes to a position of a file; the file's own is the same afterwards."""
+    before = os.lseek(descriptor, 0, os.SEEK_CUR)
+    try:
+        os.lseek(descriptor, position, os.SEEK_SET)
+        os.write(descriptor, data)
+    finally:
+        os.lseek(descriptor, before, os.SEEK_SET)
 
 
 def read_at(descriptor: int, most: int, position: int) -> bytes:
@@ -69,6 +85,11 @@ def replace(source: Path, target: Path) -> None:
 def user() -> str:
     """Return what tells this user's temporary folders from those of others: nothing, they are apart."""
     return "user"
+
+
+def is_root() -> bool:
+    """Return False: no user reads all files here."""
+    return False
 
 
 def is_own(path: Path) -> bool:

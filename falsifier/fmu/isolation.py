@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from falsifier.core import operating_system
 from falsifier.core.operating_system import exit_text
 from falsifier.errors import FailureStatus, ModelError, SimulationError
+from falsifier.fmu import process
 from falsifier.fmu.buffers import Room
 from falsifier.fmu.channel import (
     Closed,
@@ -372,3 +373,4 @@ def stop_simulations(threads: Collection[int]) -> None:
         threads: their identifiers (threading.get_ident); they start no other simulation.
     """
     REGISTRY.stop(threads)
+    process.REGISTRY.stop(threads)

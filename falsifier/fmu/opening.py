@@ -1,6 +1,5 @@
 """Unpacking and loading what a worker simulates."""
 
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -48,7 +47,6 @@ def open_session(
     folder: Path,
     log: LogSink,
     announce: Callable[[int], None] = lambda _: None,
-    scratch: Path | None = None,
 ) -> Session:
     """Load what an order asks for from the folder to which it was unpacked.
 
@@ -57,7 +55,6 @@ def open_session(
         folder: where it was unpacked.
         log: called with each message of an FMU.
         announce: called with the position of each component of a system before it is loaded.
-        scratch: folder of this process, in which Wine may write; None: the folder above.
 
     Raises:
         ModelError: if it cannot be loaded.
@@ -67,11 +64,6 @@ def open_session(
         from falsifier.fmu.system_instance import SystemInstance
 
         return Session(partial(SystemInstance, order.network, folder, log, announce, logging=order.logging))
-    if sys.platform != "win32" and order.through_wine:
-        from falsifier.fmu.wine_instance import WineInstance
-
-        make = partial(WineInstance, order.description, folder, scratch or folder, order.interface, log)
-        return Session(partial(make, logging=order.logging))
     return Session(
         partial(FmuInstance, order.description, folder, order.interface, log, logging=order.logging)
     )

@@ -21,15 +21,19 @@ class Output:
         """Descriptor of the file, for the process that prints."""
         return self._file.fileno()
 
-    def take(self) -> tuple[str, ...]:
-        """Return the lines printed since the last call; only the last of much output."""
+    def take(self, until: int | None = None) -> tuple[str, ...]:
+        """Return the lines printed since the last call; only the last of much output.
+
+        Args:
+            until: position where they end, if the process goes on printing; it may say anything.
+        """
         position = os.lseek(self.fileno(), 0, os.SEEK_CUR)
         if not position:
             return ()
-        os.lseek(self.fileno(), 0, os.SEEK_SET)
         # The process may have moved the position, which would otherwise be the number of bytes.
-        size = min(position, _MOST_BYTES)
+        size = min(position, _MOST_BYTES if until is None else until, _MOST_BYTES)
         text = operating_system.read_at(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
+        os.lseek(self.fileno(), 0, os.SEEK_SET)
         lines = tuple(printable(text.decode("utf-8", "replace")).splitlines())
         return lines if size < _MOST_BYTES else (*lines, _DROPPED)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import get_args
+from typing import ClassVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,11 @@ from falsifier.core.model import Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu import in_process
 from falsifier.fmu.description import Description, archive, describe, needed_tool_text
-from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.fmu.plan import make_plan
+from falsifier.fmu.process import REGISTRY, FmuOrder, Runner
 from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
-from falsifier.fmu.worker_order import Order
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +27,6 @@ class FmuModel:
     Attributes:
         path: path of the .fmu file.
         interface: ``co-simulation`` (the FMU contains its own solver) or ``model-exchange``.
-        isolate: whether to simulate in a worker process; if not, a crash of the FMU crashes this process.
         logging: whether to ask the FMU for messages in every simulation; otherwise only after a failure.
         windows: whether to simulate the library for 64-bit Windows, through Wine, although there is another;
             if there is no other for this machine, that happens anyway.
@@ -45,7 +42,7 @@ class FmuModel:
 
     path: Path
     interface: Interface = "co-simulation"
-    isolate: bool = field(default=True, kw_only=True)
+    isolate: ClassVar[bool] = True
     logging: bool = field(default=False, kw_only=True)
     windows: bool = field(default=False, kw_only=True)
     allow: tuple[str, ...] = field(default=(), kw_only=True)
@@ -77,7 +74,7 @@ class FmuModel:
         tables = self._pieces(signals, experiment)
         task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
         try:
-            return run_task(_runner(self), task, tables, parameters, self.info.name)
+            return run_task(REGISTRY.runner(_order(self)), task, tables, parameters, self.info.name)
         except (ModelError, SimulationError) as error:
             raise self._with_hint(error) from None
 
@@ -99,18 +96,15 @@ class FmuModel:
         Raises:
             ModelError: if that fails.
         """
-        order = replace(_order(self), logging=True)
-        fmu = IsolatedFmu(REGISTRY.starter, order)
+        runner = Runner(REGISTRY.workplace, replace(_order(self), logging=True))
         try:
-            fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
+            runner.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
         finally:
-            fmu.close()
+            runner.close()
 
     def close(self) -> None:
-        """End the worker process or unload the library; the next simulation starts again."""
-        drop = REGISTRY.drop if self.isolate else in_process.drop
-        wine = _order(self).through_wine
-        drop(self.sha256, self.interface, logging=self.logging, through_wine=wine)
+        """End the worker processes; the next simulation starts again."""
+        REGISTRY.drop(_order(self).key)
 
     def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
         """Return the inputs as piecewise cubics; for a solver, discrete ones change on the output grid."""
@@ -164,22 +158,17 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
     return table
 
 
-def _runner(model: FmuModel) -> IsolatedFmu | in_process.LocalFmu:
-    order = _order(model)
-    return REGISTRY.fmu(order) if model.isolate else in_process.fmu(order)
-
-
 @lru_cache(maxsize=64)
-def _order(model: FmuModel) -> Order:
+def _order(model: FmuModel) -> FmuOrder:
     description = describe(model.path, model.sha256)
-    return Order(
+    return FmuOrder(
         model.path,
         model.sha256,
         description,
         model.interface,
-        None,
         logging=model.logging,
         through_wine=model.windows or description.needs_wine(model.interface),
+        policy=Policy.of(model.allow, model.deny),
     )
 
 

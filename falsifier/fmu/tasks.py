@@ -1,16 +1,14 @@
 """Simulations of one search, from the process that requests them: inputs in, a trajectory out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.model import Experiment, ModelInfo, check_finite
 from falsifier.core.trajectory import Trajectory
-from falsifier.fmu.buffers import Room
-from falsifier.fmu.in_process import LocalFmu
-from falsifier.fmu.isolation import IsolatedFmu
 from falsifier.fmu.plan import Plan
 
 
@@ -27,6 +25,12 @@ class Task:
     plan: Plan
     times: NDArray[np.float64]
     units: Mapping[str, str]
+
+
+class _Simulates(Protocol):
+    def simulate(
+        self, plan: Plan, fill: Callable[[Any], None]
+    ) -> tuple[NDArray[np.float64], tuple[str, ...]]: ...
 
 
 def make_task(plan: Plan, experiment: Experiment, info: ModelInfo) -> Task:
@@ -48,7 +52,7 @@ def room_for(tables: Sequence[NDArray[np.float64]]) -> int:
 
 
 def run_task(
-    runner: IsolatedFmu | LocalFmu,
+    runner: _Simulates,
     task: Task,
     tables: Sequence[NDArray[np.float64]],
     parameters: Mapping[str, float],
@@ -68,7 +72,7 @@ def run_task(
         ModelError: if the model cannot be used.
     """
 
-    def fill(room: Room) -> None:
+    def fill(room: Any) -> None:
         if parameters:
             room.parameters[:] = list(parameters.values())
         for row, table in zip(room.inputs, tables, strict=True):

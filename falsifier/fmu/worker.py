@@ -77,7 +77,6 @@ def serve(sock: socket.socket, order: Order, folder: Path) -> None:
 class _Worker:
     def __init__(self, order: Order, folder: Path) -> None:
         self._order, self._folder = order, folder
-        self._scratch = Path.cwd()
         self._reuse = order.reuse
         self._session: Session | None = None
         self._instances = 0
@@ -99,7 +98,7 @@ class _Worker:
     def _load(self) -> Session:
         """Load the library and make an instance, which may succeed at another time."""
         try:
-            self._session = open_session(self._order, self._folder, _log, self._announce, self._scratch)
+            self._session = open_session(self._order, self._folder, _log, self._announce)
         except ModelError as error:
             raise SimulationError(str(error)) from error
         return self._session

@@ -15,7 +15,6 @@ SYSTEMS = {
 }
 # Used only where processes can be forked, or Wine can be installed.
 FORKING = {"fmu/forking.py", "fmu/nursery.py", "fmu/remote_component.py"}
-WINE = {"fmu/wine_process.py"}
 
 MODULES = {
     "fcntl",
@@ -88,7 +87,7 @@ def test_all_other_modules_take_it_from_one_place() -> None:
     wrong = []
     for path in sorted(PACKAGE.rglob("*.py")):
         place = path.relative_to(PACKAGE).as_posix()
-        if place in SYSTEMS | FORKING | WINE | {"core/operating_system.py"}:
+        if place in SYSTEMS | FORKING | {"core/operating_system.py"}:
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module in ("falsifier.core", "falsifier"):

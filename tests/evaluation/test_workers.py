@@ -19,11 +19,10 @@ from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.evaluation.workers import Renewing, local_executor, open_workers, start
-from falsifier.fmu.isolation import REGISTRY
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.fmu import support
-from tests.fmu.fixtures import isolated, ramp, run
+from tests.fmu.fixtures import isolated, ramp, run, runners
 from tests.patience import HANG, wait_until
 from tests.problems import BEGUN, HOLD, RELEASE
 
@@ -105,6 +104,7 @@ def test_processes_are_as_quiet_as_their_parent_and_end_in_the_middle_of_a_task(
 
 def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:
     model = isolated("Lag_2")
+    model.close()
     together = Barrier(2)
 
     def simulate(level: float) -> float:
@@ -112,7 +112,7 @@ def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:
         return float(run(model, ("y",), signals={"u": ramp(1.0, level)})["y"][-1])
 
     def workers() -> int:
-        return sum(key[0] == model.sha256 for key in REGISTRY._fmus)
+        return len(runners(model))
 
     with local_executor(2, model) as executor:
         assert executor is not None
@@ -127,7 +127,7 @@ def test_a_simulation_in_a_thread_is_stopped_at_the_end() -> None:
     model = isolated("Misdeeds_2")
 
     def workers() -> list[int]:
-        found = [fmu._worker for key, fmu in REGISTRY._fmus.items() if key[0] == model.sha256]
+        found = [runner._worker for runner in runners(model)]
         return [worker.pid for worker in found if worker is not None and worker.plan is not None]
 
     with local_executor(2, model) as executor:

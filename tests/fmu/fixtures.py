@@ -8,6 +8,9 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
+from falsifier.fmu.process import REGISTRY, Runner
+from falsifier.fmu.process.worker import Worker
+from falsifier.fmu.simulator import _order
 from tests.patience import HANG
 
 # How a model-exchange FMU is simulated, for type checkers.
@@ -20,14 +23,27 @@ def path(name: str) -> Path:
     return FOLDER / f"{name}.fmu"
 
 
-def local(name: str, interface: Interface = "co-simulation") -> FmuModel:
-    """A test FMU in this process."""
-    return FmuModel(path(name), interface, isolate=False)
-
-
 def isolated(name: str, interface: Interface = "co-simulation") -> FmuModel:
-    """A test FMU in a worker."""
+    """A test FMU."""
     return FmuModel(path(name), interface)
+
+
+def runners(model: FmuModel) -> list[Runner]:
+    """What simulates a model in this process, in each thread that has simulated it."""
+    return [runner for (key, _), runner in REGISTRY._runners.items() if key == _order(model).key]
+
+
+def runner(model: FmuModel) -> Runner:
+    """What simulates a model in this thread."""
+    (found,) = runners(model)
+    return found
+
+
+def worker(model: FmuModel) -> Worker:
+    """The process in which a model is simulated."""
+    found = runner(model)._worker
+    assert found is not None
+    return found
 
 
 def run(

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu.ways import workers_fork
+from falsifier.fmu.folders import sweep
 from tests import patience
 from tests.command import listen_to_interrupts
 from tests.fmu import fixtures
 
 NOTHING, CRASH, HANG, EXIT, ALLOCATE, NAN, DISCARD, END, ABORT, ERROR, TALK, PRINT = range(12)
-
-FORKED = pytest.mark.skipif(not workers_fork(), reason="about the nursery, from which workers are forked")
 
 SCRIPT = """
 import os, sys, time
@@ -41,5 +39,12 @@ def script(body: str, **environment: str) -> subprocess.Popen[str]:
 
 
 def assert_nothing_is_left(folder: Path) -> None:
-    """Wait until the folders of the processes are gone, which happens after the last of them has ended."""
-    patience.wait_until(lambda: not list(folder.glob("falsifier-fmu-*")))
+    """Wait until the folders of processes in this folder are gone or can be swept."""
+
+    def is_empty() -> bool:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("tempfile.tempdir", str(folder))
+            sweep()
+        return not list(folder.glob("falsifier-fmu-*"))
+
+    patience.wait_until(is_empty)

@@ -9,7 +9,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import stepper
 from tests.fmu import plain
-from tests.fmu.fixtures import local, ramp, run
+from tests.fmu.fixtures import isolated, ramp, run
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ def held_lag(values: Floats, step: float, *, period: float = 2.0) -> Floats:
 @pytest.mark.parametrize("name", LAGS)
 def test_inputs_of_a_communication_point_hold_until_the_next(name: str) -> None:
     wave = Signal.evenly((0.0, 3.0, -2.0, 5.0), stop_time=2.0)
-    got = run(local(name), ("x", "y"), stop=2.0, signals={"u": wave}, parameters={"gain": 3.0})
+    got = run(isolated(name), ("x", "y"), stop=2.0, signals={"u": wave}, parameters={"gain": 3.0})
     expected = held_lag(wave.sample(np.linspace(0.0, 1.9, 20)), 0.1)
     np.testing.assert_allclose(got["x"], expected, atol=1e-9)
     np.testing.assert_allclose(got["y"], 3.0 * expected, atol=1e-9)
@@ -36,14 +36,14 @@ def test_inputs_of_a_communication_point_hold_until_the_next(name: str) -> None:
 
 @pytest.mark.parametrize("name", LAGS)
 def test_a_smaller_communication_step_keeps_the_output_grid(name: str) -> None:
-    got = run(local(name), ("x",), signals={"u": ramp(1.0)}, step_size=0.02)
+    got = run(isolated(name), ("x",), signals={"u": ramp(1.0)}, step_size=0.02)
     expected = held_lag(np.linspace(0.0, 0.98, 50), 0.02)[::5]
     np.testing.assert_allclose(got["x"], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", LAGS)
 def test_start_values_and_parameters_are_set_before_the_start(name: str) -> None:
-    got = run(local(name), ("x",), parameters={"x": 4.0, "T": 0.5})
+    got = run(isolated(name), ("x",), parameters={"x": 4.0, "T": 0.5})
     np.testing.assert_allclose(got["x"], 4.0 * np.exp(-got.times / 0.5), atol=1e-5)
 
 
@@ -54,7 +54,7 @@ def test_every_type_goes_in_rounded_and_comes_out(
 ) -> None:
     if is_plain:
         monkeypatch.setattr(stepper, "loops", lambda: plain)
-    model = local(name)
+    model = isolated(name)
     model.close()
     inputs = {v.name: ramp(1.0, 3.0 if v.kind != "boolean" else 1.0) for v in model.info.inputs}
     outputs = [v.name for v in model.info.outputs]
@@ -74,7 +74,7 @@ def test_every_type_goes_in_rounded_and_comes_out(
     ("kind", "low", "high"), [("Int8", -128, 127), ("UInt8", 0, 255), ("Int16", -32768, 32767)]
 )
 def test_integers_keep_their_limits(kind: str, low: int, high: int) -> None:
-    model = local("Echo_3")
+    model = isolated("Echo_3")
     for value in (low, high):
         got = run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (float(value),))})
         assert got[f"out_{kind}"][-1] == value
@@ -84,17 +84,17 @@ def test_integers_keep_their_limits(kind: str, low: int, high: int) -> None:
 
 def test_elements_of_arrays_are_driven_set_and_recorded_alone() -> None:
     # x1' = x2 + u1, x2' = -x1: with u1 = 1 held from rest x1 = sin t, x2 = cos t - 1.
-    got = run(local("Arrays_3"), ("y[2]", "x[1]"), signals={"u[1]": Signal((0.0,), (1.0,))}, interval=0.01)
+    got = run(isolated("Arrays_3"), ("y[2]", "x[1]"), signals={"u[1]": Signal((0.0,), (1.0,))}, interval=0.01)
     np.testing.assert_allclose(got["x[1]"], np.sin(got.times), atol=1e-9)
     np.testing.assert_allclose(got["y[2]"], np.cos(got.times) - 1 + 20.0, atol=1e-9)
-    got = run(local("Arrays_3"), ("y[1]", "y[2]", "A[2,1]"), parameters={"offset[2]": 5.0, "A[2,1]": 0.0})
+    got = run(isolated("Arrays_3"), ("y[1]", "y[2]", "A[2,1]"), parameters={"offset[2]": 5.0, "A[2,1]": 0.0})
     assert (got["y[1]"][-1], got["y[2]"][-1], got["A[2,1]"][-1]) == (10.0, 5.0, 0.0)
 
 
 @pytest.mark.parametrize("interface", ["co-simulation", "model-exchange"])
 def test_a_fixed_element_stays_if_another_one_is_driven(interface: Interface) -> None:
     # x1' = x2 + u1, x2' = -x1 + u2 from rest: with u = (1, 2), x1 = sin t + 2 (1 - cos t).
-    model = local("Arrays_3", interface)
+    model = isolated("Arrays_3", interface)
     drive = {"u[1]": Signal((0.0,), (1.0,))}
     for fixed in (2.0, -1.0):
         got = run(model, ("x[1]",), signals=drive, parameters={"u[2]": fixed}, interval=0.01)
@@ -106,14 +106,14 @@ def test_a_fixed_element_stays_if_another_one_is_driven(interface: Interface) ->
 
 def test_event_mode_sets_discrete_inputs_at_events() -> None:
     step = Signal((0.0, 0.5), (1.0, 3.0), "constant")
-    got = run(local("Echo_3"), ("out_Int32",), signals={"in_Int32": step})
+    got = run(isolated("Echo_3"), ("out_Int32",), signals={"in_Int32": step})
     assert got["out_Int32"].tolist() == [1, 1, 1, 1, 1, 1, 3, 3, 3, 3, 3]
 
 
 @pytest.mark.parametrize("name", ["Ball_2", "Ball_3"])
 def test_events_inside_of_steps(name: str) -> None:
     """The first bounce is at t = sqrt(2 h / g) = 0.4515 s, whether or not the FMU returns early for it."""
-    got = run(local(name), ("h", "v", "bounces"), interval=0.05)
+    got = run(isolated(name), ("h", "v", "bounces"), interval=0.05)
     assert got["bounces"][got.index(0.45)] == 0 and got["bounces"][got.index(0.5)] == 1
     flight = 0.5 - np.sqrt(2 / 9.81)
     assert got["v"][got.index(0.5)] == pytest.approx(0.7 * np.sqrt(2 * 9.81) - 9.81 * flight, abs=0.12)

@@ -53,7 +53,7 @@ def test_time_events_are_met_within_a_step(name: str) -> None:
 def test_state_events_are_located_within_a_step(name: str) -> None:
     model = system({"ball": solved(name), "plant": "Plant_2"}, {"plant.u": "ball.h"})
     found = run(model, "ball.h", interval=0.25, stop=2.0)
-    alone = fixtures.run(fixtures.local(name, ME), ("h",), interval=0.25, stop=2.0)
+    alone = fixtures.run(fixtures.isolated(name, ME), ("h",), interval=0.25, stop=2.0)
     np.testing.assert_allclose(found["ball.h"], alone["h"], atol=1e-7)
     assert found["ball.h"].min() >= -1e-6
 

@@ -2,12 +2,12 @@ from pathlib import Path
 
 from falsifier.fmu import FmuModel, System, fmu_files, fmus_sha256, with_local_files
 from falsifier.testing import lag_problem
-from tests.fmu.fixtures import local, path
+from tests.fmu.fixtures import isolated, path
 from tests.fmu.small_systems import loop
 
 
 def test_files_of_a_model_are_known_with_their_hashes() -> None:
-    lag = local("Lag_2")
+    lag = isolated("Lag_2")
     assert fmu_files(lag) == {lag.path: lag.sha256}
     assert list(fmu_files(loop())) == [path("Plant_2"), path("Gain_2")]
     assert fmu_files(lag_problem().model) == {}
@@ -28,7 +28,7 @@ def test_models_are_read_from_the_copies_of_another_machine(tmp_path: Path) -> N
     moved = with_local_files(model, copies)
     assert isinstance(moved, System) and moved.key == model.key
     assert set(fmu_files(moved)) == set(copies.values())
-    lag = with_local_files(local("Plant_2"), copies)
+    lag = with_local_files(isolated("Plant_2"), copies)
     assert isinstance(lag, FmuModel) and lag.path in copies.values()
     function = lag_problem().model
     assert with_local_files(function, copies) is function

@@ -11,24 +11,18 @@ from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
 from falsifier.evaluation.evaluate import Evaluation, evaluate, simulate
 from falsifier.fmu import FmuModel, read_info
-from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.problem.problem import Problem
 from tests.fmu import fixtures
-from tests.fmu.fixtures import isolated, local, run
+from tests.fmu.fixtures import isolated, run
 
 ONE = {"u": Signal((0.0,), (1.0,))}
 FAILS = {"u": Signal((0.0,), (6.0,))}
 
 
-def worker_of(model: FmuModel) -> IsolatedFmu:
-    (found,) = [fmu for key, fmu in REGISTRY._fmus.items() if key[0] == model.sha256 and not key[2]]
-    return found
-
-
 @pytest.mark.parametrize("name", ["StrictEnd_2", "StrictEnd_3"])
 @pytest.mark.parametrize("stop", [1.0, 0.7, 4.3, 49.9])
 def test_steps_end_at_the_stop_time_not_a_rounding_error_after_it(name: str, stop: float) -> None:
-    model = local(name)
+    model = isolated(name)
     for interval in (stop / 1000, stop / 300, stop / 7):
         for step_size in (interval, interval / 2):
             got = run(model, ("y",), stop=stop, interval=interval, step_size=step_size, signals=ONE)
@@ -41,7 +35,7 @@ def test_a_reset_that_corrupts_memory_is_not_used_again() -> None:
     expected = run(fresh, ("y",), signals=ONE)["y"].tolist()
     for _ in range(8):
         assert run(model, ("y",), signals=ONE)["y"].tolist() == expected
-    trust = worker_of(model)._trust
+    trust = fixtures.runner(model)._experience
     assert (trust.reuse, trust.untrusted) == ("instance", ("reset",))
     model.close()
     fresh.close()
@@ -54,9 +48,9 @@ def test_a_reset_that_hangs_does_not_cost_the_time_limit() -> None:
     assert first == second
     # The trial would be waited for five times as long as one simulation may take.
     assert time.perf_counter() - started < 300.0
-    assert worker_of(model)._trust.untrusted == ("reset",)
+    assert fixtures.runner(model)._experience.untrusted == ("reset",)
     run(model, ("y",), signals=ONE)
-    assert worker_of(model)._trust.reuse == "instance"
+    assert fixtures.runner(model)._experience.reuse == "instance"
     model.close()
 
 
@@ -142,7 +136,7 @@ def test_two_names_of_one_input_are_one_input() -> None:
     assert [v.name for v in info.outputs] == ["y", "plant.y"]
     assert info.notes == ("two names of one input: plant.u = u; use the second",)
     with pytest.raises(ModelError, match=r"'plant\.u' cannot be set: it is another name of 'u'"):
-        run(local("Aliases_3"), ("y",), parameters={"plant.u": 1.0})
+        run(isolated("Aliases_3"), ("y",), parameters={"plant.u": 1.0})
 
 
 def test_a_formula_may_use_either_name() -> None:
@@ -218,9 +212,9 @@ def test_static_data_that_even_a_new_instance_keeps_does_not_cost_a_process() ->
     pids = set()
     for _ in range(6):
         assert run(model, ("y",))["y"].tolist() == list(range(11))
-        fmu = worker_of(model)
+        fmu = fixtures.runner(model)
         pids |= {fmu._worker.pid} if fmu._worker else set()
-    assert fmu._trust.reuse == "library"
+    assert fmu._experience.reuse == "library"
     assert len(pids) == 1
     model.close()
 

@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from tests.fmu.fixtures import ME, local, ramp, run
+from tests.fmu.fixtures import ME, isolated, ramp, run
 
 LAGS = ["Lag_1me", "Lag_2", "Lag_3"]
 TICKERS = ["Ticker_1me", "Ticker_2", "Ticker_3"]
@@ -15,7 +15,7 @@ TICKERS = ["Ticker_1me", "Ticker_2", "Ticker_3"]
 def test_inputs_act_inside_of_steps(name: str) -> None:
     """With u = t: x = t - T + T exp(-t / T), however far apart the outputs are."""
     for interval in (0.01, 0.5):
-        got = run(local(name, ME), ("x",), stop=5.0, interval=interval, signals={"u": ramp(5.0)})
+        got = run(isolated(name, ME), ("x",), stop=5.0, interval=interval, signals={"u": ramp(5.0)})
         exact = got.times - 2.0 + 2.0 * np.exp(-got.times / 2.0)
         np.testing.assert_allclose(got["x"], exact, atol=3e-7)
 
@@ -24,7 +24,7 @@ def test_inputs_act_inside_of_steps(name: str) -> None:
 @pytest.mark.parametrize("hold", [None, 0.3])
 def test_any_signal_is_followed(interpolation: str, hold: float | None) -> None:
     signal = Signal((0.0, 0.7, 1.1, 3.0), (0.0, 2.0, -1.0, 1.0), interpolation, hold)  # type: ignore[arg-type]
-    got = run(local("Lag_2", ME), ("x",), stop=4.0, signals={"u": signal}, parameters={"T": 0.5})
+    got = run(isolated("Lag_2", ME), ("x",), stop=4.0, signals={"u": signal}, parameters={"T": 0.5})
     fine = np.linspace(0.0, 4.0, 400_001)
     middle = signal.sample((fine[1:] + fine[:-1]) / 2)
     x, expected = 0.0, [0.0]
@@ -39,7 +39,9 @@ def test_any_signal_is_followed(interpolation: str, hold: float | None) -> None:
 @pytest.mark.parametrize("name", TICKERS)
 def test_time_events_are_met_exactly(name: str) -> None:
     """The sample of u = t at each multiple of 0.5 s is held; x integrates it."""
-    got = run(local(name, ME), ("sampled", "count", "x"), stop=3.0, interval=0.05, signals={"u": ramp(3.0)})
+    got = run(
+        isolated(name, ME), ("sampled", "count", "x"), stop=3.0, interval=0.05, signals={"u": ramp(3.0)}
+    )
     ticks = np.floor(got.times / 0.5 + 1e-9)
     np.testing.assert_allclose(got["sampled"], 0.5 * ticks, atol=1e-9)
     assert got["count"].tolist() == (ticks + 1).tolist()
@@ -49,13 +51,13 @@ def test_time_events_are_met_exactly(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["Lag_2", "Ball_2", "Ticker_3", "Arrays_3", "VanDerPol_3"])
 def test_both_interfaces_agree_as_the_communication_step_shrinks(name: str) -> None:
-    model = local(name)
+    model = isolated(name)
     inputs = {v.name: Signal.evenly((0.0, 2.0, 1.0), stop_time=1.0) for v in model.info.inputs}
     outputs = [v.name for v in model.info.outputs if v.kind == "real"]
     apart = []
     for step in (0.01, 0.001):
         held = run(model, outputs, signals=inputs, step_size=step)
-        solved = run(local(name, ME), outputs, signals=inputs)
+        solved = run(isolated(name, ME), outputs, signals=inputs)
         apart.append(max(float(np.abs(held[n] - solved[n]).max()) for n in outputs))
     assert apart[1] < max(0.2 * apart[0], 1e-7) and apart[1] < 5e-3
 
@@ -63,11 +65,11 @@ def test_both_interfaces_agree_as_the_communication_step_shrinks(name: str) -> N
 def test_discrete_inputs_change_at_events_only() -> None:
     """Ticker samples u, a continuous input; driven by a step it sees the value after the step."""
     step = Signal((0.0, 0.5), (1.0, 3.0), "constant")
-    got = run(local("Ticker_2", ME), ("sampled",), signals={"u": step})
+    got = run(isolated("Ticker_2", ME), ("sampled",), signals={"u": step})
     assert got["sampled"].tolist() == [1.0] * 5 + [3.0] * 6
 
 
 def test_a_model_that_leaves_its_domain_fails_with_the_time() -> None:
     """Van der Pol's equation run with negative damping of the far field blows up in finite time."""
     with pytest.raises(SimulationError, match=r"no step is small enough.* at t = "):
-        run(local("VanDerPol_2", ME), ("x",), stop=50.0, parameters={"mu": -1.0, "x": 5.0})
+        run(isolated("VanDerPol_2", ME), ("x",), stop=50.0, parameters={"mu": -1.0, "x": 5.0})

@@ -6,13 +6,13 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.fmu import Frame
 from falsifier.fmu.step_effect import Movement, step_convergence, sufficient_step
-from tests.fmu.fixtures import local, ramp
+from tests.fmu.fixtures import isolated, ramp
 from tests.fmu.small_systems import loop
 
 
 def test_halving_the_step_moves_outputs_by_half_the_error_of_holding() -> None:
     """A held ramp lags by half a step: x is off by h / 2 (1 - exp(-t / T)), and half of that moves."""
-    model = local("Lag_2")
+    model = isolated("Lag_2")
     moved = step_convergence(model, Experiment(4.0, 0.1, ("x", "T")), {"u": ramp(4.0)})
     assert moved["x"].largest == pytest.approx(0.1 / 4 * (1 - np.exp(-2.0)), rel=0.03)
     assert moved["x"].time == pytest.approx(4.0)

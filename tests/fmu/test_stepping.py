@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from falsifier.core.signals import Signal
 from falsifier.fmu import stepper
 from tests.fmu import plain
-from tests.fmu.fixtures import local, run
+from tests.fmu.fixtures import isolated, run
 
 OUTPUTS = {
     **{name: ("x", "y") for name in ("Lag_1cs", "Lag_2", "Lag_3")},
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 @pytest.mark.parametrize("name", sorted(OUTPUTS))
 def test_plain_loops_do_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = local(name)
+    model = isolated(name)
     inputs = {v.name: Signal.evenly((0.0, 2.0, -1.0, 1.0), stop_time=2.0) for v in model.info.inputs}
 
     def outcome() -> Floats:

@@ -62,7 +62,7 @@ def test_the_coupled_system_is_what_its_equations_say() -> None:
 
 def test_each_charge_point_alone_leaves_the_other_what_it_has_published() -> None:
     rng = np.random.default_rng(7)
-    charger = FmuModel(ROOT / "fmus" / "ShareCharger.fmu", isolate=False)
+    charger = FmuModel(ROOT / "fmus" / "ShareCharger.fmu")
     values = {"request": rng.uniform(0.0, 80.0, 200), "other": rng.uniform(0.0, 100.0, 200)}
     signals = {
         n: Signal.evenly(v.tolist(), stop_time=20.0, interpolation="constant") for n, v in values.items()

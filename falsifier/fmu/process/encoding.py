@@ -3,13 +3,18 @@
 ``falsifier/fmu/worker/request.c`` is the other side.
 """
 
+import os
 import struct
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.model import Interface
 from falsifier.fmu.description import Description
+from falsifier.fmu.description.wine import windows_path
 
 # Storage types of values; their position is the number that request.c reads.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
@@ -109,3 +114,65 @@ def _buffer(
             numbers = description.arrays[reference]
             values[start : start + len(numbers)] = numbers
     return values, begins
+
+
+def limits(description: Description, names: Sequence[str]) -> NDArray[np.float64]:
+    """Return the smallest and largest number of each variable's type, shape (n, 2); infinite for reals."""
+    return np.array([_limits(description.major, description.slot(name).type) for name in names]).reshape(
+        -1, 2
+    )
+
+
+def _limits(major: int, code: str) -> tuple[float, float]:
+    stored = STORED[major][code]
+    if code == "Boolean":
+        return 0.0, 1.0
+    if stored.startswith("f"):
+        return -np.inf, np.inf
+    kind = np.iinfo(stored)
+    return float(kind.min), float(kind.max)
+
+
+def fmu(
+    description: Description,
+    folder: Path,
+    library: Path,
+    interface: Interface,
+    *,
+    logging: bool,
+    through_wine: bool = False,
+) -> bytes:
+    """Return what the worker needs to load an FMU.
+
+    Args:
+        description: its description.
+        folder: where it was unpacked.
+        library: path of its library.
+        interface: interface to simulate with.
+        logging: whether to ask it for messages.
+        through_wine: whether the worker is a Windows program on another system.
+    """
+    resources = folder / "resources"
+    if through_wine:
+        names = [windows_path(library), windows_path(resources) + "\\"]
+        addresses = ["file:///Z:" + quote(str(path)) for path in (folder, resources)]
+    else:
+        names, addresses = [str(library), f"{resources}{os.sep}"], [folder.as_uri(), resources.as_uri()]
+    events = description.major == 3 and interface == "co-simulation" and description.event_mode
+    numbers = integers(
+        description.major,
+        interface == "model-exchange",
+        logging,
+        events,
+        interface in description.saves_state,
+        description.states,
+        description.indicators,
+    )
+    words = (
+        names[0],
+        description.identifiers[interface],
+        description.info.name,
+        description.token,
+        (*addresses, names[1])[description.major - 1],
+    )
+    return numbers + b"".join(map(text, words))

@@ -2,12 +2,10 @@
 
 #include <math.h>
 
-#include "platform.h"
 #include "worker.h"
 
 /* Early returns at one time, or rounds of one event iteration, after which the FMU is considered stuck. */
 #define MOST_ROUNDS 1000
-#define STEPS_PER_CLOCK_CHECK 100
 
 typedef unsigned (*step_1)(void *, double, double, char);
 typedef unsigned (*step_2)(void *, double, double, int);
@@ -144,11 +142,10 @@ static struct outcome begin(struct fmu *fmu, struct plan *plan)
  *
  * The step sizes are differences of the communication points. The FMU adds them to its time again, which is
  * exact for these; with k * size + size it would pass the stop time by a rounding error, and some refuse. */
-struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, double *reached)
+struct outcome co_simulate(struct fmu *fmu, struct plan *plan, struct progress *progress)
 {
     size_t steps = (plan->samples - 1) * plan->every;
     double size = plan->stop_time / (double)steps;
-    *reached = 0.0;
     find_step_functions(fmu);
     struct outcome o = begin(fmu, plan);
     for (size_t k = 0; k < steps && o.where == DONE;) {
@@ -160,7 +157,7 @@ struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, 
             o = do_step(fmu, start, end, &ends);
         if (o.where != DONE)
             break;
-        *reached = (double)++k * size;
+        int late = is_late(progress, (double)++k * size);
         if (k % plan->every == 0) {
             unsigned status = read_row(fmu, plan, k / plan->every);
             if (status > 1)
@@ -170,7 +167,7 @@ struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, 
             break;
         if (ends)
             return (struct outcome){0, TERMINATED};
-        if (k % STEPS_PER_CLOCK_CHECK == 0 && now() > deadline)
+        if (late)
             return (struct outcome){0, TIMEOUT};
     }
     return o;

@@ -88,9 +88,12 @@ void *fmu_required(const struct fmu *fmu, const char *name)
 
 const char *fmu_load(struct fmu *fmu)
 {
+    static char text[MESSAGE_BYTES];
     const char *wrong = NULL;
     fmu->module = load_library(fmu->library, &wrong);
-    return wrong;
+    if (!fmu->module)
+        snprintf(text, sizeof text, "the library cannot be loaded: %s", wrong);
+    return fmu->module ? NULL : text;
 }
 
 static void *instantiate_1(const struct fmu *fmu)
@@ -127,7 +130,15 @@ const char *fmu_instantiate(struct fmu *fmu)
     } else {
         fmu->instance = instantiate_3(fmu);
     }
+    /* Some FMUs change the working folder. */
+    return_to_folder();
     return fmu->instance ? NULL : "instantiating the FMU failed";
+}
+
+void fmu_unload(struct fmu *fmu)
+{
+    unload_library(fmu->module);
+    fmu->module = NULL;
 }
 
 void fmu_free(struct fmu *fmu)

@@ -1,9 +1,9 @@
-/* Runs one FMU: the process that may crash, hang or leak memory in place of the one that requests simulations.
+/* Runs FMUs: the process that may crash, hang or leak memory in place of the one that requests simulations.
  *
- * Requests arrive on standard input: their kind and length (4 bytes each), then what request.c reads. Replies
- * go to a pipe of their own: where the request stopped, FMI's status, the simulated time, and a text after its
- * length. Messages of the FMU come before the reply. Standard output and standard error belong to the FMU.
- * Parameters, inputs and outputs of simulations are in memory that both sides map.
+ * Requests are their kind and length (4 bytes each), then what request.c reads. Replies are a mark, where the request
+ * stopped, FMI's status, flags, the length of a text, the bytes printed so far (4 bytes each), the simulated time, and
+ * that text. Standard output and standard error belong to the FMU, whose messages go there too. Parameters, inputs and
+ * outputs of simulations are in memory that both sides map.
  *
  * The end of the requests ends the process. */
 
@@ -14,45 +14,48 @@
 #include <string.h>
 
 #include "platform.h"
-#include "worker.h"
+#include "session.h"
 
-enum kind { CONNECT, LOAD, PREPARE, SIMULATE, RESET, TAKE, RESTORE, FORGET, RENEW };
+enum kind { CONNECT, LOAD, PREPARE, SIMULATE };
 
 #define MESSAGE_BYTES 4096
+#define CUT_OFF 74 /* exit code: nobody can be replied to */
+#define MARK 0x756d66f0u
+#define MORE 1u    /* another reply follows without a request */
+#define LEAVING 2u /* the process ends after this reply */
+/* Waking up a process takes about 40 microseconds, which is a lot compared with a simulation shorter than this. */
+#define QUICK_SECONDS 500e-6
 
-static struct fmu fmu;
-static struct plan plan;
 static jmp_buf end_of_request;
-static double reached;
+static struct subject subject;
 
 const char *failing = "";
 
-static void reply(enum where where, unsigned status, double time, const char *text)
+static void reply(struct outcome outcome, unsigned flags, double time, const char *text)
 {
-    static const char *const parts_of_statuses[] = {
-        "ok: ", "warning: ", "discard: ", "error: ", "fatal: ", "pending: "};
-    char prefix[32] = "";
-    if (where == MESSAGE && status < 6)
-        snprintf(prefix, sizeof prefix, "%s", parts_of_statuses[status]);
-    else if (where == MESSAGE)
-        snprintf(prefix, sizeof prefix, "status %d: ", (int)status);
-    char message[24 + sizeof prefix + MESSAGE_BYTES];
-    uint32_t head[] = {(uint32_t)where, status};
-    size_t before = strlen(prefix), length = strlen(text);
+    size_t length = strlen(text);
     length = length > MESSAGE_BYTES ? MESSAGE_BYTES : length;
-    uint32_t size = (uint32_t)(before + length);
-    memcpy(message, head, 8);
-    memcpy(message + 8, &time, 8);
-    memcpy(message + 16, &size, 4);
-    memcpy(message + 20, prefix, before);
-    memcpy(message + 20 + before, text, length);
-    if (!send_bytes(message, 20 + size))
-        end_process(0);
+    char message[32 + MESSAGE_BYTES];
+    uint32_t head[] = {MARK, (uint32_t)outcome.where, outcome.status, flags, (uint32_t)length, printed()};
+    memcpy(message, head, sizeof head);
+    memcpy(message + sizeof head, &time, sizeof time);
+    memcpy(message + 32, text, length);
+    if (!send_bytes(message, 32 + length))
+        end_process(CUT_OFF);
 }
 
+/* A message of the FMU, where it also prints. */
 void say(unsigned status, const char *text)
 {
-    reply(MESSAGE, status, 0.0, text);
+    static const char *const names[] = {"ok", "warning", "discard", "error", "fatal", "pending"};
+    char line[MESSAGE_BYTES + 64], number[32];
+    snprintf(number, sizeof number, "status %d", (int)status);
+    size_t length = strlen(text);
+    while (length && strchr(" \t\r\n", text[length - 1]))
+        length--;
+    int size = snprintf(line, sizeof line, "%s: %.*s\n", status < 6 ? names[status] : number,
+                        (int)(length > MESSAGE_BYTES ? MESSAGE_BYTES : length), text);
+    print(line, (size_t)size);
 }
 
 /* End the request: the FMU cannot be used. */
@@ -63,7 +66,7 @@ void give_up(const char *format, ...)
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    reply(IMPOSSIBLE, 0, -1.0, text);
+    reply((struct outcome){0, IMPOSSIBLE}, 0, -1.0, text);
     longjmp(end_of_request, 1);
 }
 
@@ -75,99 +78,93 @@ void *need(size_t count, size_t size)
     return memory;
 }
 
+int is_late(struct progress *p, double time)
+{
+    p->header[SIMULATED] = time;
+    if (++p->steps % STEPS_PER_CLOCK_CHECK)
+        return 0;
+    double at = now();
+    if (time >= p->next) {
+        p->deadline = at + p->limit;
+        p->next = time + p->share;
+    }
+    return at > p->deadline;
+}
+
 static void report_crash(unsigned code)
 {
-    reply(CRASHED, code, -1.0, "");
+    reply((struct outcome){code, CRASHED}, 0, -1.0, "");
+}
+
+static void announce(const char *way)
+{
+    reply((struct outcome){0, DONE}, MORE, -1.0, way);
+}
+
+static void connect(struct request *r)
+{
+    if (!settle(read_text(r)))
+        end_process(CUT_OFF);
 }
 
 static void load(struct request *r)
 {
-    read_fmu(r, &fmu);
-    const char *wrong = fmu_load(&fmu);
-    if (wrong)
-        give_up("the library cannot be loaded: %s", wrong);
-    wrong = fmu_instantiate(&fmu);
-    if (wrong)
-        give_up("%s", wrong);
+    enum reuse reuse = (enum reuse)read_size(r);
+    unsigned untrusted = (unsigned)read_size(r);
+    read_one_fmu(r, &subject);
+    start_session(&subject, reuse, untrusted);
 }
 
-static void prepare(struct request *r)
+/* Returns whether the process goes on. */
+static int simulate(struct request *r)
 {
-    read_plan(r, &fmu, &plan);
-    if (fmu.is_model_exchange)
-        prepare_solver(&fmu, &plan);
-}
-
-static struct outcome simulate(double time_limit)
-{
-    struct event_info_1 first_events = {0};
-    double deadline = now() + time_limit;
-    struct inputs *both[] = {&plan.inputs, &plan.held};
-    for (int k = 0; k < 2; k++)
-        for (size_t j = 0; j < both[k]->ports.count; j++) {
-            both[k]->current[j] = 0;
-            both[k]->values[j] = 0.0;
-        }
-    reached = 0.0;
-    struct outcome o = initialise(&fmu, &plan, &first_events);
-    if (o.where != DONE)
-        return o;
-    failing = "";
-    o = fmu.is_model_exchange ? solve(&fmu, &first_events, deadline, &reached)
-                              : co_simulate(&fmu, &plan, deadline, &reached);
-    if (o.where == DONE)
-        terminate(&fmu);
-    return o;
-}
-
-static void renew(void)
-{
-    fmu_free(&fmu);
-    const char *wrong = fmu_instantiate(&fmu);
-    if (wrong)
-        give_up("%s", wrong);
-}
-
-static struct outcome answer(enum kind kind, struct request *r)
-{
-    const struct outcome done = {0, DONE}, refused = {0, REFUSED};
-    switch (kind) {
-    case CONNECT:
-        if (!connect_replies(read_text(r)))
-            end_process(2);
-        return done;
-    case LOAD: load(r); return done;
-    case PREPARE: prepare(r); return done;
-    case SIMULATE: return simulate(read_number(r));
-    case RESET: return reset(&fmu) ? done : refused;
-    case TAKE: return take_state(&fmu) ? done : refused;
-    case RESTORE: return restore_state(&fmu) ? done : refused;
-    case FORGET: forget_state(&fmu); return done;
-    case RENEW: renew(); return done;
+    double started = now(), limit = read_number(r), reached;
+    int is_per_share = (int)read_size(r);
+    struct outcome o = simulate_again(limit, is_per_share, &reached);
+    int is_quick = now() - started < QUICK_SECONDS;
+    int is_done = o.where == DONE, is_tested = is_done && awaits_test();
+    int ends = is_done && !is_tested && is_spent();
+    reply(o, (is_tested ? MORE : 0) | (ends ? LEAVING : 0), reached, failing);
+    if (is_tested) {
+        find_reuse(announce);
+        ends = is_spent();
+        reply((struct outcome){0, DONE}, ends ? LEAVING : 0, -1.0, way_to_start());
     }
-    give_up("request %d is unknown", (int)kind);
+    if (is_quick && !ends)
+        watch_requests(QUICK_SECONDS);
+    return !ends;
+}
+
+static int answer(enum kind kind, struct request *r)
+{
+    failing = "";
+    switch (kind) {
+    case CONNECT: connect(r); break;
+    case LOAD: load(r); break;
+    case PREPARE: prepare_session(*r); break;
+    case SIMULATE: return simulate(r);
+    default: give_up("request %d is unknown", (int)kind);
+    }
+    reply((struct outcome){0, DONE}, 0, -1.0, "");
+    return 1;
 }
 
 int main(void)
 {
     uint32_t head[2];
     start_platform(report_crash);
-    while (receive_bytes(head, sizeof head)) {
+    for (int goes_on = 1; goes_on && receive_bytes(head, sizeof head);) {
         char *start = calloc(head[1] + 1, 1);
         struct request r = {start, start + head[1]};
         if (!start || !receive_bytes(r.at, head[1]))
             break;
+        /* Of a request that ends early nothing is freed, and of others what they contain is used later. */
         if (setjmp(end_of_request))
             continue;
-        failing = "";
-        reached = -1.0;
-        struct outcome o = answer((enum kind)head[0], &r);
-        reply(o.where, o.status, reached, failing);
-        /* The other requests' contents are used later. */
-        if (head[0] != LOAD && head[0] != PREPARE)
+        goes_on = answer((enum kind)head[0], &r);
+        if (head[0] == SIMULATE)
             free(start);
     }
-    forget_state(&fmu);
-    fmu_free(&fmu);
-    return 0;
+    /* Nothing is tidied up, because FMUs may crash when they are unloaded. */
+    end_process(0);
 }

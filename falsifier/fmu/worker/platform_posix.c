@@ -5,25 +5,58 @@
 
 #include <dlfcn.h>
 #include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "platform.h"
+#include "sandbox.h"
 
-enum { REQUESTS = 0, REPLIES = 3, ROOM = 4 };
+enum { REPLIES = 3, ROOM = 4, LAST = ROOM };
 
-/* Its exit status tells what ended a process; no report is needed. */
+/* A copy of descriptor 0, so that the FMU does not read requests from its standard input. */
+static int requests;
+static char working_folder[4096];
+
+/* Descriptors of the parent that it did not mean to pass on. */
+static void close_others(void)
+{
+#if defined(__linux__) && defined(SYS_close_range)
+    if (!syscall(SYS_close_range, LAST + 1, ~0u, 0))
+        return;
+#endif
+    long most = sysconf(_SC_OPEN_MAX);
+    for (int descriptor = LAST + 1; descriptor < (most > 65536 ? 65536 : most); descriptor++)
+        close(descriptor);
+}
+
+/* Its exit status tells what ended a process; no report is needed. Returns in the process that runs the FMU. */
 void start_platform(void (*report)(unsigned code))
 {
     (void)report;
+    start_guarded();
+    close_others();
+    requests = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, LAST + 1);
+    int nothing = open("/dev/null", O_RDONLY);
+    if (nothing > 0 && nothing != STDIN_FILENO) {
+        dup2(nothing, STDIN_FILENO);
+        close(nothing);
+    }
+    /* Programs that the FMU starts do not get the others. */
+    for (int descriptor = REPLIES; descriptor <= LAST; descriptor++)
+        fcntl(descriptor, F_SETFD, FD_CLOEXEC);
     signal(SIGPIPE, SIG_IGN);
     /* What the FMU printed before a crash must not be lost. */
-    setvbuf(stdout, NULL, _IONBF, 0);
+    setvbuf(stdout, NULL, _IOLBF, 0);
 }
 
 void end_process(int code)
@@ -38,16 +71,55 @@ double now(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-int connect_replies(const char *place)
+int settle(const char *replies)
 {
-    (void)place;
-    return 1;
+    (void)replies;
+    return getcwd(working_folder, sizeof working_folder) != NULL;
+}
+
+void return_to_folder(void)
+{
+    if (chdir(working_folder)) {
+        /* it has been removed */
+    }
+}
+
+size_t most_memory_used(void)
+{
+    struct rusage used;
+    getrusage(RUSAGE_SELF, &used);
+#ifdef __APPLE__
+    return (size_t)used.ru_maxrss >> 10;
+#else
+    return (size_t)used.ru_maxrss;
+#endif
 }
 
 int receive_bytes(void *target, size_t count)
 {
     for (char *at = target; count;) {
-        ssize_t some = read(REQUESTS, at, count);
+        ssize_t some = read(requests, at, count);
+        if (some < 0 && errno == EINTR)
+            continue;
+        if (some <= 0)
+            return 0;
+        at += some;
+        count -= (size_t)some;
+    }
+    return 1;
+}
+
+void watch_requests(double seconds)
+{
+    struct pollfd waiting = {requests, POLLIN, 0};
+    for (double end = now() + seconds; now() < end && !poll(&waiting, 1, 0);)
+        sched_yield();
+}
+
+static int write_all(int target, const char *at, size_t count)
+{
+    while (count) {
+        ssize_t some = write(target, at, count);
         if (some < 0 && errno == EINTR)
             continue;
         if (some <= 0)
@@ -60,16 +132,19 @@ int receive_bytes(void *target, size_t count)
 
 int send_bytes(const void *source, size_t count)
 {
-    for (const char *at = source; count;) {
-        ssize_t some = write(REPLIES, at, count);
-        if (some < 0 && errno == EINTR)
-            continue;
-        if (some <= 0)
-            return 0;
-        at += some;
-        count -= (size_t)some;
-    }
-    return 1;
+    return write_all(REPLIES, source, count);
+}
+
+void print(const char *text, size_t count)
+{
+    write_all(STDOUT_FILENO, text, count);
+}
+
+unsigned printed(void)
+{
+    fflush(stdout);
+    off_t position = lseek(STDOUT_FILENO, 0, SEEK_CUR);
+    return position > 0 ? (unsigned)position : 0;
 }
 
 double *map_room(const char *place)
@@ -105,6 +180,11 @@ void *load_library(const char *path, const char **wrong)
     if (!library)
         *wrong = dlerror();
     return library;
+}
+
+void unload_library(void *library)
+{
+    dlclose(library);
 }
 
 void *find_symbol(void *library, const char *name)

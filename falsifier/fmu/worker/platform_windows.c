@@ -1,13 +1,17 @@
 /* Windows, also as Wine offers it. Requests come from standard input, replies go to a named pipe or file. */
 
+#include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <windows.h>
+#include <psapi.h>
 
 #include "platform.h"
 
 #define LONGEST_PATH 4096
 
 static HANDLE requests, replies;
+static wchar_t working_folder[LONGEST_PATH];
 static void (*report_crash)(unsigned code);
 
 static LONG WINAPI on_crash(EXCEPTION_POINTERS *crash)
@@ -48,13 +52,32 @@ static int widen(const char *path, wchar_t wide[LONGEST_PATH])
     return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, LONGEST_PATH);
 }
 
-int connect_replies(const char *place)
+/* Replies go to a handle that the process got, by its number, or to a pipe or file. */
+int settle(const char *place)
 {
     wchar_t path[LONGEST_PATH];
+    if (!GetCurrentDirectoryW(LONGEST_PATH, working_folder))
+        return 0;
+    if (*place >= '0' && *place <= '9') {
+        replies = (HANDLE)(uintptr_t)strtoull(place, NULL, 10);
+        return 1;
+    }
     if (!widen(place, path))
         return 0;
     replies = CreateFileW(path, GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL, OPEN_EXISTING, 0, NULL);
     return replies != INVALID_HANDLE_VALUE;
+}
+
+void return_to_folder(void)
+{
+    SetCurrentDirectoryW(working_folder);
+}
+
+size_t most_memory_used(void)
+{
+    PROCESS_MEMORY_COUNTERS used = {.cb = sizeof used};
+    GetProcessMemoryInfo(GetCurrentProcess(), &used, sizeof used);
+    return used.PeakWorkingSetSize >> 10;
 }
 
 int receive_bytes(void *target, size_t count)
@@ -67,6 +90,24 @@ int receive_bytes(void *target, size_t count)
         count -= some;
     }
     return 1;
+}
+
+/* Nothing tells whether a pipe has bytes without a switch between processes, so there is nothing to save. */
+void watch_requests(double seconds)
+{
+    (void)seconds;
+}
+
+void print(const char *text, size_t count)
+{
+    DWORD written;
+    WriteFile(GetStdHandle(STD_OUTPUT_HANDLE), text, (DWORD)count, &written, NULL);
+}
+
+unsigned printed(void)
+{
+    DWORD position = SetFilePointer(GetStdHandle(STD_OUTPUT_HANDLE), 0, NULL, FILE_CURRENT);
+    return position == INVALID_SET_FILE_POINTER ? 0 : position;
 }
 
 int send_bytes(const void *source, size_t count)
@@ -127,6 +168,11 @@ void *load_library(const char *path, const char **wrong)
     else if (!library)
         *wrong = text;
     return library;
+}
+
+void unload_library(void *library)
+{
+    FreeLibrary(library);
 }
 
 void *find_symbol(void *library, const char *name)

@@ -47,6 +47,7 @@ void read_fmu(struct request *r, struct fmu *fmu)
     fmu->is_model_exchange = (int)read_size(r);
     fmu->logging = (int)read_size(r);
     fmu->event_mode = (int)read_size(r);
+    fmu->saves_state = (int)read_size(r);
     fmu->states = read_size(r);
     fmu->indicators = read_size(r);
     fmu->library = read_text(r);
@@ -125,7 +126,7 @@ void read_strings(struct request *r, struct plan *plan)
     }
 }
 
-/* Map the memory of simulations. */
+/* Map the memory of simulations; it begins with a header. */
 double *read_room(struct request *r)
 {
     const char *place = read_text(r);
@@ -135,11 +136,12 @@ double *read_room(struct request *r)
     return room;
 }
 
-/* Read a plan; its shared memory is laid out as Room is: parameters, inputs, outputs. */
+/* Read a plan; its shared memory is laid out as Room is: header, parameters, inputs, outputs. */
 void read_plan(struct request *r, const struct fmu *fmu, struct plan *plan)
 {
     memset(plan, 0, sizeof *plan);
-    double *room = read_room(r);
+    plan->header = read_room(r);
+    double *room = plan->header + HEADER;
     plan->samples = read_size(r);
     plan->every = read_size(r);
     size_t pieces = read_size(r);

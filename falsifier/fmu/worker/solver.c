@@ -21,7 +21,6 @@
 #define MAX_FACTOR 5.0
 /* Events within one output interval after which the FMU is considered stuck (Zeno behaviour). */
 #define MOST_EVENTS 10000
-#define STEPS_PER_CLOCK_CHECK 100
 /* Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7). */
 #define ABSOLUTE_SHARE 0.01
 
@@ -388,19 +387,16 @@ void bring_back_solver(struct fmu *fmu, void *kept)
 }
 
 /* Solve the differential equation up to the stop time. */
-struct outcome solve(
-    struct fmu *fmu, const struct event_info_1 *first_events, double deadline, double *reached)
+struct outcome solve(struct fmu *fmu, const struct event_info_1 *first_events, struct progress *progress)
 {
     struct solver *s = fmu->solver;
     struct outcome o = begin_solving(fmu, first_events);
     if (o.where == DONE)
         o = checked(read_row(fmu, s->plan, 0));
-    for (size_t k = 1; o.where == DONE && s->column < s->plan->samples; k++) {
+    while (o.where == DONE && s->column < s->plan->samples) {
         o = advance(s);
-        int is_late = k % STEPS_PER_CLOCK_CHECK == 0 && now() > deadline;
-        if (is_late && o.where == DONE && s->column < s->plan->samples)
+        if (is_late(progress, s->time) && o.where == DONE && s->column < s->plan->samples)
             o = (struct outcome){0, TIMEOUT};
     }
-    *reached = s->time;
     return o;
 }

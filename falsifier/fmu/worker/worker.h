@@ -17,9 +17,8 @@ enum where {
     TEXT,           /* a string parameter; the text is its position */
     TIMEOUT,        /* the time limit */
     IMPOSSIBLE,     /* the FMU cannot be used; the text says why */
-    REFUSED,        /* a reset or a saved state, without consequences */
-    MESSAGE,        /* not an outcome: a message of the FMU */
-    CRASHED         /* not an outcome: the last words of a process; the status is Windows' exception code */
+    CANNOT_RENEW,   /* no new instance can be made; the text says why */
+    CRASHED         /* the last words of a process; the status is Windows' exception code */
 };
 
 /* FMI's status is unsigned: a negative one, which FMI does not define, is larger than all others. */
@@ -50,7 +49,7 @@ struct saving {
 
 /* One FMU: what the request says of it, its library, and its instance with what surrounds it. */
 struct fmu {
-    int major, is_model_exchange, logging, event_mode;
+    int major, is_model_exchange, logging, event_mode, saves_state;
     size_t states, indicators;
     char *library, *identifier, *name, *token, *resources;
     void *module, *instance, *state;
@@ -113,6 +112,18 @@ struct plan {
     struct inputs inputs, held; /* held: may change only at events */
     const double *parameter_values;
     double *recorded; /* one row per output, one column per sample */
+    double *header;   /* of the shared memory */
+};
+
+/* Numbers at the start of the shared memory: which component of a system runs, and the time that is simulated. */
+enum header { RUNNING, SIMULATED, HEADER = 8 };
+
+#define STEPS_PER_CLOCK_CHECK 100
+
+/* How far a simulation is, and when it is ended: after limit s, or limit s after the last share of simulated time. */
+struct progress {
+    double *header, limit, deadline, share, next;
+    unsigned steps;
 };
 
 /* fmiEventInfo */
@@ -125,6 +136,7 @@ struct event_info_1 {
 const char *fmu_load(struct fmu *fmu); /* returns what went wrong, or NULL */
 const char *fmu_instantiate(struct fmu *fmu);
 void fmu_free(struct fmu *fmu);
+void fmu_unload(struct fmu *fmu);
 void *fmu_function(const struct fmu *fmu, const char *name); /* NULL if it is not exported */
 void *fmu_required(const struct fmu *fmu, const char *name); /* ends the request if it is not exported */
 
@@ -156,7 +168,7 @@ void find_step_functions(struct fmu *fmu);
 struct outcome begin_steps(struct fmu *fmu); /* after the initialisation */
 struct outcome change_at_event(struct fmu *fmu, const struct ports *ports);
 struct outcome do_step(struct fmu *fmu, double start, double end, int *ends);
-struct outcome co_simulate(struct fmu *fmu, struct plan *plan, double deadline, double *reached);
+struct outcome co_simulate(struct fmu *fmu, struct plan *plan, struct progress *progress);
 
 /* solver.c */
 void prepare_solver(struct fmu *fmu, struct plan *plan);
@@ -164,8 +176,7 @@ struct outcome begin_solving(struct fmu *fmu, const struct event_info_1 *first_e
 struct outcome solve_step(struct fmu *fmu, double start, double end, int has_event, int *ends);
 void *keep_solver(const struct fmu *fmu, void *kept); /* what changes in a step; new memory if kept is NULL */
 void bring_back_solver(struct fmu *fmu, void *kept);
-struct outcome solve(
-    struct fmu *fmu, const struct event_info_1 *first_events, double deadline, double *reached);
+struct outcome solve(struct fmu *fmu, const struct event_info_1 *first_events, struct progress *progress);
 
 /* request.c */
 struct request {
@@ -174,9 +185,9 @@ struct request {
 size_t read_size(struct request *request);
 void read_fmu(struct request *request, struct fmu *fmu);
 void read_plan(struct request *request, const struct fmu *fmu, struct plan *plan);
+double *read_room(struct request *request);
 char *read_text(struct request *request);
 double read_number(struct request *request);
-double *read_room(struct request *request);
 void read_strings(struct request *request, struct plan *plan);
 void read_ports(struct request *request, const struct fmu *fmu, const char *verb, struct ports *ports);
 void read_inputs(struct request *request, const struct fmu *fmu, size_t pieces, struct inputs *inputs);
@@ -184,6 +195,7 @@ void read_inputs(struct request *request, const struct fmu *fmu, size_t pieces, 
 /* main.c */
 void give_up(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
 void say(unsigned status, const char *text); /* passes a message of the FMU on */
+int is_late(struct progress *progress, double time); /* to be called after each step */
 void *need(size_t count, size_t size);       /* zeroed memory */
 
 extern const char *failing; /* the text of the next outcome */

@@ -3,7 +3,7 @@
 import os
 import re
 import signal
-import socket
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event, Thread
@@ -12,14 +12,12 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description.model_description import read_description
-from falsifier.fmu.forking import Nursery
-from falsifier.fmu.isolation import _MOST_OF_A_THREAD, REGISTRY, IsolatedFmu, _Registry
-from falsifier.fmu.spawning import Spawner
-from falsifier.fmu.worker_order import Order
+from falsifier.fmu.description import read_description
+from falsifier.fmu.process import REGISTRY, FmuOrder, Runner
+from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
 from tests import patience
 from tests.fmu import fixtures
-from tests.fmu.fixtures import isolated, run
+from tests.fmu.fixtures import isolated, run, worker
 from tests.fmu.support import (
     ABORT,
     ALLOCATE,
@@ -28,7 +26,6 @@ from tests.fmu.support import (
     END,
     ERROR,
     EXIT,
-    FORKED,
     HANG,
     NAN,
     PRINT,
@@ -36,6 +33,9 @@ from tests.fmu.support import (
     assert_nothing_is_left,
     script,
 )
+
+# As in session.c.
+_MOST_INSTANCES = 400
 
 
 @pytest.fixture
@@ -105,22 +105,38 @@ def test_messages_of_failed_and_of_successful_simulations_are_kept(misdeeds: Fmu
 def test_a_worker_that_dies_between_simulations_is_replaced_without_blame(misdeeds: FmuModel) -> None:
     run(misdeeds, ("y",))
     run(misdeeds, ("y",))
-    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == misdeeds.sha256]
-    assert fmu._worker is not None
-    os.kill(fmu._worker.pid, signal.SIGKILL)
-    assert fmu._worker.sock.recv(1, socket.MSG_PEEK) == b"", "it is gone"
+    os.kill(worker(misdeeds).pid, signal.SIGKILL)
+    patience.wait_until(lambda: not worker(misdeeds)._started.program.is_alive)
     assert run(misdeeds, ("y",))["y"][-1] == 10
 
 
-@FORKED
-def test_a_nursery_that_dies_is_replaced(misdeeds: FmuModel) -> None:
-    run(misdeeds, ("y",))
-    nursery = REGISTRY.starter()
-    assert isinstance(nursery, Nursery)
-    os.kill(nursery._process.pid, signal.SIGKILL)
-    nursery._process.wait(patience.HANG)
-    assert commit(misdeeds, CRASH).status == "crashed"
-    assert REGISTRY.starter() is not nursery
+def test_each_fmu_has_a_worker_of_its_own_without_secrets(
+    misdeeds: FmuModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOME_API_KEY", "hidden")
+    other = isolated("Ball_2")
+    assert len(run(misdeeds, ("y",))) == len(run(other, ("h",))) == 11
+    pids = {worker(model).pid for model in (misdeeds, other)}
+    assert len(pids) == 2
+    if sys.platform == "linux":
+        assert all("hidden" not in Path(f"/proc/{pid}/environ").read_text() for pid in pids)
+    other.close()
+
+
+def test_a_worker_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
+    body = """
+from falsifier.fmu.process import REGISTRY
+(runner,) = REGISTRY._runners.values()
+import threading
+threading.Timer(0.3, os.kill, (os.getpid(), 9)).start()
+print(runner._worker.pid, flush=True)
+go(2)
+"""
+    with script(body, TMPDIR=str(tmp_path)) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.read())
+    patience.wait_until(lambda: not Path(f"/proc/{pid}").exists())
+    assert_nothing_is_left(tmp_path)
 
 
 def test_a_forked_copy_starts_workers_of_its_own(tmp_path: Path) -> None:
@@ -154,55 +170,53 @@ except KeyboardInterrupt:
 
 def test_closing_the_registry_removes_the_folder_of_this_process() -> None:
     run(isolated("Lag_2"), ("y",))
-    starter = REGISTRY.starter()
-    assert isinstance(starter, Nursery | Spawner)
-    root = starter._root
+    root = REGISTRY.workplace().root
     assert root.is_dir()
     REGISTRY.close()
     assert not root.exists()
     assert len(run(isolated("Lag_2"), ("y",))) == 11
 
 
-def orders(number: int) -> list[Order]:
+def orders(number: int) -> list[FmuOrder]:
     description = read_description(fixtures.path("Lag_2"))
-    return [Order(Path("Lag"), f"{k:064d}", description, "co-simulation", None) for k in range(number)]
+    return [FmuOrder(Path("Lag"), f"{k:064d}", description, "co-simulation") for k in range(number)]
 
 
 @pytest.fixture
-def ended(monkeypatch: pytest.MonkeyPatch) -> list[IsolatedFmu]:
+def ended(monkeypatch: pytest.MonkeyPatch) -> list[Runner]:
     """What a registry ends from here on, in this order."""
-    found: list[IsolatedFmu] = []
-    monkeypatch.setattr(IsolatedFmu, "close", lambda fmu: found.append(fmu))
+    found: list[Runner] = []
+    monkeypatch.setattr(Runner, "close", lambda fmu: found.append(fmu))
     return found
 
 
-def test_workers_of_ended_threads_are_ended_when_another_is_needed(ended: list[IsolatedFmu]) -> None:
-    registry, (order,) = _Registry(), orders(1)
-    made: list[IsolatedFmu] = []
-    thread = Thread(target=lambda: made.append(registry.fmu(order)))
+def test_workers_of_ended_threads_are_ended_when_another_is_needed(ended: list[Runner]) -> None:
+    registry, (order,) = Registry(), orders(1)
+    made: list[Runner] = []
+    thread = Thread(target=lambda: made.append(registry.runner(order)))
     thread.start()
     thread.join()
     assert not ended
-    here = registry.fmu(order)
+    here = registry.runner(order)
     assert ended == made
-    assert registry.fmu(order) is here
+    assert registry.runner(order) is here
     registry.close()
 
 
-def test_workers_of_living_threads_are_kept(ended: list[IsolatedFmu]) -> None:
-    registry, asked, goes_on = _Registry(), Event(), Event()
+def test_workers_of_living_threads_are_kept(ended: list[Runner]) -> None:
+    registry, asked, goes_on = Registry(), Event(), Event()
 
     def go() -> None:
-        one = registry.fmu(orders(1)[0])
+        one = registry.runner(orders(1)[0])
         asked.set()
         goes_on.wait(patience.HANG)
-        assert registry.fmu(orders(1)[0]) is one
+        assert registry.runner(orders(1)[0]) is one
         goes_on.clear()
 
     thread = Thread(target=go)
     thread.start()
     assert asked.wait(patience.HANG)
-    registry.fmu(orders(2)[1])
+    registry.runner(orders(2)[1])
     assert not ended
     goes_on.set()
     thread.join()
@@ -210,8 +224,52 @@ def test_workers_of_living_threads_are_kept(ended: list[IsolatedFmu]) -> None:
     registry.close()
 
 
-def test_a_thread_keeps_the_workers_of_its_latest_fmus(ended: list[IsolatedFmu]) -> None:
-    registry = _Registry()
-    made = [registry.fmu(order) for order in orders(_MOST_OF_A_THREAD + 3)]
+def test_a_thread_keeps_the_workers_of_its_latest_fmus(ended: list[Runner]) -> None:
+    registry = Registry()
+    made = [registry.runner(order) for order in orders(_MOST_OF_A_THREAD + 3)]
     assert ended == made[:3]
     registry.close()
+
+
+def test_workers_are_replaced_before_they_have_made_too_many_instances() -> None:
+    model = isolated("NoReset_2")
+    pids = set()
+    for _ in range(_MOST_INSTANCES + 20):
+        assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
+        found = fixtures.runner(model)._worker
+        pids |= {found.pid} if found else set()
+    assert len(pids) == 2
+    model.close()
+
+
+@pytest.mark.parametrize("name", ["SavedState_2", "SavedState_3"])
+def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -> None:
+    model = isolated(name)
+    run(model, ("y",), stop=0.2)
+    run(model, ("y",), stop=0.2)  # takes note of the self-test
+    pid = worker(model).pid
+    for _ in range(5 * _MOST_INSTANCES):
+        assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
+    assert worker(model).pid == pid
+    model.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "reuse"),
+    [
+        ("Lag_2", "reset"),
+        ("NoReset_2", "instance"),
+        ("LyingReset_2", "instance"),
+        ("SavedState_2", "state"),
+        ("SavedState_3", "state"),
+        ("LyingState_2", "instance"),
+        ("SpentState_3", "instance"),
+        ("KeepsStatic_2", "library"),
+    ],
+)
+def test_the_cheapest_way_that_gives_the_same_again_is_found(name: str, reuse: str) -> None:
+    model = isolated(name)
+    found = [run(model, ("y",))["y"].tolist() for _ in range(4)]
+    assert found == [found[0]] * 4
+    assert fixtures.runner(model)._experience.reuse == reuse
+    model.close()

@@ -152,7 +152,7 @@ def test_errors_of_model_exchange_are_the_same_too(misdeed: str) -> None:
 @needs_wine
 @pytest.mark.parametrize("interface", ["co-simulation", ME])
 def test_the_time_limit_is_watched_between_steps(interface: Interface) -> None:
-    model = FmuModel(FOLDER / "Lag_2.fmu", interface, isolate=False)
+    model = FmuModel(FOLDER / "Lag_2.fmu", interface)
     with pytest.raises(SimulationError, match=r"after the time limit of 1e-09 s; slow models") as caught:
         run(model, ("y",), interval=0.001, time_limit=1e-9)
     model.close()
@@ -209,7 +209,7 @@ def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("shutil.which", lambda _: None)
     if not wine.can_run_windows():
         pytest.skip("Windows libraries are not simulated on this machine, with or without Wine")
-    model = FmuModel(FOLDER / "Lag_2.fmu", isolate=False)
+    model = FmuModel(FOLDER / "Lag_2.fmu")
     with pytest.raises(ModelError, match=r"run through Wine, which is missing: .*apt-get install wine64"):
         run(model, ("y",))
 

@@ -1,0 +1,208 @@
+"""What a worker is to simulate: one FMU here, or a system of several elsewhere."""
+
+import sys
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from falsifier.core.model import Interface, Variable
+from falsifier.errors import FalsifierError, ModelError
+from falsifier.fmu.description import Description, misnamed_text, missing_binary_text
+from falsifier.fmu.description.archive import library_file
+from falsifier.fmu.plan import Plan, solver_tolerance
+from falsifier.fmu.process import encoding, outcome
+from falsifier.fmu.process.connection import Reply
+from falsifier.fmu.process.encoding import integers, reals, text
+from falsifier.fmu.process.policy import Policy
+from falsifier.fmu.process.room import Room
+
+
+class Order(Protocol):
+    """What a new worker needs to know, and how its replies are to be understood."""
+
+    @property
+    def name(self) -> str:
+        """Name of the model, for errors."""
+        ...
+
+    @property
+    def path(self) -> Path:
+        """The file, for errors; the name of a system."""
+        ...
+
+    @property
+    def key(self) -> Hashable:
+        """What tells models apart that cannot share a process."""
+        ...
+
+    @property
+    def archives(self) -> Mapping[str, tuple[Path, str]]:
+        """FMUs to unpack and their hashes, by the folder that each is unpacked to; "" for the top."""
+        ...
+
+    @property
+    def through_wine(self) -> bool:
+        """Whether to simulate the library for Windows."""
+        ...
+
+    @property
+    def policy(self) -> Policy:
+        """What the FMUs may do."""
+        ...
+
+    @property
+    def logging(self) -> bool:
+        """Whether to ask the FMU for messages."""
+        ...
+
+    def load(self, folder: Path, *, logging: bool) -> bytes:
+        """Return the request to load what was unpacked to a folder.
+
+        Raises:
+            ModelError: if there is no library for this machine.
+        """
+        ...
+
+    def prepare(self, plan: Plan) -> bytes:
+        """Return the request to prepare for a plan's simulations."""
+        ...
+
+    def checks(self, plan: Plan) -> Callable[[Room], None]:
+        """Return what raises a SimulationError if a value in a room does not fit its variable's type."""
+        ...
+
+    def failure(self, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
+        """Return the error for the reply to a simulation that failed; see ``outcome.failure``."""
+        ...
+
+    def component(self, position: float) -> str:
+        """Return the name of the component at a position that a worker tells; empty for a single FMU."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class FmuOrder:
+    """One FMU to simulate; see Order.
+
+    Attributes:
+        path: path of the FMU.
+        sha256: hash of the file when the model was loaded.
+        description: its description.
+        interface: interface to simulate with.
+        logging: whether to ask it for messages.
+        through_wine: whether to simulate the library for Windows.
+        policy: what it may do.
+    """
+
+    path: Path
+    sha256: str
+    description: Description
+    interface: Interface
+    logging: bool = False
+    through_wine: bool = False
+    policy: Policy = field(default_factory=Policy)
+
+    @property
+    def name(self) -> str:
+        """See Order."""
+        return self.description.info.name
+
+    @property
+    def key(self) -> Hashable:
+        """See Order."""
+        return self.sha256, self.interface, self.logging, self.through_wine, self.policy
+
+    @property
+    def archives(self) -> Mapping[str, tuple[Path, str]]:
+        """See Order."""
+        return {"": (self.path, self.sha256)}
+
+    def load(self, folder: Path, *, logging: bool) -> bytes:
+        """See Order."""
+        library = library_of(self.path, self.description, folder, self.interface, windows=self.through_wine)
+        through_wine = self.through_wine and sys.platform != "win32"
+        return encoding.fmu(
+            self.description, folder, library, self.interface, logging=logging, through_wine=through_wine
+        )
+
+    def prepare(self, plan: Plan) -> bytes:
+        """See Order."""
+        d, slots = self.description, self.description.slots
+        held, others = self._rows(plan)
+        numbers = integers(
+            plan.samples, plan.every, plan.pieces, len(plan.parameters), len(plan.inputs),
+            plan.tolerance is not None,
+        )  # fmt: skip
+        times = reals(plan.stop_time, plan.max_step, plan.tolerance or 0.0, solver_tolerance(plan, d.info))
+        parts = [numbers, times, integers(len(plan.strings))]
+        parts += [integers(slots[name].reference) + text(value) for name, value in plan.strings]
+        parts.append(encoding.ports(d, plan.parameters))
+        for rows in (others, held):
+            names = [plan.inputs[row] for row in rows]
+            parts += [encoding.inputs(d, names, plan.parameters), integers(*rows)]
+        parts.append(encoding.ports(d, plan.outputs))
+        return b"".join(parts)
+
+    def checks(self, plan: Plan) -> Callable[[Room], None]:
+        """See Order."""
+        parameters = encoding.limits(self.description, plan.parameters)
+        inputs = encoding.limits(self.description, plan.inputs)
+        limited = [bool(np.isfinite(limits).any()) for limits in (parameters, inputs)]
+
+        def check(room: Room) -> None:
+            if limited[0]:
+                outcome.check_range(self.name, plan.parameters, parameters, room.parameters[:, np.newaxis])
+            if limited[1]:
+                # Interpolated values are always between those at the ends of a piece.
+                pieces = room.inputs.reshape(len(plan.inputs), plan.pieces, 5)
+                values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
+                outcome.check_range(self.name, plan.inputs, inputs, values)
+
+        return check
+
+    def failure(self, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
+        """See Order."""
+        return outcome.failure(self.name, plan, reply, refusals, log)
+
+    def component(self, position: float) -> str:
+        """See Order."""
+        del position
+        return ""
+
+    def _rows(self, plan: Plan) -> tuple[list[int], list[int]]:
+        """Return the rows of the inputs that may change only at events, and those of the others."""
+        kinds = {v.name: v for v in self.description.info.variables}
+        held = [is_held(self.description, self.interface, kinds[name]) for name in plan.inputs]
+        return [k for k, so in enumerate(held) if so], [k for k, so in enumerate(held) if not so]
+
+
+def is_held(description: Description, interface: Interface, variable: Variable) -> bool:
+    """Whether an input may change only at events."""
+    if interface == "co-simulation":
+        return description.major == 3 and description.event_mode and variable.variability != "continuous"
+    return not variable.is_continuous
+
+
+def library_of(
+    path: Path, description: Description, folder: Path, interface: Interface, *, windows: bool
+) -> Path:
+    """Return the path of the library of an FMU that was unpacked to a folder.
+
+    Raises:
+        ModelError: if there is none for this platform, or several with other names than expected.
+    """
+    libraries = description.windows_libraries if windows else description.libraries
+    info, identifier = description.info, description.identifiers[interface]
+    if interface in libraries:
+        return folder / libraries[interface]
+    names = [p.relative_to(folder).as_posix() for p in folder.glob("binaries/*/*")]
+    said = misnamed_text(names, info.fmi_version, [identifier])
+    if not said:
+        has_sources = any((folder / "sources").rglob("*.c"))
+        wine = description.needs_wine(interface)
+        said = missing_binary_text("FMU", info.platforms, has_sources=has_sources, needs_wine=wine)
+        said += f" ({library_file(info.fmi_version, identifier)} is missing)"
+    raise ModelError(f"{path}: {said}")

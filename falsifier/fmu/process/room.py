@@ -1,0 +1,131 @@
+"""The memory through which a worker receives parameters and inputs and returns outputs."""
+
+import mmap
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core import operating_system
+from falsifier.fmu.plan import Plan
+
+# Numbers at its start; their positions are those of ``enum header`` in worker.h.
+HEADER = 8
+_RUNNING, _SIMULATED = 0, 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """Arrays that a plan's simulations read from and write to.
+
+    Attributes:
+        header: what the worker tells while it simulates, shape (8,); it may write anything there.
+        parameters: values to set, shape (parameters,).
+        inputs: each input as a piecewise cubic (``Signal.pieces``), shape (inputs, 5 * pieces); unused pieces
+            start at inf.
+        outputs: recorded values by output and sample, shape (outputs, samples).
+    """
+
+    header: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+
+    @staticmethod
+    def size(plan: Plan) -> int:
+        """Return the number of float64 values that a plan needs."""
+        rows = len(plan.inputs) * 5 * plan.pieces + len(plan.outputs) * plan.samples
+        return HEADER + len(plan.parameters) + rows
+
+    @classmethod
+    def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
+        """Return a plan's arrays as views of a flat array of at least ``size`` float64 values."""
+        a = HEADER + len(plan.parameters)
+        b = a + len(plan.inputs) * 5 * plan.pieces
+        c = b + len(plan.outputs) * plan.samples
+        return cls(
+            memory[:HEADER],
+            memory[HEADER:a],
+            memory[a:b].reshape(len(plan.inputs), 5 * plan.pieces),
+            memory[b:c].reshape(len(plan.outputs), plan.samples),
+        )
+
+
+class Memory:
+    """Float64 values that this process and a worker share; they can become more.
+
+    Where no process can shorten the file, both map it. Elsewhere this process would die with it, and so it
+    writes and reads the file instead.
+
+    Args:
+        path: of the file, for a worker that cannot get a descriptor; None: it has no name.
+
+    Attributes:
+        values: the values.
+        path: as above.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        if path is None:
+            self._file = operating_system.sealed_file(0, may_grow=True)
+        else:
+            self._file = path.open("x+b", buffering=0)
+        self._is_mapped = path is None and operating_system.can_seal()
+        self.values: NDArray[np.float64] = np.zeros(0)
+
+    def fileno(self) -> int:
+        """Descriptor of the file."""
+        return self._file.fileno()
+
+    def fit(self, count: int) -> None:
+        """Make room for at least this many values.
+
+        Raises:
+            OSError: if there is none, or files may not be so large.
+        """
+        if count <= len(self.values):
+            return
+        try:
+            self._file.truncate(8 * count)
+        except OSError as error:
+            error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
+            raise
+        if self._is_mapped:
+            self.values = np.frombuffer(mmap.mmap(self.fileno(), 8 * count), dtype=np.float64)
+        else:
+            self.values = np.zeros(count)
+
+    def give(self) -> None:
+        """Let the worker see the values."""
+        if not self._is_mapped:
+            operating_system.write_at(self.fileno(), self.values.tobytes(), 0)
+
+    def take(self) -> None:
+        """See what the worker has written."""
+        if not self._is_mapped:
+            read = operating_system.read_at(self.fileno(), self.values.nbytes, 0)
+            found = np.frombuffer(read[: len(read) // 8 * 8], dtype=np.float64)
+            self.values[: len(found)] = found
+            self.values[len(found) :] = np.nan
+
+    @property
+    def component(self) -> float:
+        """Position of the component of a system that runs, as the worker says."""
+        return float(self._header()[_RUNNING])
+
+    @property
+    def simulated(self) -> float:
+        """Time in s that has been simulated, as the worker says."""
+        return float(self._header()[_SIMULATED])
+
+    def close(self) -> None:
+        """Close the file; the values stay."""
+        self._file.close()
+
+    def _header(self) -> NDArray[np.float64]:
+        if self._is_mapped or self._file.closed:
+            return self.values if len(self.values) >= HEADER else np.zeros(HEADER)
+        read = operating_system.read_at(self.fileno(), 8 * HEADER, 0)
+        return np.frombuffer(read.ljust(8 * HEADER, b"\0"), dtype=np.float64)

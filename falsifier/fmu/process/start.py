@@ -1,0 +1,245 @@
+"""Starting workers: the folder of this process's workers, unpacked FMUs, and the program that runs them."""
+
+import os
+import signal
+import stat
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+
+from falsifier.core import operating_system
+from falsifier.core.memory import check_memory_limits
+from falsifier.errors import ModelError
+from falsifier.fmu import folders
+from falsifier.fmu.description.archive import extract, file_hash, this_platform
+from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
+from falsifier.fmu.output import Output
+from falsifier.fmu.process.encoding import text
+from falsifier.fmu.process.environment import protect_secrets, worker_environment
+from falsifier.fmu.process.policy import Policy, encoded, hidden_places
+from falsifier.fmu.process.room import Memory
+
+WORKER = Path(__file__).parents[1] / "worker"
+# Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
+_MEMORY_SHARE = 0.8
+# What Wine would start besides the worker, or ask the user to install.
+_OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
+# Exceptions of Windows by the signals that the same mistakes have elsewhere.
+_SIGNALS = {
+    0xC0000005: "SIGSEGV",  # access violation
+    0xC00000FD: "SIGSEGV",  # stack overflow
+    0xC000001D: "SIGILL",
+    0xC0000094: "SIGFPE",  # integer division by zero
+    0xC0000374: "SIGABRT",  # damaged heap
+}
+
+
+class Workplace:
+    """The folder of this process's workers, and the FMUs that are unpacked to it.
+
+    Raises:
+        MachineError: if processes may not use enough memory.
+    """
+
+    def __init__(self) -> None:
+        check_memory_limits()
+        protect_secrets(os.environ)
+        folders.sweep()
+        self._folder = folders.WorkFolder()
+        self._lock = threading.Lock()
+
+    @property
+    def root(self) -> Path:
+        """The folder."""
+        return self._folder.path
+
+    def unpacked(self, archives: Mapping[str, tuple[Path, str]]) -> Path:
+        """Return the folder to which FMUs are unpacked; unpack them if necessary.
+
+        Two components with the same FMU get a folder each: a library that is loaded from two files has its
+        static data twice.
+
+        Raises:
+            ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
+        """
+        key = sha256(repr([(name, sha) for name, (_, sha) in archives.items()]).encode()).hexdigest()[:16]
+        folder = self.root / key
+        with self._lock:
+            if not folder.is_dir():
+                partial = folder.with_suffix(".partial")
+                for name, (path, sha) in archives.items():
+                    _extract(path, sha, partial / name)
+                partial.rename(folder)
+        return folder
+
+    def scratch(self) -> Path:
+        """Return a new folder for one worker."""
+        return Path(tempfile.mkdtemp(prefix="work-", dir=self.root))
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        self._folder.remove()
+
+    def forget(self) -> None:
+        """Leave the folder to another process, of which this is a copy."""
+        self._folder.forget()
+
+
+class Started:
+    """A worker's process with what belongs to it.
+
+    Args:
+        workplace: the folder of all workers.
+        folder: where its FMUs are.
+        policy: what these may do.
+        through_wine: whether it is the program for Windows, on another system.
+
+    Attributes:
+        program: the process.
+        output: what it prints.
+        memory: what it shares with this process.
+        scratch: its folder.
+
+    Raises:
+        ModelError: if there is no program for this machine, or Wine is not installed.
+    """
+
+    def __init__(self, workplace: Workplace, folder: Path, policy: Policy, *, through_wine: bool) -> None:
+        self._is_wine = through_wine and sys.platform != "win32"
+        path = worker_program(workplace.root)
+        command: tuple[str, ...] = ()
+        if self._is_wine:
+            command = (_wine(), windows_path(worker_program(workplace.root, windows=True)))
+        self.scratch = workplace.scratch()
+        self.output = Output()
+        environment = worker_environment(os.environ, self.scratch)
+        replies = None
+        if self._is_wine:
+            _make_prefix(self.scratch / "prefix")
+            environment = _wine_environment(environment, self.scratch)
+            replies = self.scratch / "replies"
+        needs_path = self._is_wine or sys.platform == "win32"
+        self.memory = Memory(self.scratch / "memory" if needs_path else None)
+        try:
+            memory = int(operating_system.machine_memory() * _MEMORY_SHARE)
+            told = encoded(policy, (self.scratch, folder), _hidden(), memory=memory, command=command)
+            self.program = operating_system.Program(
+                [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), replies
+            )
+        except BaseException as error:
+            self._close()
+            if isinstance(error, OSError):
+                raise ModelError(f"{path} cannot be started: {error}") from error
+            raise
+
+    @property
+    def connect(self) -> bytes:
+        """What the worker is told first."""
+        place = self.program.replies_place
+        return text(self.known(Path(place)) if place and self._is_wine else place)
+
+    @property
+    def place(self) -> str:
+        """What the worker is told of where the memory is."""
+        return "" if self.memory.path is None else self.known(self.memory.path)
+
+    def known(self, path: Path) -> str:
+        """Return the path by which the worker knows a file."""
+        return windows_path(path) if self._is_wine else str(path)
+
+    def end(self) -> int:
+        """End the process and remove its folder; return the exit code, negative for a signal."""
+        code = self.program.end()
+        self._close()
+        return code
+
+    def forget(self) -> None:
+        """Leave the process to another one, of which this is a copy."""
+        self.program.forget()
+
+    def _close(self) -> None:
+        self.output.close()
+        self.memory.close()
+        operating_system.remove_tree(self.scratch)
+
+
+def crash_code(exception: int) -> int:
+    """Return the exit code that an exception of Windows has elsewhere: minus the number of a signal."""
+    name = _SIGNALS.get(exception)
+    number = getattr(signal, name, None) if name else None
+    return -int(number) if number is not None else exception & 0xFF
+
+
+@lru_cache(maxsize=1)
+def _hidden() -> tuple[str, ...]:
+    return hidden_places(os.environ, Path.home(), is_root=operating_system.is_root())
+
+
+def worker_program(root: Path, *, windows: bool = False) -> Path:
+    """Return the path of the program that runs FMUs.
+
+    Args:
+        root: folder for a copy, if the installed one may not be executed.
+        windows: whether it is the program for Windows, which is executed by Wine.
+
+    Raises:
+        ModelError: if there is none for this machine.
+    """
+    platform = "x86_64-windows" if windows else this_platform()
+    suffix = ".exe" if platform.endswith("-windows") else ""
+    path = WORKER / "bin" / platform / f"worker{suffix}"
+    if not path.is_file():
+        raise ModelError(f"there is no program to run FMUs on {platform}: {path} is missing")
+    if windows or os.access(path, os.X_OK):
+        return path
+    copy = root / path.name
+    if not copy.exists():
+        copy.write_bytes(path.read_bytes())
+        copy.chmod(stat.S_IRWXU)
+    return copy
+
+
+def _extract(path: Path, sha: str, folder: Path) -> None:
+    if file_hash(path) != sha:
+        raise ModelError(f"{path}: the file has changed since the model was loaded; load the model again")
+    extract(path, folder)
+
+
+def _wine() -> str:
+    wine = find_wine()
+    if wine is None:
+        raise ModelError(f"Windows libraries run through Wine, which is missing: {HOW_TO_INSTALL}")
+    return str(wine)
+
+
+def _make_prefix(prefix: Path) -> None:
+    """Make the least that Wine takes for a Windows installation."""
+    (prefix / "drive_c" / "windows" / "system32").mkdir(parents=True)
+    drives = prefix / "dosdevices"
+    drives.mkdir()
+    (drives / "c:").symlink_to("../drive_c")
+    (drives / "z:").symlink_to("/")
+
+
+def _wine_environment(environment: Mapping[str, str], scratch: Path) -> dict[str, str]:
+    """Return the environment of Wine, which shares nothing with the user's; it gets no screen."""
+    return {
+        **environment,
+        "WINEPREFIX": str(scratch / "prefix"),
+        "WINEARCH": "win64",
+        "LC_ALL": "C.UTF-8",  # for the names of files
+        "WINEDEBUG": "-all",
+        "WINEDLLOVERRIDES": _OVERRIDES,
+        # Without an installation, Wine finds its own libraries only in this mode.
+        "WINEBOOTSTRAPMODE": "1",
+        "WINETEMP": windows_path(scratch),
+        "WINETMP": windows_path(scratch),
+        "TEMP": windows_path(scratch),
+        "TMP": windows_path(scratch),
+        "SystemRoot": "C:\\windows",
+        "windir": "C:\\windows",
+    }
