@@ -41,9 +41,11 @@ from falsifier.counterexamples.store import (
     Database,
     Replayed,
     StoredCounterexample,
+    beside,
     counterexample_file,
     load,
     problem_of,
+    shrunk_file,
     to_store,
 )
 from falsifier.counterexamples.store import (
@@ -55,6 +57,7 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import shown, signed
 from falsifier.views.terminal import warn
+from falsifier.views.text import broken_lines
 
 # Shrinking usually reaches a local minimum with fewer simulations.
 _SHRINK_BUDGET = 500
@@ -147,7 +150,7 @@ def _shrink(
     from falsifier.counterexamples.shrink import shrink as shrink_violation
 
     # A link is followed, not replaced.
-    file = _beside(original, "shrunk.json") if out is None else out.resolve()
+    file = shrunk_file(original) if out is None else out.resolve()
     check_out(file, beginnings=(b'{\n  "format"',), kept=original)
     with _problem(stored) as problem:
         shrunk = shrink_violation(
@@ -171,6 +174,8 @@ def _shrink(
         return
     say(shrunk_line(problem, shrunk, budget))
     say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
+    for line in broken_lines(confirmation.evaluation.verdict):
+        say(f"  {'what broke':<13}  {line}")
     half = ", half of the original's; --margin changes it" if margin is None else ""
     say(f"  margin         at least {shown(shrunk.least_margin):.6g} was kept{half}")
     for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
@@ -194,18 +199,18 @@ def explain(
     requirement: str | None,
     as_json: bool,
 ) -> None:
-    """Explain in one paragraph why a counterexample violates and which inputs are necessary.
+    """Explain in one paragraph what broke, and what resetting each input alone comes to.
 
-    RUN is a run directory or a counterexample file. Of a run that falsified nothing, the simulation that came
-    nearest to a violation is explained, and drawn as nearest-miss.png. With --llm, a language model describes
-    it in its own words, too.
+    RUN is a run directory, whose shrunk counterexample is taken if there is one, or a counterexample file.
+    Of a run that falsified nothing, the simulation that came nearest to a violation is explained, and drawn
+    as nearest-miss.png. With --llm, a language model describes it in its own words, too.
     """
     from falsifier.counterexamples.explain import explain as explain_violation
     from falsifier.counterexamples.explain import narrate
 
     if llm is None and (effort is not None or api_base is not None):
         raise click.UsageError("--effort and --api-base require --llm NAME")
-    found = asked_about(run, requirement)
+    found = asked_about(run, requirement, shrunk=True)
     chat = None
     if llm is not None:
         from falsifier.llm.connect import connect
@@ -216,14 +221,14 @@ def explain(
         picture = draw_nearest_miss(found, problem, evaluation) if isinstance(found, NearestMiss) else None
     words = narrate(explanation, chat) if chat else None
     if as_json:
-        effects = [{**asdict(e), "needed": e.needed} for e in explanation.effects]
+        effects = [asdict(e) for e in explanation.effects]
         told = {"llm": llm, "words": words} if words else None
-        content = {"violated": explanation.violated, "text": explanation.text, "effects": effects}
+        content: dict[str, Any] = {"violated": explanation.violated, "text": explanation.text}
+        content |= {"effects": effects, "about": _about(found)}
         content |= {"told_by": told, "picture": picture and str(picture)}
         say(json.dumps(content, indent=2))
         return
-    if isinstance(found, NearestMiss):
-        say(one_line(nearest_miss_line(found)))
+    _say_about(found, problem)
     say(explanation.text)
     if words is not None:
         say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
@@ -243,7 +248,7 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
     from falsifier.counterexamples.export import export_counterexample
 
     stored = load(run)
-    directory = out or _beside(run, "export")
+    directory = out or beside(counterexample_file(run), "export")
     with _problem(stored) as problem:
         written = export_counterexample(problem, stored, _simulated(stored, problem), directory)
     if store is not None:
@@ -282,15 +287,14 @@ def robustness_map(
 ) -> None:
     """Change the inputs of a counterexample at random and plot where they still violate.
 
-    RUN is a run directory or a counterexample file. Of a run that falsified nothing, the inputs that came
-    nearest to a violation are changed.
+    RUN is a run directory, whose shrunk counterexample is taken if there is one, or a counterexample file.
+    Of a run that falsified nothing, the inputs that came nearest to a violation are changed.
     """
     from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
-    about, name = asked_about(run, requirement), "robustness-map.png"
-    beside = about.beside(name) if isinstance(about, NearestMiss) else _beside(about[0], name)
-    picture = out or beside
+    about, name = asked_about(run, requirement, shrunk=True), "robustness-map.png"
+    picture = out or (about.beside(name) if isinstance(about, NearestMiss) else beside(about[0], name))
     with _subject(about) as (problem, evaluation):
         found = robustness_map(problem, evaluation, radius=radius, samples=samples, points=grid, seed=seed)
     save_figure(plot_robustness_map(found, problem.name), picture)
@@ -299,22 +303,32 @@ def robustness_map(
             "original": found.original,
             "smallest": found.smallest,
             "persistence": [{"size": size, "share": share} for size, share in found.persistence],
-            "deciding": [found.coordinates[i].label for i in found.axes],
+            "rank_correlations": {
+                c.label: r for c, r in zip(found.coordinates, found.influences, strict=True)
+            },
+            "about": _about(about),
             "picture": str(picture),
         }
         say(json.dumps(content, indent=2))
         return
-    if isinstance(about, NearestMiss):
-        say(one_line(nearest_miss_line(about)))
+    _say_about(about, problem)
     say(f"{problem.name}: {found.text}")
     say(f"  picture        {picture}")
 
 
-def _beside(run: Path, name: str) -> Path:
-    """Path next to a counterexample's file, with its suffix if the directory contains several."""
-    file, place = counterexample_file(run), Path(name)
-    which = file.stem.removeprefix("counterexample") if file.stem.startswith("counterexample-") else ""
-    return file.with_name(f"{place.stem}{which}{place.suffix}")
+def _about(found: Subject) -> str:
+    """The file of a counterexample, or the run directory of a nearest miss."""
+    return str(found.directory if isinstance(found, NearestMiss) else found[0])
+
+
+def _say_about(found: Subject, problem: Problem) -> None:
+    """Say what a text is about if that is not simply the counterexample that was named."""
+    if isinstance(found, NearestMiss):
+        say(one_line(nearest_miss_line(found)))
+    elif found[0].stem.startswith("shrunk"):
+        say(f"{found[0]}, the shrunk counterexample:")
+        for line in candidate_lines(Candidate.from_json(found[1].candidate), problem.space):
+            say(f"  {line}")
 
 
 @contextmanager

@@ -1,8 +1,8 @@
-"""Why a counterexample violates, or a near miss does not: what decided it, and which inputs matter.
+"""Why a counterexample violates, or a near miss does not: what broke, and what came of resetting each input.
 
-The monitor provides the path from the formula to the deciding predicate. Ablation shows which inputs matter:
-each signal, each of its stretches and each parameter is reset to rest, one at a time, and the model is
-simulated again.
+Each signal, each of its stretches and each parameter is reset to rest, one at a time, and the model is
+simulated again. That shows what one change did. It does not show that an input is needed, nor that it has no
+effect: several at once may do what none does alone.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ _NARRATOR = (
 )
 _VIOLATES = "why a simulated system violates a requirement"
 _HOLDS = "how near a simulated system comes to violating a requirement, which it does not violate"
-# Rows of the trajectory shown to a language model, in addition to the critical one.
+# Rows of the trajectory shown to a language model, in addition to those that matter.
 _ROWS = 21
 # Maximum number of stretches of one signal that are reset one at a time; the longest are chosen.
 _MAX_STRETCHES = 12
@@ -41,33 +41,23 @@ _MAX_STRETCHES = 12
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What happens if one part of a counterexample is reset.
+    """What came of resetting one part of a counterexample alone.
 
     Attributes:
         name: name of the input or parameter.
         span: start and end in s of the reset part; None for a parameter or a whole signal.
         instead: the value it was reset to.
         is_rest: whether that is the rest value; otherwise it is the middle of the range.
-        was_rest: whether the part was already at rest in the counterexample.
         robustness: robustness after the reset; None if the simulation failed.
+        violated: whether the requirement was violated after the reset.
     """
 
     name: str
     span: tuple[float, float] | None
     instead: float
     is_rest: bool
-    was_rest: bool
     robustness: float | None
-
-    @property
-    def needed(self) -> bool:
-        """Whether the violation disappears without this part."""
-        return self.robustness is not None and self.robustness >= 0
-
-    @property
-    def told(self) -> str:
-        """The robustness as it is shown."""
-        return signed(self.robustness, 4)
+    violated: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,88 +81,69 @@ class Explanation:
         """The explanation in one paragraph."""
         requirement = self.problem.requirement
         demand = requirement.description or in_words(requirement.formula)
-        robustness = self.diagnosis.robustness
-        named = "robustness, the margin by which it holds"
-        if is_on_limit(robustness):
-            meaning = margin_words(robustness, str(self.diagnosis.path[-1].formula))
-            found = f"It {'is ' if self.violated else ''}{meaning}"
-        elif self.violated:
-            found = f"It is violated by {-robustness:.5g} ({named}: {robustness:+.5g})"
-        else:
-            found = f"It is not violated here; {robustness:.5g} is missing to a violation ({named})"
-        sentences = [
-            f"{self.problem.name} requires: {demand.rstrip('.')}.",
-            f"{found}: {self.diagnosis.plain}",
-            *(self._effect_sentences() if self.violated else self._miss_sentences()),
-        ]
-        return " ".join(sentences)
+        return " ".join(
+            (f"{self.problem.name} requires: {demand.rstrip('.')}.", *self._found(), *self._tried())
+        )
 
     @property
     def violated(self) -> bool:
         """Whether the requirement is violated; otherwise the simulation is a near miss."""
-        return self.diagnosis.robustness < 0
+        return self.evaluation.violated
 
-    def _miss_sentences(self) -> Iterator[str]:
-        """What brings the simulation near a violation, strongest first, then what does not."""
-        here = self.diagnosis.robustness
+    def _found(self) -> Iterator[str]:
+        verdict, robustness = self.evaluation.verdict, self.diagnosis.robustness
+        named = "robustness, the margin by which it holds"
+        if verdict is None or verdict.breach is None:
+            found = f"It is not violated here; {shown(robustness):.5g} is missing to a violation ({named})"
+            if is_on_limit(robustness):
+                found = f"It {margin_words(robustness, str(self.diagnosis.path[-1].formula))}"
+            yield f"{found}: {self.diagnosis.plain}"
+            return
+        yield f"What broke: {verdict.breach.text}."
+        decided = f"decided by {verdict.predicate} at {verdict.critical_time:.5g} s"
+        limit = f": {margin_words(robustness, verdict.predicate)}" if is_on_limit(robustness) else ""
+        yield f"The {named}, is {signed(robustness, 5)}, {decided}{limit}."
+        yield from (vacuity.text for vacuity in self.diagnosis.vacuities)
+
+    def _tried(self) -> Iterator[str]:
+        """What came of resetting each part alone, and no conclusion from it; the largest robustness first."""
         whole = [e for e in self.effects if e.span is None]
-        for e in sorted(whole, key=lambda e: -inf if e.robustness is None else -e.robustness):
-            part, instead = self._part(e), self._instead(e)
-            if e.robustness is None:
-                yield f"With {e.name} {instead} the simulation fails."
-            elif e.robustness < 0:
-                yield (
-                    f"With {e.name} {instead} the requirement would be violated by "
-                    f"{-shown(e.robustness):.4g}, which is not confirmed yet."
-                )
-            elif e.robustness > here:
-                yield f"{part} brings it near: {instead} robustness would be {e.told}."
-            elif e.robustness == here:
-                yield f"{part} makes no difference: {instead} robustness would be the same."
-            else:
-                yield f"{part} keeps it away: {instead} robustness would be {e.told}, nearer."
-        for name in dict.fromkeys(e.name for e in whole if (e.robustness or 0.0) > here):
-            spans = [e for e in self.effects if e.name == name and e.span is not None]
-            yield from map(self._stretch, sorted(spans, key=lambda e: -(e.robustness or 0.0))[:1])
+        for effect in sorted(whole, key=lambda e: inf if e.robustness is None else -e.robustness):
+            yield self._told(effect)
+            yield from map(self._told, self._stretches(effect))
+        if len(whole) > 1:
+            yield "Each was reset alone; several at once were not tried."
 
-    def _effect_sentences(self) -> Iterator[str]:
-        whole = [e for e in self.effects if e.span is None]
-        needed = sorted((e for e in whole if e.needed), key=lambda e: -(e.robustness or 0.0))
-        for e in needed:
-            yield f"{self._part(e)} is necessary: {self._instead(e)} robustness would be {e.told}."
-        for e in whole:
-            if e.robustness is not None and not e.needed:
-                part, instead = self._part(e), self._instead(e)
-                yield f"{part} is not necessary: {instead} robustness would still be {e.told}."
-        for name in dict.fromkeys(e.name for e in needed):
-            spans = [e for e in self.effects if e.name == name and e.span is not None]
-            decisive = [e for e in spans if e.needed]
-            if len(decisive) < len(spans):  # otherwise the whole signal matters, as stated already
-                yield from map(self._stretch, decisive)
-        for e in whole:
-            if e.robustness is None:
-                yield f"With {e.name} {self._instead(e)} the simulation fails."
+    def _stretches(self, whole: Effect) -> list[Effect]:
+        """The stretches of a signal that alone do what resetting all of it does, unless all of them do."""
+        spans = [e for e in self.effects if e.name == whole.name and e.span is not None]
+        if self.violated:
+            kept = [e for e in spans if not (whole.violated or e.violated or e.robustness is None)]
+            return kept if len(kept) < len(spans) else []
+        rising = (whole.robustness or 0.0) > self.diagnosis.robustness
+        return sorted(spans, key=lambda e: -(e.robustness or 0.0))[:1] if rising else []
 
-    def _part(self, effect: Effect) -> str:
-        """The part at the start of a sentence."""
-        part = _capitalized(effect.name)
-        return f"{part} {self._rest(effect)}" if effect.was_rest else part
-
-    def _stretch(self, effect: Effect) -> str:
-        start, end = effect.span or (0.0, 0.0)
-        return (
-            f"{_capitalized(effect.name)} is decisive from {start:.4g} to {end:.4g} s: "
-            f"{self._instead(effect)} during that time robustness would be {effect.told}."
-        )
+    def _told(self, effect: Effect) -> str:
+        during = "" if effect.span is None else " from {:.4g} to {:.4g} s".format(*effect.span)
+        what = f"With {effect.name} {self._instead(effect)}{during} alone"
+        if effect.robustness is None:
+            return f"{what}, the simulation fails."
+        if self.violated:
+            came = "still violated" if effect.violated else "not violated"
+        elif effect.violated:
+            came = "violated, which is not confirmed yet"
+        else:
+            change = effect.robustness - self.diagnosis.robustness
+            came = "farther from a violation" if change > 0 else "nearer to one"
+            came = "the same" if is_on_limit(change) else came
+        return f"{what}: {signed(effect.robustness, 4)}, {came}."
 
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
         number = f"{effect.instead:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
-        return f"{self._rest(effect) if effect.is_rest else 'at the middle of its range'} ({number})"
-
-    def _rest(self, effect: Effect) -> str:
         is_parameter = any(p.name == effect.name for p in self.problem.space.parameters)
-        return "at its nominal value" if is_parameter else "at rest"
+        rest = "at its nominal value" if is_parameter else "at rest"
+        return f"{rest if effect.is_rest else 'at the middle of its range'} ({number})"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
@@ -217,9 +188,8 @@ def _findings(explanation: Explanation) -> str:
         if v.name in trajectory.names or v.name in evaluation.candidate.parameters
     ]
     last = len(trajectory) - 1
-    samples = sorted(
-        {*np.linspace(0, last, _ROWS).astype(int), trajectory.index(explanation.diagnosis.critical_time)}
-    )
+    times = (explanation.diagnosis.critical_time, evaluation.verdict.moment if evaluation.verdict else 0.0)
+    samples = sorted({*np.linspace(0, last, _ROWS).astype(int), *map(trajectory.index, times)})
     rows = [
         ", ".join(f"{x:.5g}" for x in (trajectory.times[k], *(trajectory[n][k] for n in trajectory.names)))
         for k in samples
@@ -243,21 +213,23 @@ def _findings(explanation: Explanation) -> str:
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
     for r in problem.space.inputs:
         nominal = _nominal(problem, r, candidate.signals[r.name].values)
-        changed = with_signal(candidate, r.name, constant_signal(problem, r, nominal.value))
-        yield nominal.effect(None, _robustness(problem, changed))
+        reset = with_signal(candidate, r.name, constant_signal(problem, r, nominal.value))
+        if any(v != nominal.value for v in candidate.signals[r.name].values):
+            yield nominal.effect(None, _reset(problem, reset))
     for p in problem.space.parameters:
         nominal = _nominal(problem, p, (candidate.parameters[p.name],))
-        changed = replace(candidate, parameters={**candidate.parameters, p.name: nominal.value})
-        yield nominal.effect(None, _robustness(problem, changed))
+        if candidate.parameters[p.name] != nominal.value:
+            reset = replace(candidate, parameters={**candidate.parameters, p.name: nominal.value})
+            yield nominal.effect(None, _reset(problem, reset))
     for r in problem.space.inputs:
         signal = candidate.signals[r.name]
         nominal = _nominal(problem, r, signal.values)
         for first, end in _longest(signal):
             values = (*signal.values[:first], *(nominal.value,) * (end - first), *signal.values[end:])
             if values != signal.values:
-                changed = with_signal(candidate, r.name, replace(signal, values=values))
+                reset = with_signal(candidate, r.name, replace(signal, values=values))
                 span = _span(signal, first, end, problem.space.stop_time)
-                yield nominal.effect(span, _robustness(problem, changed))
+                yield nominal.effect(span, _reset(problem, reset))
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,19 +239,17 @@ class _Nominal:
     name: str
     value: float
     is_rest: bool
-    was_rest: bool
 
-    def effect(self, span: tuple[float, float] | None, robustness: float | None) -> Effect:
-        return Effect(self.name, span, self.value, self.is_rest, self.was_rest, robustness)
+    def effect(self, span: tuple[float, float] | None, found: Evaluation) -> Effect:
+        return Effect(self.name, span, self.value, self.is_rest, found.robustness, found.violated)
 
 
 def _nominal(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]) -> _Nominal:
     """Rest, or the middle of the range if rest is unknown or all values are at rest already."""
     rest = rest_value(problem, ranged.name)
-    was_rest = rest is not None and all(v == rest for v in values)
-    if rest is not None and not was_rest:
-        return _Nominal(ranged.name, rest, is_rest=True, was_rest=False)
-    return _Nominal(ranged.name, (ranged.low + ranged.high) / 2, is_rest=False, was_rest=was_rest)
+    if rest is not None and any(v != rest for v in values):
+        return _Nominal(ranged.name, rest, is_rest=True)
+    return _Nominal(ranged.name, (ranged.low + ranged.high) / 2, is_rest=False)
 
 
 def _longest(signal: Signal) -> list[tuple[int, int]]:
@@ -298,10 +268,5 @@ def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float
     return signal.times[max(first - 1, 0)], finish
 
 
-def _capitalized(name: str) -> str:
-    """Name at the start of a sentence; only plain words are capitalized: ``u`` is not ``U``."""
-    return name.capitalize() if len(name) > 1 and name.isalpha() and name.islower() else name
-
-
-def _robustness(problem: Problem, candidate: Candidate) -> float | None:
-    return evaluate(problem, problem.space.admit(candidate)).robustness
+def _reset(problem: Problem, candidate: Candidate) -> Evaluation:
+    return evaluate(problem, problem.space.admit(candidate))

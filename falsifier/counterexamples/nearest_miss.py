@@ -12,6 +12,7 @@ from falsifier.counterexamples.store import (
     file_of,
     keep_recorded,
     load,
+    shrunk_file,
 )
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -90,12 +91,13 @@ class NearestMiss:
 Subject = tuple[Path, StoredCounterexample] | NearestMiss
 
 
-def asked_about(place: Path, requirement: str | None = None) -> Subject:
+def asked_about(place: Path, requirement: str | None = None, *, shrunk: bool = False) -> Subject:
     """Return the counterexample of a run or file, with its file; of a run without one, its nearest miss.
 
     Args:
         place: run directory or counterexample file.
         requirement: which one, if a run searched several.
+        shrunk: whether to return what a run's counterexample was shrunk to, if it was.
 
     Raises:
         SpecError: if there is neither, or a run searched several requirements and none is named.
@@ -108,7 +110,11 @@ def asked_about(place: Path, requirement: str | None = None) -> Subject:
     described = manifest.read(place)
     name = _chosen(place, described, requirement)
     file = place / file_of(name if described.shared else "")
-    return (file, load(file)) if file.exists() else nearest_miss(place, name)
+    if not file.exists():
+        return nearest_miss(place, name)
+    simpler = shrunk_file(file)
+    file = simpler if shrunk and simpler.exists() else file
+    return file, load(file)
 
 
 def nearest_miss(directory: Path, requirement: str | None = None) -> NearestMiss:

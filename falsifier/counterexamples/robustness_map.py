@@ -63,7 +63,9 @@ class RobustnessMap:
         values: values of the coordinates, shape (samples, coordinates).
         sizes: size of each sample's change as a share of the range, shape (samples,).
         robustness: robustness of each sample, shape (samples,); NaN if the simulation failed.
-        axes: indices of the two most influential coordinates; one if there is only one.
+        influences: rank correlation of each coordinate with the robustness over the samples, -1 to 1; 0 if
+            one of them does not vary.
+        axes: indices of the two coordinates with the largest; one if there is only one.
         grid: values of these coordinates, one array each.
         surface: robustness over the grid, with the other coordinates unchanged, shape
             (len(grid[1]), len(grid[0])), or (1, len(grid[0])) with one axis.
@@ -75,6 +77,7 @@ class RobustnessMap:
     values: NDArray[np.float64]
     sizes: NDArray[np.float64]
     robustness: NDArray[np.float64]
+    influences: tuple[float, ...]
     axes: tuple[int, ...]
     grid: tuple[NDArray[np.float64], ...]
     surface: NDArray[np.float64]
@@ -101,7 +104,7 @@ class RobustnessMap:
         shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
         shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
         changes = counted(len(self.robustness), "random change")
-        return f"{shares} ({changes} of all inputs at once). {self._influential}"
+        return f"{shares} ({changes} of all inputs at once). {self._followed}"
 
     @property
     def _near_miss(self) -> str:
@@ -112,11 +115,13 @@ class RobustnessMap:
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
         least = "" if self.smallest is None else f"; the smallest robustness is {self.smallest:+.4g}"
-        return f"{found}{least}, without a change it is {self.original:+.4g}. {self._influential}"
+        return f"{found}{least}, without a change it is {self.original:+.4g}. {self._followed}"
 
     @property
-    def _influential(self) -> str:
-        return f"Most influential: {listed([self.coordinates[i].label for i in self.axes])}."
+    def _followed(self) -> str:
+        """What was measured, so that it is not taken for what resetting one input alone would do."""
+        most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
+        return f"Over these changes the robustness follows {listed(most)} most (rank correlation)."
 
 
 def robustness_map(
@@ -163,7 +168,8 @@ def robustness_map(
     values = below + unit * (above - below)
     sizes = np.abs((values - start) / (high - low)).max(axis=1)
     robustness = np.array([_robustness(problem, candidate, coordinates, row) for row in values])
-    axes = _deciding(values - start, robustness)
+    influences = _influences(values, robustness)
+    axes = tuple(int(i) for i in np.argsort(-np.abs(influences), kind="stable")[:2])
     grid = tuple(
         np.linspace(max(start[i] - reach[i], low[i]), min(start[i] + reach[i], high[i]), points) for i in axes
     )
@@ -182,6 +188,7 @@ def robustness_map(
         values,
         sizes,
         robustness,
+        tuple(influences.tolist()),
         axes,
         grid,
         np.array(surface).reshape(-1, points),
@@ -227,10 +234,14 @@ def _robustness(
     return np.nan if robustness is None else robustness
 
 
-def _deciding(changes: NDArray[np.float64], robustness: NDArray[np.float64]) -> tuple[int, ...]:
-    """Indices of the two coordinates whose ranks correlate most with those of the robustness."""
+def _influences(values: NDArray[np.float64], robustness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rank correlation of each column of values, shape (samples, coordinates), with the robustness."""
+    from scipy.stats import rankdata
+
     known = np.isfinite(robustness)
-    ranks = changes[known].argsort(axis=0).argsort(axis=0) - known.sum() / 2
-    level = robustness[known].argsort().argsort() - known.sum() / 2
-    influence = np.abs((ranks * level[:, np.newaxis]).sum(axis=0))
-    return tuple(int(i) for i in np.argsort(-influence, kind="stable")[:2])
+    if not known.any():
+        return np.zeros(values.shape[1])
+    ranks, level = rankdata(values[known], axis=0), rankdata(robustness[known])
+    ranks, level = ranks - ranks.mean(axis=0), level - level.mean()
+    spread = np.sqrt((ranks**2).sum(axis=0) * (level**2).sum())
+    return np.asarray(np.divide(level @ ranks, spread, out=np.zeros(len(spread)), where=spread > 0))

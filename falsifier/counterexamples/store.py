@@ -215,6 +215,22 @@ def file_of(requirement: str = "") -> str:
     return f"counterexample-{file_name(requirement)}.json" if requirement else FILE_NAME
 
 
+def shrunk_file(counterexample: Path) -> Path:
+    """Where ``falsifier shrink`` writes what it makes of a counterexample.
+
+    >>> shrunk_file(Path("run/counterexample-AT1.json")).name
+    'shrunk-AT1.json'
+    """
+    return beside(counterexample, "shrunk.json")
+
+
+def beside(counterexample: Path, name: str) -> Path:
+    """Path next to a counterexample's file, with its suffix if the directory contains several."""
+    place, (kind, dash, requirement) = Path(name), counterexample.stem.partition("-")
+    which = f"{dash}{requirement}" if kind in ("counterexample", "shrunk") else ""
+    return counterexample.with_name(f"{place.stem}{which}{place.suffix}")
+
+
 def keep_recorded(directory: Path) -> None:
     """Write the files of counterexamples that are only in a run directory's journal.
 
@@ -284,8 +300,10 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
         raise SimulationError(f"{problem.name}: the simulation {how}: {evaluation.reason}")
     confirmation = confirm(problem, evaluation) if evaluation.violated else None
     status = _STATUS[confirmation.outcome if confirmation else "refuted"]
+    breach = evaluation.verdict.breach if evaluation.verdict else None
+    broke = f": {breach.text};" if breach else ","
     text = (
-        f"{problem.name}: {_WORDS[status]}, robustness {signed(evaluation.robustness)} "
+        f"{problem.name}: {_WORDS[status]}{broke} robustness {signed(evaluation.robustness)} "
         f"(recorded {signed(stored.robustness)})"
     )
     text += f"; {confirmation.reason}" if confirmation else ""

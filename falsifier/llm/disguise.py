@@ -180,6 +180,7 @@ class Disguise:
             values={
                 self.names[n]: self._hidden_number(n, v) for n, v in verdict.values.items() if n in self.names
             },
+            breach=None,  # it tells real names and values
         )
 
     def canonical(self, candidate: Candidate) -> Candidate:

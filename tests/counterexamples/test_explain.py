@@ -9,35 +9,52 @@ from falsifier.counterexamples.explain import explain, narrate
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.testing import Array, lag_problem
-from tests.problems import broken
+from tests.problems import broken, conditional
 
 FREE = Freedom(10, 0.1)
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
 
 
-def test_a_signal_that_is_needed_is_named_with_what_happens_without_it() -> None:
+def test_of_each_part_is_said_what_resetting_it_alone_comes_to_and_no_more() -> None:
     problem = lag_problem(parameters=(X0,))
     explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4 + [0.5])))
     effects = {e.name: e for e in explanation.effects if e.span is None}
-    assert effects["u"].needed
-    assert effects["u"].is_rest
+    assert effects["u"].is_rest and not effects["u"].violated
     # At rest x falls from 0.5 to 0: the margin is smallest at the start.
     assert effects["u"].robustness == pytest.approx(0.4)
-    assert not effects["x0"].needed
+    assert effects["x0"].violated
     assert "LAG requires: At all times from 0 to 10 s, x is at most 0.9." in explanation.text
-    assert "u is necessary: at rest (0 V) robustness would be +0.4." in explanation.text
-    text = "x0 is not necessary: at its nominal value (0) robustness would still be -0.09997."
-    assert text in explanation.text
+    told = (
+        "With u at rest (0 V) alone: +0.4, not violated. "
+        "With x0 at its nominal value (0) alone: -0.09997, still violated. "
+        "Each was reset alone; several at once were not tried."
+    )
+    assert explanation.text.endswith(told)
     assert explanation.diagnosis.critical_time == 10.0
+
+
+def test_what_broke_comes_first_and_then_what_decided() -> None:
+    problem = conditional()
+    text = explain(problem, evaluate(problem, problem.space.decode([0.95] * 4))).text
+    told = (
+        "What broke: x <= 0.5 was violated from ",
+        "; while u >= 0.9 held (u = 0.95 V at 10 s).",
+        "is -0.05, decided by u >= 0.9 at ",
+        "With u at rest (0 V) alone: +0.9, not violated.",
+    )
+    places = [text.index(part) for part in told]
+    assert places == sorted(places)
+    assert "several at once" not in text, "there is only one"
 
 
 def test_of_a_signal_the_stretches_that_count_are_named() -> None:
     problem = lag_problem("G[9,10] (x <= 0.9)", free=FREE)
     signal = Signal((0.0, 2.0, 5.0), (-1.0, 0.5, 1.0), "constant")
     explanation = explain(problem, evaluate(problem, Candidate({"u": signal})))
-    spans = {e.span: e.needed for e in explanation.effects if e.span is not None}
-    assert spans == {(0.0, 2.0): False, (2.0, 5.0): False, (5.0, 10.0): True}
-    assert "u is decisive from 5 to 10 s: at rest (0 V) during that time" in explanation.text
+    spans = {e.span: e.violated for e in explanation.effects if e.span is not None}
+    assert spans == {(0.0, 2.0): True, (2.0, 5.0): True, (5.0, 10.0): False}
+    assert "With u at rest (0 V) from 5 to 10 s alone: +" in explanation.text
+    assert "from 2 to 5 s" not in explanation.text
 
 
 def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
@@ -45,9 +62,15 @@ def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
     problem = lag_problem("G[0,10] (x >= 0.1)", parameters=(shifted,))
     explanation = explain(problem, evaluate(problem, problem.space.decode([0.0] * 4 + [0.0])))
     x0 = next(e for e in explanation.effects if e.name == "x0")
-    assert (x0.instead, x0.is_rest, x0.was_rest) == (0.5, False, True)
-    assert "x0 at its nominal value is not necessary: " in explanation.text
-    assert "at the middle of its range (0.5) robustness would still be" in explanation.text
+    assert (x0.instead, x0.is_rest) == (0.5, False)
+    assert "With x0 at the middle of its range (0.5) alone: -0.09999, still violated." in explanation.text
+
+
+def test_what_resetting_would_not_change_is_left_out() -> None:
+    problem = lag_problem(parameters=(X0,))  # the nominal value of x0 is the middle of its range
+    explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4 + [0.0])))
+    assert [e.name for e in explanation.effects] == ["u"]
+    assert "x0" not in explanation.text
 
 
 def test_a_part_without_which_the_simulation_fails_is_said() -> None:
@@ -58,7 +81,7 @@ def test_a_part_without_which_the_simulation_fails_is_said() -> None:
 
     problem = lag_problem("G[0,10] (x >= 0.5)", response=fails_at_rest)
     explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-    assert "With u at rest (0 V) the simulation fails." in explanation.text
+    assert "With u at rest (0 V) alone, the simulation fails." in explanation.text
 
 
 def test_a_failed_simulation_cannot_be_explained() -> None:
@@ -90,8 +113,8 @@ def test_of_a_near_miss_is_said_what_brings_it_near_and_what_keeps_it_away() -> 
     found = explain(problem, evaluate(problem, candidate))
     assert not found.violated
     assert "It is not violated here; " in found.text
-    assert "u brings it near: at rest (0 V) robustness would be +2." in found.text
-    assert "v keeps it away: at rest (0 V) robustness would be +1, nearer." in found.text
+    assert "With u at rest (0 V) alone: +2, farther from a violation." in found.text
+    assert "With v at rest (0 V) alone: +1, nearer to one." in found.text
     assert "counterexample" not in found.text
 
 
@@ -99,5 +122,4 @@ def test_a_violation_that_explaining_meets_is_told() -> None:
     bias = ParameterRange("bias", -1.0, 1.0, nominal=-1.0)
     problem = lag_problem("G[0,10] (x >= -0.5)", parameters=[bias])
     told = explain(problem, evaluate(problem, problem.space.decode([0.0, 0.0, 0.0, 0.0, 0.5]))).text
-    assert "With bias at its nominal value (-1) the requirement would be violated by 0.5" in told
-    assert "which is not confirmed yet" in told
+    assert "With bias at its nominal value (-1) alone: -0.5, violated, which is not confirmed yet." in told

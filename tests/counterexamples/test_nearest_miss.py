@@ -4,6 +4,7 @@ import pytest
 
 from falsifier import falsify
 from falsifier.counterexamples.nearest_miss import NearestMiss, asked_about, nearest_miss
+from falsifier.counterexamples.store import save
 from falsifier.errors import JournalError, SpecError
 from falsifier.testing import lag_problem
 from tests.problems import easy, hard, impossible
@@ -26,6 +27,12 @@ def test_a_run_with_a_counterexample_is_asked_about_that(tmp_path: Path) -> None
     assert not isinstance(found, NearestMiss)
     assert found[1].robustness < 0
     assert asked_about(found[0]) == found
+    simpler = save(found[1].model_copy(update={"reason": "shrunk"}), tmp_path / "shrunk.json")
+    assert asked_about(tmp_path) == found
+    again = asked_about(tmp_path, shrunk=True)
+    assert not isinstance(again, NearestMiss)
+    assert (again[0], again[1].reason) == (simpler, "shrunk")
+    assert asked_about(found[0], shrunk=True) == found, "the file that was named"
 
 
 def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:

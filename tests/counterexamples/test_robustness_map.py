@@ -34,6 +34,16 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
     assert found.sizes.max() <= 0.1 + 1e-12
     assert found.surface.shape == (11, 11)
     assert "100 % of changes up to 1.25 % of the range still violate, " in found.text
+    # At 10 s u has full effect, x0 almost none.
+    u, x0 = found.influences
+    assert u < -0.99 and abs(x0) < 0.3
+    assert f"the robustness follows u [V] ({u:+.2f}) and x0 ({x0:+.2f}) most (rank correlation)" in found.text
+
+
+def test_what_moves_nothing_has_no_influence() -> None:
+    flat = lag_problem("G[0,10] (x - x >= 1)", parameters=(X0,))
+    found = robustness_map(flat, evaluate(flat, flat.space.decode([1.0] * 4 + [0.0])), samples=8, points=2)
+    assert set(found.influences) == {0.0}
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:

@@ -137,6 +137,7 @@ def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
         assert real.verdict is not None and told.verdict is not None
         assert (told.verdict.robustness < 0) == (real.verdict.robustness < 0)
         foretold = settled.hidden_verdict(real.verdict)
+        assert foretold.breach is None, "it would tell real names"
         assert foretold.robustness == pytest.approx(told.verdict.robustness, abs=1e-8)
 
 

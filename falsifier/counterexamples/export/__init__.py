@@ -8,7 +8,7 @@
     MODEL.fmu                   copy of the FMU
     SYSTEM.ssp                  of a system of FMUs: its FMUs and connections, start values and inputs
     components/                 of a system: what each component saw, to simulate it alone; see components.py
-    replay.py                   simulates the FMU with FMPy only; writes outputs.csv, prints the critical time
+    replay.py                   simulates the FMU with FMPy only; writes outputs.csv, prints where it broke
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
     test_NAME.py                a pytest test that fails as long as the counterexample violates

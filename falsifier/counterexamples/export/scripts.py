@@ -9,21 +9,22 @@ from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 from falsifier.stl.margins import signed
 
-# Rows that replay.py prints before and after the critical time.
+# Rows that replay.py prints before and after the one at which what broke was farthest off.
 _SHOWN_ROWS = 3
 _LONGEST_IDENTIFIER = 80
 _FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
 _REPLAY_ABOUT = """\
-Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows at the critical time.
+Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows around what broke.
 
     pip install fmpy
     python replay.py [MODEL.fmu]
 
 {requirement}: {formula}
-Recorded robustness {robustness}, decided at t = {critical_time:.6g} s by {predicate}
+{recorded}
 """
 
 _REPLAY = '''\
@@ -78,11 +79,11 @@ with (HERE / "outputs.csv").open("w", newline="", encoding="utf-8") as file:
     writer.writerows([float(value) for value in row] for row in zip(*columns.values()))
 
 shown = {shown}
-critical = int(abs(result["time"] - {critical_time!r}).argmin())
+marked = int(abs(result["time"] - {moment!r}).argmin())
 print("".join(f"{{name:>14}}" for name in shown))
-for k in range(max(critical - {around}, 0), min(critical + {around} + 1, len(result))):
+for k in range(max(marked - {around}, 0), min(marked + {around} + 1, len(result))):
     values = "".join(f"{{float(columns[name][k]):14.6g}}" for name in shown)
-    print(values + ("  <- critical time" if k == critical else ""))
+    print(values + ({mark} if k == marked else ""))
 print(f"all {{len(result)}} rows are in outputs.csv next to this script")
 '''
 
@@ -133,13 +134,12 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     about = _REPLAY_ABOUT.format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),
-        robustness=signed(verdict.robustness),
-        critical_time=verdict.critical_time,
-        predicate=one_line(verdict.predicate),
+        recorded=recorded_lines(verdict),
     )
     return _REPLAY.format(
         about=python_docstring(about),
-        critical_time=verdict.critical_time,
+        moment=verdict.moment,
+        mark=repr(mark_of(verdict)),
         fmu=repr(model.path.name),
         fmi_type=_FMPY_TYPES[model.interface],
         stop_time=experiment.stop_time,
@@ -151,6 +151,19 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         around=_SHOWN_ROWS,
         every=round(experiment.output_interval / step),
     )
+
+
+def recorded_lines(verdict: Verdict) -> str:
+    """What broke in the recorded simulation, and what decided its robustness."""
+    broken = verdict.breach.lines if verdict.breach else ()
+    decided = f"decided at t = {verdict.critical_time:.6g} s by {verdict.predicate}"
+    return "\n".join(map(one_line, (*broken, f"Recorded robustness {signed(verdict.robustness)}, {decided}")))
+
+
+def mark_of(verdict: Verdict) -> str:
+    """What stands beside the row to look at."""
+    part = verdict.breach.main.part if verdict.breach else verdict.predicate
+    return f"  <- {'violated' if verdict.breach else 'decided by'}: {one_line(part)}"
 
 
 def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> str | None:

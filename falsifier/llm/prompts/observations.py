@@ -1,4 +1,4 @@
-"""Everything observed in one sample: what decided it, the parts of the formula, all signals over time."""
+"""Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
@@ -53,7 +53,7 @@ def summary(evaluation: Evaluation) -> Iterator[str]:
 
 
 def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator[str]:
-    """The most important lines: what decided, robustness of the parts, stays.
+    """The most important lines: what broke, what decided, robustness of the parts, stays.
 
     Args:
         view: the problem.
@@ -68,6 +68,8 @@ def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator
     monitor = monitor_for(view)
     diagnosis = monitor.diagnose(trajectory)
     clock = _clock(view)
+    if evaluation.verdict is not None and evaluation.verdict.breach is not None:
+        yield f"what broke: {evaluation.verdict.breach.text}"
     yield f"why: {diagnosis.text}"
     if close:
         yield _values_there(view, trajectory, diagnosis)

@@ -17,6 +17,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.command import ROOT
 from tests.counterexamples.export.support import AT_INPUTS, confirmed, exported
@@ -40,14 +41,31 @@ def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: P
     rows = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
     np.testing.assert_allclose(rows[:, 1], evaluation.trajectory["speed"], rtol=1e-9, atol=1e-9)
     assert evaluation.verdict is not None
-    critical = evaluation.verdict.critical_time
+    critical = evaluation.verdict.moment
     header, *shown, where = done.stdout.splitlines()
     assert header.split() == ["time", "speed"]  # the requirement speaks of nothing else
     assert [float(line.split()[0]) for line in shown] == pytest.approx(
         [critical + 0.01 * k for k in range(-3, 4)]
     )
-    assert shown[3].endswith("<- critical time")
+    assert shown[3].endswith("<- decided by: speed <= 120")
     assert "all 5001 rows are in outputs.csv" in where
+
+
+def test_the_replay_script_shows_what_broke_and_not_the_condition_that_decided() -> None:
+    problem = load_problem("AT1")
+    formula = parse("G[0,20] (speed >= 80 -> rpm <= 100)")
+    problem = replace(problem, requirement=replace(problem.requirement, formula=formula))
+    evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["held"]))
+    verdict = evaluation.verdict
+    assert verdict is not None and verdict.predicate == "speed >= 80"
+    script = replay_script(problem, evaluation, ["throttle", "brake"])
+    assert script is not None
+    told = [
+        script.index(part) for part in ("rpm <= 100 was violated from ", "while speed >= 80 held", "Recorded")
+    ]
+    assert told == sorted(told)
+    assert f'result["time"] - {verdict.moment!r}' in script
+    assert "'  <- violated: rpm <= 100'" in script
 
 
 def replayed(problem: Problem, values: list[float], directory: Path) -> dict[str, list[float]]:
@@ -140,7 +158,7 @@ def test_the_pytest_file_fails_while_the_counterexample_violates(tmp_path: Path)
         check=False,
     )
     assert done.returncode == 1
-    assert "AT1: still violated, robustness -0.21" in done.stdout
+    assert "AT1: still violated: speed <= 120 was violated from " in done.stdout
     assert load(tmp_path / FILE_NAME).robustness == evaluation.robustness
 
 

@@ -41,6 +41,13 @@ def test_it_is_told_why_and_what_all_signals_were_then() -> None:
     assert line(lines, "all signals at t = 6 s: ") == "all signals at t = 6 s: x = 1.5 m, u = 0 V"
 
 
+def test_what_broke_is_told_before_the_condition_that_decided() -> None:
+    lines = list(facts(*seen("G[0,10] (x >= 5 -> u >= 3)", np.minimum(TIMES, 5.5))))
+    assert lines[0].startswith("what broke: u >= 3 was violated from 5")
+    assert "while x >= 5 held (x = 5" in lines[0]
+    assert lines[1].startswith("why: ") and lines[1].endswith("x = 5.5 exceeds 5 by 0.5.")
+
+
 @pytest.mark.parametrize(
     ("limit", "parts"),
     [
