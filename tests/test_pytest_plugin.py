@@ -65,7 +65,7 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
         "fast is violated by a counterexample found by a search",
         "throttle [%] constant 100",
         "brake [ft.lbf] constant 0",
-        "What broke: speed <= ",
+        "  what broke     speed <= ",
         "With throttle at rest (0 %) alone: +",
         "replay with    falsifier replay counterexamples/car.fast/",
     ):

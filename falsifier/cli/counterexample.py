@@ -57,7 +57,7 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import shown, signed
 from falsifier.views.terminal import warn
-from falsifier.views.text import broken_lines
+from falsifier.views.text import broken_rows
 
 # Shrinking usually reaches a local minimum with fewer simulations.
 _SHRINK_BUDGET = 500
@@ -174,8 +174,8 @@ def _shrink(
         return
     say(shrunk_line(problem, shrunk, budget))
     say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
-    for line in broken_lines(confirmation.evaluation.verdict):
-        say(f"  {'what broke':<13}  {line}")
+    for line in broken_rows(confirmation.evaluation.verdict):
+        say(f"  {line}")
     half = ", half of the original's; --margin changes it" if margin is None else ""
     say(f"  margin         at least {shown(shrunk.least_margin):.6g} was kept{half}")
     for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
@@ -228,7 +228,7 @@ def explain(
         content |= {"told_by": told, "picture": picture and str(picture)}
         say(json.dumps(content, indent=2))
         return
-    _say_about(found, problem)
+    _say_about(found, problem, run)
     say(explanation.text)
     if words is not None:
         say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
@@ -311,7 +311,7 @@ def robustness_map(
         }
         say(json.dumps(content, indent=2))
         return
-    _say_about(about, problem)
+    _say_about(about, problem, run)
     say(f"{problem.name}: {found.text}")
     say(f"  picture        {picture}")
 
@@ -321,12 +321,12 @@ def _about(found: Subject) -> str:
     return str(found.directory if isinstance(found, NearestMiss) else found[0])
 
 
-def _say_about(found: Subject, problem: Problem) -> None:
-    """Say what a text is about if that is not simply the counterexample that was named."""
+def _say_about(found: Subject, problem: Problem, named: Path) -> None:
+    """Say what a text is about if that is not what was named."""
     if isinstance(found, NearestMiss):
         say(one_line(nearest_miss_line(found)))
-    elif found[0].stem.startswith("shrunk"):
-        say(f"{found[0]}, the shrunk counterexample:")
+    elif found[0] != named and found[0].stem.startswith("shrunk"):
+        say(f"This is about {found[0]}, the shrunk counterexample:")
         for line in candidate_lines(Candidate.from_json(found[1].candidate), problem.space):
             say(f"  {line}")
 

@@ -167,7 +167,7 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
     verdict = evaluation.verdict
     lines = []
     if verdict is not None:
-        lines += [f"  {'' if k else 'what broke':<14} {text}" for k, text in enumerate(broken_lines(verdict))]
+        lines += [f"  {line}" for line in broken_rows(verdict)]
         info = problem.info
         values = ", ".join(
             f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
@@ -186,6 +186,11 @@ def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
 def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
     """Say what broke, and what made it necessary; nothing of what is not violated."""
     return verdict.breach.lines if verdict is not None and verdict.breach is not None else ()
+
+
+def broken_rows(verdict: Verdict | None) -> list[str]:
+    """The same, as rows of a table of facts."""
+    return [f"{'' if k else 'what broke':<14} {text}" for k, text in enumerate(broken_lines(verdict))]
 
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:

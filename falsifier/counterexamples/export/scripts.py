@@ -134,12 +134,12 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     about = _REPLAY_ABOUT.format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),
-        recorded=recorded_lines(verdict),
+        recorded=_recorded_lines(verdict),
     )
     return _REPLAY.format(
         about=python_docstring(about),
         moment=verdict.moment,
-        mark=repr(mark_of(verdict)),
+        mark=repr(_mark_of(verdict)),
         fmu=repr(model.path.name),
         fmi_type=_FMPY_TYPES[model.interface],
         stop_time=experiment.stop_time,
@@ -153,14 +153,14 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     )
 
 
-def recorded_lines(verdict: Verdict) -> str:
+def _recorded_lines(verdict: Verdict) -> str:
     """What broke in the recorded simulation, and what decided its robustness."""
     broken = verdict.breach.lines if verdict.breach else ()
     decided = f"decided at t = {verdict.critical_time:.6g} s by {verdict.predicate}"
     return "\n".join(map(one_line, (*broken, f"Recorded robustness {signed(verdict.robustness)}, {decided}")))
 
 
-def mark_of(verdict: Verdict) -> str:
+def _mark_of(verdict: Verdict) -> str:
     """What stands beside the row to look at."""
     part = verdict.breach.main.part if verdict.breach else verdict.predicate
     return f"  <- {'violated' if verdict.breach else 'decided by'}: {one_line(part)}"
