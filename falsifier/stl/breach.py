@@ -189,7 +189,7 @@ class _Demand(NamedTuple):
 
     def met(self, buffer: Floats, span: Span) -> Truths:
         """At which samples of a span it is met."""
-        true: Truths = self.part.over(buffer, *span) >= 0
+        true: Truths = self.part.over(buffer, *span) > 0
         return true if self.wanted else ~true
 
 
