@@ -197,7 +197,8 @@ class Experiment:
         step_size: communication step (co-simulation) or maximum solver step (model exchange) in s; None: the
             output interval.
         tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
-        time_limit: maximum wall-clock time of one simulation in s.
+        time_limit: maximum wall-clock time of one simulation in s; None: as long as it makes progress, see
+            ``falsifier.fmu.plan``.
         strings: names and values of string parameters.
 
     Raises:
@@ -209,13 +210,13 @@ class Experiment:
     outputs: tuple[str, ...]
     step_size: float | None = None
     tolerance: float | None = None
-    time_limit: float = 60.0
+    time_limit: float | None = None
     strings: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("stop_time", "output_interval", "time_limit"):
+        for name in ("stop_time", "output_interval"):
             positive(name, getattr(self, name))
-        for name in ("step_size", "tolerance"):
+        for name in ("step_size", "tolerance", "time_limit"):
             if (given := getattr(self, name)) is not None:
                 positive(name, given)
         if not isinstance(self.outputs, tuple):

@@ -3,6 +3,7 @@
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
 from falsifier.fmu.isolation import stop_simulations
+from falsifier.fmu.process import watching
 from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.ssp import is_package, read_package
@@ -26,5 +27,6 @@ __all__ = [
     "read_package",
     "resolved",
     "stop_simulations",
+    "watching",
     "with_local_files",
 ]

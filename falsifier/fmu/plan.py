@@ -8,6 +8,7 @@ from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description import Description
 
 _DEFAULT_TOLERANCE = 1e-6
+_DEFAULT_TIME_LIMIT = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,8 @@ class Plan:
         max_step: maximum step of the solver in s (model exchange).
         tolerance: relative tolerance; None for the model's default.
         time_limit: maximum wall-clock time of one simulation in s.
+        has_limit: whether that is for the whole simulation; else for each tenth of the simulated time, so
+            that slow models are simulated, and those that hang are ended.
         strings: names and values of string parameters.
     """
 
@@ -39,6 +42,7 @@ class Plan:
     tolerance: float | None
     time_limit: float
     strings: tuple[tuple[str, str], ...] = ()
+    has_limit: bool = True
 
     @property
     def steps(self) -> int:
@@ -75,8 +79,9 @@ def make_plan(
         pieces=pieces,
         max_step=experiment.step_size or experiment.output_interval,
         tolerance=experiment.tolerance,
-        time_limit=experiment.time_limit,
+        time_limit=experiment.time_limit or _DEFAULT_TIME_LIMIT,
         strings=experiment.strings,
+        has_limit=experiment.time_limit is not None,
     )
     model = description.info.name
     kinds = {v.name: v for v in description.info.variables}

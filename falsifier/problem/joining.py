@@ -19,7 +19,6 @@ from falsifier.problem.sizes import check_sizes, check_steps
 from falsifier.problem.source import MODEL_FILES
 from falsifier.problem.spec import Spec, overlay, parse_spec
 
-_DEFAULT_TIME_LIMIT = 60.0
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
 _MAX_RECORDED = 50
 
@@ -273,7 +272,7 @@ def _experiment(
         outputs=(),
         step_size=step_size,
         tolerance=stated("tolerance"),
-        time_limit=stated("time_limit") or _DEFAULT_TIME_LIMIT,
+        time_limit=stated("time_limit"),
     )
     return experiment, grid
 

@@ -111,7 +111,8 @@ class Problem:
                 smaller one that fits the stop time and the formula's times.
             step_size: communication step or maximum solver step in s; default: the output interval.
             tolerance: relative tolerance of the solver; default: the FMU's.
-            time_limit: maximum wall-clock time of one simulation in s; default: 60.
+            time_limit: maximum wall-clock time of one simulation in s; default: 60 for each tenth of the
+                simulated time.
             interface: interface of the FMU; default: co-simulation if the FMU offers it.
             context: files that a language model may read, and ``fmu`` for what lies inside the FMU.
             allow: what the FMU may do beyond changing its own folders: ``write:PATH``, ``read:PATH`` (a file
@@ -172,7 +173,8 @@ class Problem:
                 stop time and the formula's times.
             step_size: communication step in s; default: the output interval.
             tolerance: relative tolerance of the components' solvers.
-            time_limit: maximum wall-clock time of one simulation in s; default: 60.
+            time_limit: maximum wall-clock time of one simulation in s; default: 60 for each tenth of the
+                simulated time.
 
         Raises:
             SpecError: naming what is wrong or unknown.

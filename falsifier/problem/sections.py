@@ -124,7 +124,8 @@ class ModelSection(Strict):
     step_size: Seconds | None = Field(None, description="Communication or maximum solver step in s.")
     tolerance: Seconds | None = Field(None, description="Relative tolerance of the solver.")
     time_limit: Seconds | None = Field(
-        None, description="Maximum wall-clock time of one simulation in s; default: 60."
+        None,
+        description="Maximum wall-clock time of one simulation in s; default: 60 per tenth of its stop time.",
     )
     logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")

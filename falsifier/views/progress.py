@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
+from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search.events import (
     Asked,
@@ -79,7 +80,11 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                 case _:
                     pass
 
-        yield unbroken(show)
+        def tell(_name: str, reached: float, stop_time: float) -> None:
+            progress.update(task, note=f"simulated {reached:.4g} of {stop_time:g} s")
+
+        with watching(tell):
+            yield unbroken(show)
 
 
 def progress() -> Listener:

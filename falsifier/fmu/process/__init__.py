@@ -1,6 +1,7 @@
 """Processes in which FMUs run, from the side of the process that requests simulations."""
 
 from falsifier.fmu.process.order import FmuOrder, Order, is_held
+from falsifier.fmu.process.patience import watching
 from falsifier.fmu.process.registry import REGISTRY, stop_simulations
 from falsifier.fmu.process.reuse import REUSES, Reuse
 from falsifier.fmu.process.room import Room
@@ -16,4 +17,5 @@ __all__ = [
     "Runner",
     "is_held",
     "stop_simulations",
+    "watching",
 ]

@@ -101,7 +101,10 @@ def check_range(
 
 
 def _out_of_time(plan: Plan) -> str:
-    return f"after the time limit of {plan.time_limit:g} s; slow models need a larger time_limit"
+    if plan.has_limit:
+        return f"after the time limit of {plan.time_limit:g} s; slow models need a larger time_limit"
+    share = f"{plan.time_limit:g} s without another tenth of the simulated time"
+    return f"after {share}; slow models need a time_limit"
 
 
 def _reason(plan: Plan, reply: Reply) -> str:

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.plan import Plan
-from falsifier.fmu.process import outcome
+from falsifier.fmu.process import outcome, patience
 from falsifier.fmu.process.connection import Closed, Reply
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.reuse import REUSES, Experience, Reuse
 from falsifier.fmu.process.room import Room
 from falsifier.fmu.process.start import Workplace
-from falsifier.fmu.process.worker import GRACE_SECONDS, Worker
+from falsifier.fmu.process.worker import Worker
 
 
 class Runner:
@@ -138,7 +138,9 @@ class Runner:
         outputs = worker.room.outputs.copy()
         log = worker.take_log(reply)
         if worker.simulations == 1:
-            self._experience.took(time.perf_counter() - worker.started)
+            seconds = time.perf_counter() - worker.started
+            self._experience.took(seconds)
+            patience.took(self._order.name, plan, seconds)
         if reply.leaving:
             self._drop()
         return outputs, log
@@ -180,7 +182,7 @@ class Runner:
 
     def _prepare(self, worker: Worker, plan: Plan, *, is_new: bool) -> bool:
         """Prepare a worker; return False if an old one has died since its last simulation."""
-        limit = plan.time_limit + GRACE_SECONDS
+        limit = plan.time_limit + patience.GRACE_SECONDS
         try:
             if is_new:
                 self._check(worker, worker.load(limit), may_load_later=True)

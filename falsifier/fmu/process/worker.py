@@ -22,13 +22,12 @@ from falsifier.fmu.process.connection import (
 )
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
+from falsifier.fmu.process.patience import SHARES, Patience
 from falsifier.fmu.process.policy import Told, read_told
 from falsifier.fmu.process.reuse import REUSES, Reuse
 from falsifier.fmu.process.room import Room
 from falsifier.fmu.process.start import Started, Workplace, crash_code
 
-# The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
-GRACE_SECONDS = 0.1
 # A process that could not send its reply ends with this code (main.c); one that is going to end does so soon.
 _CUT_OFF, _ENDING_SECONDS = 74, 0.2
 # Wine on a busy machine.
@@ -128,7 +127,7 @@ class Worker:
         fill(self.room)
         self._check(self.room)
         self._started.memory.give()
-        payload = reals(self.plan.time_limit) + integers(0)
+        payload = reals(self.plan.time_limit) + integers(0 if self.plan.has_limit else SHARES)
         send(self._started.program, Request.SIMULATE, payload)
 
     def wait(self) -> Reply:
@@ -140,8 +139,14 @@ class Worker:
         """
         assert self.plan is not None, "it is prepared"
         started = time.perf_counter()
+        patience = Patience(self._order.name, self.plan)
         polling = QUICK_SECONDS if self._is_quick else 0.0
-        reply = self.receive(self.plan.time_limit + GRACE_SECONDS, polling)
+        while True:
+            try:
+                reply = self.receive(patience.seconds, polling)
+                break
+            except TimeoutError:
+                patience.look(self.reached)
         self._is_quick = time.perf_counter() - started < QUICK_SECONDS
         if reply.is_done:
             self._started.memory.take()

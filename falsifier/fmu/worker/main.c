@@ -119,8 +119,7 @@ static void load(struct request *r)
 static int simulate(struct request *r)
 {
     double started = now(), limit = read_number(r), reached;
-    int is_per_share = (int)read_size(r);
-    struct outcome o = simulate_again(limit, is_per_share, &reached);
+    struct outcome o = simulate_again(limit, (unsigned)read_size(r), &reached);
     int is_quick = now() - started < QUICK_SECONDS;
     int is_done = o.where == DONE, is_tested = is_done && awaits_test();
     int ends = is_done && !is_tested && is_spent();

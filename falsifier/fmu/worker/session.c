@@ -16,8 +16,6 @@
 #define MOST_INSTANCES 400
 /* Growth in memory after which a process that leaks is replaced. */
 #define MOST_GROWTH_KIB (256u << 10)
-/* Without a limit of the user, each of these shares of the simulated time has the whole limit. */
-#define SHARES 10.0
 
 static const char *const WAYS[] = {"reset", "state", "instance", "library", "process"};
 
@@ -93,12 +91,12 @@ static int is_brought_back(void)
     return 0;
 }
 
-static struct outcome run(double limit, int is_per_share, double *reached)
+static struct outcome run(double limit, unsigned shares, double *reached)
 {
     struct progress progress = {subject->header, limit, now() + limit, INFINITY, INFINITY, 0};
     subject->header[SIMULATED] = 0.0;
-    if (is_per_share)
-        progress.next = progress.share = subject->stop_time / SHARES;
+    if (shares)
+        progress.next = progress.share = subject->stop_time / shares;
     *reached = 0.0;
     if (condition != NEW && !is_brought_back()) {
         failing = renew();
@@ -120,12 +118,12 @@ static struct outcome run(double limit, int is_per_share, double *reached)
     return o;
 }
 
-/* Simulate once, within a limit in s for the whole simulation, or for each share of it. */
-struct outcome simulate_again(double limit, int is_per_share, double *reached)
+/* Simulate once, within a limit in s for the whole simulation or, unless shares is 0, for each share of it. */
+struct outcome simulate_again(double limit, unsigned shares, double *reached)
 {
     double started = now();
     instances += reuse == BY_INSTANCE || reuse == BY_LIBRARY || !instances;
-    struct outcome o = run(limit, is_per_share, reached);
+    struct outcome o = run(limit, shares, reached);
     if (o.where == DONE && !is_known && now() - started > MOST_TEST_SECONDS) {
         reuse = untrusted & 1u << BY_INSTANCE ? BY_PROCESS : BY_INSTANCE;
         is_known = 1;

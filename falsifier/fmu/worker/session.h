@@ -32,7 +32,7 @@ struct subject {
 /* session.c */
 void start_session(struct subject *subject, enum reuse reuse, unsigned untrusted);
 void prepare_session(struct request request);
-struct outcome simulate_again(double limit, int is_per_share, double *reached);
+struct outcome simulate_again(double limit, unsigned shares, double *reached);
 int awaits_test(void);  /* whether find_reuse must be called next */
 void find_reuse(void (*announce)(const char *way));
 const char *way_to_start(void);
