@@ -64,30 +64,26 @@ def main() -> None:
     """Measure and print."""
     lag, chained = FOLDER / "CheapLag_2.fmu", {"b.u": "a.y"}
     third = FOLDER / "CheapLag_3.fmu"
-    for isolate in (False, True):
-        where = "in a worker process" if isolate else "in this process"
-        chain = System({"a": lag, "b": lag}, chained, isolate=isolate)
-        closed = System({"a": lag, "b": lag}, {"b.u": "a.y", "a.u": "b.y"}, isolate=isolate)
-        runs = {
-            "one FMU": ours(FmuModel(lag), "u", "y"),
-            "two FMUs, one after the other": ours(chain, "a.u", "a.y", "b.y"),
-            "two FMUs in a loop": ours(closed, "", "a.y", "b.y"),
-            "two FMUs of FMI 3, one after the other": ours(
-                System({"a": third, "b": third}, chained, isolate=isolate), "a.u", "a.y", "b.y"
-            ),
-        }
-        if isolate:
-            each = System({"a": lag, "b": lag}, chained, coupling=Coupling(isolation="each"))
-            runs["two FMUs, each in a process of its own"] = ours(each, "a.u", "a.y", "b.y")
-        for run in runs.values():
-            for _ in range(5):
-                run()
-        best = fastest(runs, ROUNDS)
-        print(f"\n| {where} | ms | times one FMU |\n|---|---|---|")
-        for name, seconds in best.items():
-            print(f"| {name} | {1000 * seconds:.3f} | {seconds / best['one FMU']:.2f} |")
-        if not isolate:
-            against_fmpy(runs["two FMUs, one after the other"])
+    chain = System({"a": lag, "b": lag}, chained)
+    each = System({"a": lag, "b": lag}, chained, coupling=Coupling(isolation="each"))
+    closed = System({"a": lag, "b": lag}, {"b.u": "a.y", "a.u": "b.y"})
+    runs = {
+        "one FMU": ours(FmuModel(lag), "u", "y"),
+        "two FMUs, one after the other": ours(chain, "a.u", "a.y", "b.y"),
+        "two FMUs in a loop": ours(closed, "", "a.y", "b.y"),
+        "two FMUs of FMI 3, one after the other": ours(
+            System({"a": third, "b": third}, chained), "a.u", "a.y", "b.y"
+        ),
+        "two FMUs, each in a process of its own": ours(each, "a.u", "a.y", "b.y"),
+    }
+    for run in runs.values():
+        for _ in range(5):
+            run()
+    best = fastest(runs, ROUNDS)
+    print("\n| | ms | times one FMU |\n|---|---|---|")
+    for name, seconds in best.items():
+        print(f"| {name} | {1000 * seconds:.3f} | {seconds / best['one FMU']:.2f} |")
+    against_fmpy(runs["two FMUs, one after the other"])
     print(f"\n{platform.machine()}, Python {platform.python_version()}")
 
 

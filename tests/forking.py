@@ -98,7 +98,6 @@ def serve(descriptor: int) -> None:
     """Fork for each request; the copies run it and end."""
     from falsifier.llm.tokens import count_tokens
     from tests.compiling import load_common
-    from tests.spare import Spare
 
     importlib.import_module("falsifier.llm.litellm_import").load_litellm()
     large = [importlib.import_module(name) for name in _LARGE]
@@ -117,9 +116,7 @@ def serve(descriptor: int) -> None:
         pid = os.fork()
         if not pid:
             requests.close()
-            spare = Spare()
             _become(json.loads(data), streams)
-            spare.offer()
             _run_and_end()
         for stream in streams:
             os.close(stream)

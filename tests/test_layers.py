@@ -14,7 +14,7 @@ PACKAGE = Path(falsifier.__file__).parent
 ROOMS = re.findall(r"^    ([a-z]+)/ ", falsifier.__doc__ or "", re.MULTILINE)
 RANK = {name: rank for rank, name in enumerate(("errors", *ROOMS, "testing"))}
 # Who may import these, always inside a function.
-HEAVY = {"fmpy": "fmu", "rtamt": "stl/second_monitor.py", "litellm": "llm", "matplotlib": "views/plotting"}
+HEAVY = {"rtamt": "stl/second_monitor.py", "litellm": "llm", "matplotlib": "views/plotting"}
 DOOR = ("__init__", "__main__")
 
 

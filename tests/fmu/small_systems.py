@@ -10,6 +10,8 @@ from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import Component, Connection, Coupling, System
+from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.systems.system import _order
 from tests.fmu.fixtures import path
 from tests.patience import HANG
 
@@ -21,12 +23,17 @@ def system(
     components: Mapping[str, str | Component],
     connections: Mapping[str, str | Connection],
     coupling: Coupling | None = None,
-    *,
-    isolate: bool = False,
 ) -> System:
-    """A system of test FMUs in this process."""
+    """A system of test FMUs."""
     found = {n: path(each) if isinstance(each, str) else each for n, each in components.items()}
-    return System(found, connections, coupling=coupling or Coupling(), isolate=isolate)
+    return System(found, connections, coupling=coupling or Coupling())
+
+
+def pids(model: System) -> list[int]:
+    """The worker processes of a system."""
+    key = _order(model).key
+    workers = [runner._worker for (own, _), runner in REGISTRY._runners.items() if own == key]
+    return [worker.pid for worker in workers if worker is not None]
 
 
 def loop(coupling: Coupling | None = None, *, plant: str = "Plant_2", pi: str = "Gain_2") -> System:

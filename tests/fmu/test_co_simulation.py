@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import stepper
-from tests.fmu import plain
 from tests.fmu.fixtures import isolated, ramp, run
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
@@ -48,12 +46,7 @@ def test_start_values_and_parameters_are_set_before_the_start(name: str) -> None
 
 
 @pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
-@pytest.mark.parametrize("is_plain", [False, True])
-def test_every_type_goes_in_rounded_and_comes_out(
-    name: str, is_plain: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if is_plain:
-        monkeypatch.setattr(stepper, "loops", lambda: plain)
+def test_every_type_goes_in_rounded_and_comes_out(name: str) -> None:
     model = isolated(name)
     model.close()
     inputs = {v.name: ramp(1.0, 3.0 if v.kind != "boolean" else 1.0) for v in model.info.inputs}

@@ -9,7 +9,7 @@ import pytest
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.isolation import REGISTRY
+from falsifier.fmu.process import REGISTRY
 from tests.fmu.fixtures import isolated, path, run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
@@ -78,8 +78,9 @@ def test_a_wrong_number_of_states_or_indicators_is_no_defect(
 ) -> None:
     REGISTRY.close()  # so that the next worker sees the variable
     monkeypatch.setenv(name, str(number))
+    monkeypatch.setenv("FALSIFIER_FMU_VARIABLES", name)
     model = FmuModel(path("Wild_3"), "model-exchange")
-    with pytest.raises(ModelError, match=r"Wild: .* (states|indicators); expected 0 to"):
+    with pytest.raises(ModelError, match=r"Wild_3\.fmu: .* (states|indicators); expected 0 to"):
         run(model, ("x",))
     model.close()
     REGISTRY.close()

@@ -116,9 +116,7 @@ def test_workers_get_the_files_that_they_miss(tmp_path: Path, monkeypatch: pytes
     folder.mkdir()
     for name in ("Plant_2", "Gain_2"):
         (folder / f"{name}.fmu").write_bytes(path(name).read_bytes())
-    system = System(
-        {"plant": folder / "Plant_2.fmu", "pi": folder / "Gain_2.fmu"}, {"plant.u": "pi.y"}, isolate=False
-    )
+    system = System({"plant": folder / "Plant_2.fmu", "pi": folder / "Gain_2.fmu"}, {"plant.u": "pi.y"})
     problem = Problem.from_system(system, "G[0,1] (plant.y <= 5)", stop_time=1.0)
     contents = {digest: file.read_bytes() for file, digest in fmu_files(system).items()}
     for file in fmu_files(system):

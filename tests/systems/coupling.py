@@ -7,18 +7,13 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.fmu import System
 from falsifier.problem.loading import load_problems
 from falsifier.problem.problem import Problem, alike
 
 
 def problems(system: str) -> list[Problem]:
-    """The problems of a system in this process, which all record the same signals."""
-    found = []
-    for problem in load_problems(system):
-        local = replace(problem.model, isolate=False) if isinstance(problem.model, System) else problem.model
-        found.append(replace(problem, model=local))
-    (group,) = alike(found)
+    """The problems of a system, which all record the same signals."""
+    (group,) = alike(load_problems(system))
     return group
 
 

@@ -21,7 +21,7 @@ GRID = PROBLEM.experiment.times
 
 def local() -> System:
     assert isinstance(PROBLEM.model, System)
-    return replace(PROBLEM.model, isolate=False)
+    return PROBLEM.model
 
 
 def rising(left: float, right: float) -> Candidate:

@@ -186,7 +186,7 @@ class _Reader:
         return np.full(times.shape, float(value)) if isinstance(value, int | float) else None
 
     def _fed(self, link: Link, ends: NDArray[np.intp], own: int) -> tuple[Floats, Floats]:
-        """Return a connected input as coupled_stepping.py computes it."""
+        """Return a connected input as the worker computes it."""
         title = self._network.title(link.source)
         column, times = self._recorded[title], self._recorded.times
         known = ends - own if self._network.coupling.method == "jacobi" else ends - self._lateness(link)

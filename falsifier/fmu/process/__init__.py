@@ -1,6 +1,8 @@
 """Processes in which FMUs run, from the side of the process that requests simulations."""
 
-from falsifier.fmu.process.order import FmuOrder, Order, is_held
+from falsifier.fmu.process import encoding, outcome
+from falsifier.fmu.process.connection import Reply, Request, Where
+from falsifier.fmu.process.order import FmuOrder, Order, is_held, library_of, value_checks
 from falsifier.fmu.process.patience import watching
 from falsifier.fmu.process.registry import REGISTRY, stop_simulations
 from falsifier.fmu.process.reuse import REUSES, Reuse
@@ -12,10 +14,17 @@ __all__ = [
     "REUSES",
     "FmuOrder",
     "Order",
+    "Reply",
+    "Request",
     "Reuse",
     "Room",
     "Runner",
+    "Where",
+    "encoding",
     "is_held",
+    "library_of",
+    "outcome",
     "stop_simulations",
+    "value_checks",
     "watching",
 ]

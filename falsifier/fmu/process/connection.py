@@ -35,6 +35,7 @@ class Request(IntEnum):
     LOAD = 1
     PREPARE = 2
     SIMULATE = 3
+    LOAD_SYSTEM = 4
 
 
 class Where(IntEnum):
@@ -48,6 +49,12 @@ class Where(IntEnum):
     TERMINATED = 5
     STUCK = 6
     TOO_SMALL = 7
+    NOT_CONVERGED = 9
+    RESTORING = 10
+    NOT_A_NUMBER = 11
+    UNSETTLED = 12
+    MISSING_AT_FIRST = 13
+    MISSING_AFTER_START = 14
     CALLING = 20
     WRITING = 21
     TEXT = 22
@@ -69,6 +76,7 @@ class Reply:
         printed: position in its output at which the reply was sent.
         more: whether another reply follows without a request.
         leaving: whether the process ends after this reply.
+        component: position of the component of a system that has failed; -1 if unknown.
     """
 
     where: int
@@ -78,6 +86,7 @@ class Reply:
     printed: int = 0
     more: bool = False
     leaving: bool = False
+    component: int = -1
 
     @property
     def is_done(self) -> bool:

@@ -32,6 +32,10 @@ STORED: Mapping[int, Mapping[str, str]] = {
 }
 
 
+# The largest integer of a request.
+_MOST = (1 << 63) - 1
+
+
 def integers(*numbers: int) -> bytes:
     """Return integers as they are in requests."""
     return struct.pack(f"<{len(numbers)}q", *numbers)
@@ -165,8 +169,9 @@ def fmu(
         logging,
         events,
         interface in description.saves_state,
-        description.states,
-        description.indicators,
+        # A description may say anything; the worker refuses what is too many.
+        min(description.states, _MOST),
+        min(description.indicators, _MOST),
     )
     words = (
         names[0],

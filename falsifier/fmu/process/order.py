@@ -1,12 +1,13 @@
 """What a worker is to simulate: one FMU here, or a system of several elsewhere."""
 
 import sys
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import FalsifierError, ModelError
@@ -14,7 +15,7 @@ from falsifier.fmu.description import Description, misnamed_text, missing_binary
 from falsifier.fmu.description.archive import library_file
 from falsifier.fmu.plan import Plan, solver_tolerance
 from falsifier.fmu.process import encoding, outcome
-from falsifier.fmu.process.connection import Reply
+from falsifier.fmu.process.connection import Reply, Request
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.policy import Policy
 from falsifier.fmu.process.room import Room
@@ -58,6 +59,11 @@ class Order(Protocol):
         """Whether to ask the FMU for messages."""
         ...
 
+    @property
+    def kind(self) -> Request:
+        """The request with what ``load`` returns."""
+        ...
+
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """Return the request to load what was unpacked to a folder.
 
@@ -78,7 +84,7 @@ class Order(Protocol):
         """Return the error for the reply to a simulation that failed; see ``outcome.failure``."""
         ...
 
-    def component(self, position: float) -> str:
+    def component(self, position: int) -> str:
         """Return the name of the component at a position that a worker tells; empty for a single FMU."""
         ...
 
@@ -120,6 +126,11 @@ class FmuOrder:
         """See Order."""
         return {"": (self.path, self.sha256)}
 
+    @property
+    def kind(self) -> Request:
+        """See Order."""
+        return Request.LOAD
+
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""
         library = library_of(self.path, self.description, folder, self.interface, windows=self.through_wine)
@@ -148,26 +159,14 @@ class FmuOrder:
 
     def checks(self, plan: Plan) -> Callable[[Room], None]:
         """See Order."""
-        parameters = encoding.limits(self.description, plan.parameters)
-        inputs = encoding.limits(self.description, plan.inputs)
-        limited = [bool(np.isfinite(limits).any()) for limits in (parameters, inputs)]
-
-        def check(room: Room) -> None:
-            if limited[0]:
-                outcome.check_range(self.name, plan.parameters, parameters, room.parameters[:, np.newaxis])
-            if limited[1]:
-                # Interpolated values are always between those at the ends of a piece.
-                pieces = room.inputs.reshape(len(plan.inputs), plan.pieces, 5)
-                values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
-                outcome.check_range(self.name, plan.inputs, inputs, values)
-
-        return check
+        rows = [list(zip(names, range(len(names)), strict=True)) for names in (plan.parameters, plan.inputs)]
+        return value_checks(plan, [(self.description, rows[0], rows[1])])
 
     def failure(self, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
         """See Order."""
         return outcome.failure(self.name, plan, reply, refusals, log)
 
-    def component(self, position: float) -> str:
+    def component(self, position: int) -> str:
         """See Order."""
         del position
         return ""
@@ -177,6 +176,48 @@ class FmuOrder:
         kinds = {v.name: v for v in self.description.info.variables}
         held = [is_held(self.description, self.interface, kinds[name]) for name in plan.inputs]
         return [k for k, so in enumerate(held) if so], [k for k, so in enumerate(held) if not so]
+
+
+# Variables of an FMU and the rows of a plan's parameters or inputs that have their values.
+Rows = Sequence[tuple[str, int]]
+
+
+# Name of an FMU, and names, limits and rows of some of its variables.
+_Limited = tuple[str, list[str], NDArray[np.float64], list[int]]
+
+
+def value_checks(plan: Plan, fmus: Iterable[tuple[Description, Rows, Rows]]) -> Callable[[Room], None]:
+    """Return what raises a SimulationError if a value in a room does not fit its variable's type.
+
+    Args:
+        plan: what the simulations have in common.
+        fmus: FMUs, with the rows of their parameters and of their inputs.
+    """
+    parameters: list[_Limited] = []
+    inputs: list[_Limited] = []
+    for description, own_parameters, own_inputs in fmus:
+        parameters += _limited(description, own_parameters)
+        inputs += _limited(description, own_inputs)
+
+    def check(room: Room) -> None:
+        for name, names, limits, rows in parameters:
+            outcome.check_range(name, names, limits, room.parameters[rows, np.newaxis])
+        for name, names, limits, rows in inputs:
+            # Interpolated values are always between those at the ends of a piece.
+            pieces = room.inputs[rows].reshape(len(rows), plan.pieces, 5)
+            values = np.where(np.isfinite(pieces[:, :, 0]), pieces[:, :, 1], pieces[:, :1, 1])
+            outcome.check_range(name, names, limits, values)
+
+    return check
+
+
+def _limited(description: Description, rows: Rows) -> Iterator[_Limited]:
+    """Return, at most once, the FMU's name and the names, limits and rows of its limited variables."""
+    limits = encoding.limits(description, [name for name, _ in rows])
+    kept = np.flatnonzero(np.isfinite(limits).any(axis=1)).tolist()
+    if kept:
+        names, numbers = [rows[k][0] for k in kept], [rows[k][1] for k in kept]
+        yield description.info.name, names, limits[kept], numbers
 
 
 def is_held(description: Description, interface: Interface, variable: Variable) -> bool:

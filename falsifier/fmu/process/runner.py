@@ -201,7 +201,9 @@ class Runner:
     def _check(self, worker: Worker, reply: Reply, *, may_load_later: bool) -> None:
         if reply.is_done:
             return
-        text = f"{self._order.path}: {reply.text}{worker.refusals}{outcome.last_lines(worker.take_log())}"
+        name = self._order.component(reply.component)
+        said = f"{name}: {reply.text}" if name else reply.text
+        text = f"{self._order.path}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
         # What has loaded before is not unusable for that.
         raise SimulationError(text) if may_load_later and self._has_loaded else ModelError(text)
 

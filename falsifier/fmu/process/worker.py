@@ -3,8 +3,7 @@
 import contextlib
 import time
 from collections.abc import Callable
-
-import numpy as np
+from dataclasses import replace
 
 from falsifier.core.operating_system import exit_text
 from falsifier.errors import ModelError
@@ -99,7 +98,7 @@ class Worker:
             self.receive(_STARTING_SECONDS)
         except (Closed, TimeoutError) as error:
             raise ModelError(self._no_start()) from error
-        send(program, Request.LOAD, self._ways + self._load)
+        send(program, self._order.kind, self._ways + self._load)
         reply = self.receive(limit)
         self._is_loaded = reply.is_done
         return reply
@@ -160,7 +159,7 @@ class Worker:
         if reply.where == Where.CRASHED:
             self._crash = crash_code(reply.status)
             raise Closed
-        return reply
+        return reply if reply.is_done else replace(reply, component=self.position)
 
     @property
     def reached(self) -> float:
@@ -168,11 +167,15 @@ class Worker:
         return self._started.memory.simulated
 
     @property
+    def position(self) -> int:
+        """Position of the component of a system that runs or has failed; -1 if the worker tells nonsense."""
+        position = self._started.memory.component
+        return int(position) if 0 <= position < 1e9 else -1
+
+    @property
     def during(self) -> str:
         """Which component of a system was running, in words; nothing for a single FMU."""
-        # The worker may have written anything there.
-        position = self._started.memory.component
-        name = self._order.component(position) if np.isfinite(position) else ""
+        name = self._order.component(self.position)
         return f" in component {name}" if name else ""
 
     def take_log(self, reply: Reply | None = None) -> tuple[str, ...]:

@@ -139,9 +139,9 @@ class Network:
     description: Description
     places: Mapping[str, Place]
 
-    def stepped(self, position: float) -> str:
+    def stepped(self, position: int) -> str:
         """Return the name of the component at a position of the order; empty if there is none."""
-        return self.members[self.order[int(position)]].name if 0 <= position < len(self.order) else ""
+        return self.members[self.order[position]].name if 0 <= position < len(self.order) else ""
 
     def title(self, place: Place) -> str:
         """Return the name of a variable in the system."""

@@ -5,22 +5,21 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import get_args
+from typing import ClassVar, get_args
 
 from falsifier.core.arguments import instance, one_of, positive, whole
 from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu import in_process
 from falsifier.fmu.description import archive
-from falsifier.fmu.isolation import REGISTRY, IsolatedFmu
 from falsifier.fmu.plan import make_plan
+from falsifier.fmu.process import REGISTRY, Runner
 from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.systems.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
+from falsifier.fmu.systems.order import SystemOrder
 from falsifier.fmu.systems.wiring import Connection, make_network
 from falsifier.fmu.tasks import Task, make_task, room_for, run_task
-from falsifier.fmu.worker_order import Order
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +62,6 @@ class System:
         frame: inputs, names, values and stop time that the system has as a whole.
         name: name of the system.
         package: the SSP package that it was read from, if it was.
-        isolate: whether to simulate in a worker process; if not, a crash of an FMU crashes this process.
         logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
         allow: what the FMUs may do; see FmuModel.
         deny: what they may not do.
@@ -86,7 +84,7 @@ class System:
     name: str = field(default="system", kw_only=True)
     package: Path | None = field(default=None, kw_only=True, compare=False)
     key: str = field(default="", init=False, repr=False, compare=False)
-    isolate: bool = field(default=True, kw_only=True)
+    isolate: ClassVar[bool] = True
     logging: bool = field(default=False, kw_only=True)
     allow: tuple[str, ...] = field(default=(), kw_only=True)
     deny: tuple[str, ...] = field(default=(), kw_only=True)
@@ -112,8 +110,6 @@ class System:
         object.__setattr__(self, "components", components)
         object.__setattr__(self, "connections", connections)
         _check_coupling(self.coupling)
-        if self.coupling.isolation == "each" and not self.isolate:
-            raise SpecError('coupling.isolation: "each" needs worker processes; leave out isolate=False')
         object.__setattr__(self, "key", _key(self))
         _network(self)
 
@@ -147,14 +143,18 @@ class System:
             SpecError: if a component's own step is not an integer multiple of the communication step.
         """
         tables = [signal.pieces(experiment.stop_time) for signal in signals.values()]
-        if self.frame.values:
-            values = dict(self.frame.values)
-            numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
-            texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
-            experiment = replace(experiment, strings=(*texts, *experiment.strings))
-            parameters = numbers | dict(parameters)
-        task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
-        return run_task(self._runner(), task, tables, parameters, self.info.name)
+        values = dict(self.frame.values)
+        texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
+        experiment = replace(experiment, strings=(*texts, *experiment.strings)) if texts else experiment
+        numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
+        numbers |= parameters
+        # An input of the whole that no signal drives is constant.
+        constants = {v.name: v for v in self.frame.inputs if v.name not in signals}
+        for name, variable in constants.items():
+            start = numbers.pop(name, float(variable.start or 0.0))
+            tables.append(Signal((0.0,), (start,), "constant").pieces(experiment.stop_time))
+        task = _task(self, experiment, (*signals, *constants), tuple(numbers), room_for(tables))
+        return run_task(REGISTRY.runner(_order(self)), task, tables, numbers, self.info.name)
 
     def check_steps(self, experiment: Experiment) -> None:
         """Check that each component's own step is an integer multiple of the communication step, and fits in.
@@ -188,20 +188,15 @@ class System:
         Raises:
             ModelError: if that fails.
         """
-        fmu = IsolatedFmu(REGISTRY.starter, _order(self, logging=True))
+        runner = Runner(REGISTRY.workplace, replace(_order(self), logging=True))
         try:
-            fmu.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
+            runner.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
         finally:
-            fmu.close()
+            runner.close()
 
     def close(self) -> None:
-        """End the worker process or unload the libraries; the next simulation starts again."""
-        drop = REGISTRY.drop if self.isolate else in_process.drop
-        drop(self.key, "co-simulation", logging=self.logging)
-
-    def _runner(self) -> "IsolatedFmu | in_process.LocalFmu":
-        order = _order(self, logging=self.logging)
-        return REGISTRY.fmu(order) if self.isolate else in_process.fmu(order)
+        """End the worker processes; the next simulation starts again."""
+        REGISTRY.drop(_order(self).key)
 
 
 def _key(system: System) -> str:
@@ -212,17 +207,9 @@ def _key(system: System) -> str:
 
 
 @lru_cache(maxsize=64)
-def _order(system: System, *, logging: bool) -> Order:
-    network = system.network
-    return Order(
-        Path(system.name),
-        system.key,
-        network.description,
-        "co-simulation",
-        None,
-        logging=logging,
-        network=network,
-    )
+def _order(system: System) -> SystemOrder:
+    policy = Policy.of(system.allow, system.deny)
+    return SystemOrder(system.network, system.key, logging=system.logging, policy=policy)
 
 
 @lru_cache(maxsize=32)

@@ -59,7 +59,6 @@ def make_network(
     for target, connection in connections.items():
         joiner.connect(target, connection)
     links = tuple(joiner.links)
-    _check_isolation(members, coupling)
     dependencies = Dependencies(members, structures)
     loop = direct_loop(links, dependencies)
     if loop and coupling.loops == "refuse":
@@ -279,16 +278,6 @@ def _loop_text(loop: list[Place], members: tuple[Member, ...]) -> str:
         'delay, or accept a delay of one communication step: [coupling] loops = "delay"; or repeat their '
         'steps until they agree: loops = "iterate"'
     )
-
-
-def _check_isolation(members: tuple[Member, ...], coupling: Coupling) -> None:
-    solved = [m.name for m in members if m.interface == "model-exchange"]
-    if coupling.isolation == "each" and solved:
-        raise SpecError(
-            f"{', '.join(solved)}: a model-exchange component runs in the process of the system, beside its "
-            'solver; use isolation = "together", or export it for co-simulation',
-            key="coupling.isolation",
-        )
 
 
 def _check_restorable(

@@ -16,7 +16,7 @@
 #include "platform.h"
 #include "session.h"
 
-enum kind { CONNECT, LOAD, PREPARE, SIMULATE };
+enum kind { CONNECT, LOAD, PREPARE, SIMULATE, LOAD_SYSTEM };
 
 #define MESSAGE_BYTES 4096
 #define CUT_OFF 74 /* exit code: nobody can be replied to */
@@ -26,9 +26,9 @@ enum kind { CONNECT, LOAD, PREPARE, SIMULATE };
 /* Waking up a process takes about 40 microseconds, which is a lot compared with a simulation shorter than this. */
 #define QUICK_SECONDS 500e-6
 
-static jmp_buf end_of_request;
 static struct subject subject;
 
+jmp_buf end_of_request;
 const char *failing = "";
 
 static void reply(struct outcome outcome, unsigned flags, double time, const char *text)
@@ -61,12 +61,12 @@ void say(unsigned status, const char *text)
 /* End the request: the FMU cannot be used. */
 void give_up(const char *format, ...)
 {
-    char text[MESSAGE_BYTES];
+    static char text[MESSAGE_BYTES];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    reply((struct outcome){0, IMPOSSIBLE}, 0, -1.0, text);
+    failing = text;
     longjmp(end_of_request, 1);
 }
 
@@ -107,11 +107,11 @@ static void connect(struct request *r)
         end_process(CUT_OFF);
 }
 
-static void load(struct request *r)
+static void load(struct request *r, void (*read_subject)(struct request *, struct subject *))
 {
     enum reuse reuse = (enum reuse)read_size(r);
     unsigned untrusted = (unsigned)read_size(r);
-    read_one_fmu(r, &subject);
+    read_subject(r, &subject);
     start_session(&subject, reuse, untrusted);
 }
 
@@ -139,7 +139,8 @@ static int answer(enum kind kind, struct request *r)
     failing = "";
     switch (kind) {
     case CONNECT: connect(r); break;
-    case LOAD: load(r); break;
+    case LOAD: load(r, read_one_fmu); break;
+    case LOAD_SYSTEM: load(r, read_one_system); break;
     case PREPARE: prepare_session(*r); break;
     case SIMULATE: return simulate(r);
     default: give_up("request %d is unknown", (int)kind);
@@ -158,8 +159,10 @@ int main(void)
         if (!start || !receive_bytes(r.at, head[1]))
             break;
         /* Of a request that ends early nothing is freed, and of others what they contain is used later. */
-        if (setjmp(end_of_request))
+        if (setjmp(end_of_request)) {
+            reply((struct outcome){0, IMPOSSIBLE}, 0, -1.0, failing);
             continue;
+        }
         goes_on = answer((enum kind)head[0], &r);
         if (head[0] == SIMULATE)
             free(start);

@@ -15,6 +15,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -147,21 +148,24 @@ unsigned printed(void)
     return position > 0 ? (unsigned)position : 0;
 }
 
+static struct {
+    void *memory;
+    size_t bytes;
+} room;
+
 double *map_room(const char *place)
 {
-    static void *last;
-    static size_t size;
-    struct stat room;
+    struct stat about;
     (void)place;
-    if (last)
-        munmap(last, size);
-    last = NULL;
-    if (fstat(ROOM, &room) || room.st_size <= 0)
+    if (room.memory)
+        munmap(room.memory, room.bytes);
+    room.memory = NULL;
+    if (fstat(ROOM, &about) || about.st_size <= 0)
         return NULL;
-    size = (size_t)room.st_size;
-    void *mapped = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED, ROOM, 0);
-    last = mapped == MAP_FAILED ? NULL : mapped;
-    return last;
+    room.bytes = (size_t)about.st_size;
+    void *mapped = mmap(NULL, room.bytes, PROT_READ | PROT_WRITE, MAP_SHARED, ROOM, 0);
+    room.memory = mapped == MAP_FAILED ? NULL : mapped;
+    return room.memory;
 }
 
 void *guarded_memory(size_t bytes)
@@ -172,6 +176,68 @@ void *guarded_memory(size_t bytes)
         return NULL;
     mprotect(memory + usable, page, PROT_NONE);
     return memory + usable - bytes;
+}
+
+void *shared_memory(size_t bytes)
+{
+    void *memory = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    return memory == MAP_FAILED ? NULL : memory;
+}
+
+void release_memory(void *memory, size_t bytes)
+{
+    munmap(memory, bytes);
+}
+
+long own_process(void)
+{
+    return getpid();
+}
+
+/* The new process has the FMU's output, but neither the requests nor the replies and the memory for others. */
+long split_process(void)
+{
+    pid_t id = fork();
+    if (id)
+        return id;
+    close(requests);
+    close(REPLIES);
+    close(ROOM);
+    if (room.memory)
+        munmap(room.memory, room.bytes);
+    return 0;
+}
+
+static int last_end;
+
+int has_ended(long process)
+{
+    return waitpid((pid_t)process, &last_end, WNOHANG) != 0;
+}
+
+int has_other_parent(long parent)
+{
+    return getppid() != parent;
+}
+
+void end_like(long process)
+{
+    (void)process;
+    if (WIFSIGNALED(last_end)) {
+        signal(WTERMSIG(last_end), SIG_DFL);
+        raise(WTERMSIG(last_end));
+    }
+    _exit(WIFEXITED(last_end) ? WEXITSTATUS(last_end) : 1);
+}
+
+void nap(long nanoseconds)
+{
+    nanosleep(&(struct timespec){0, nanoseconds}, NULL);
+}
+
+void yield_processor(void)
+{
+    sched_yield();
 }
 
 void *load_library(const char *path, const char **wrong)

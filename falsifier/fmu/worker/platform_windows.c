@@ -149,6 +149,55 @@ void *guarded_memory(size_t bytes)
     return memory + usable - bytes;
 }
 
+void *shared_memory(size_t bytes)
+{
+    (void)bytes;
+    return NULL;
+}
+
+void release_memory(void *memory, size_t bytes)
+{
+    (void)memory, (void)bytes;
+}
+
+long own_process(void)
+{
+    return (long)GetCurrentProcessId();
+}
+
+long split_process(void)
+{
+    return -1;
+}
+
+int has_ended(long process)
+{
+    (void)process;
+    return 1;
+}
+
+int has_other_parent(long parent)
+{
+    (void)parent;
+    return 0;
+}
+
+void end_like(long process)
+{
+    (void)process;
+    ExitProcess(1);
+}
+
+void nap(long nanoseconds)
+{
+    Sleep((DWORD)(nanoseconds / 1000000));
+}
+
+void yield_processor(void)
+{
+    SwitchToThread();
+}
+
 void *load_library(const char *path, const char **wrong)
 {
     static char text[64];

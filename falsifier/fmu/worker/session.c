@@ -201,6 +201,8 @@ int is_spent(void)
     if (instances >= MOST_INSTANCES || reuse == BY_PROCESS)
         return 1;
     size_t size = most_memory_used();
+    if (subject->memory_elsewhere)
+        size += subject->memory_elsewhere(subject->self);
     if (!first_size)
         first_size = size;
     return first_size && size > first_size + MOST_GROWTH_KIB;

@@ -23,6 +23,7 @@ struct subject {
     int (*take_state)(void *self);
     int (*restore_state)(void *self);
     void (*forget_state)(void *self);
+    size_t (*memory_elsewhere)(void *self); /* in KiB, of other processes; NULL: there are none */
     double **recorded; /* where the simulations write their outputs, and how many numbers */
     size_t recorded_count;
     double *header;    /* of the shared memory */
@@ -40,5 +41,8 @@ int is_spent(void);     /* whether the process should be replaced */
 
 /* one_fmu.c */
 void read_one_fmu(struct request *request, struct subject *subject);
+
+/* one_system.c */
+void read_one_system(struct request *request, struct subject *subject);
 
 #endif

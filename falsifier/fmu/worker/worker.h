@@ -6,12 +6,15 @@
 #ifndef WORKER_H
 #define WORKER_H
 
+#include <setjmp.h>
 #include <stddef.h>
 #include <stdint.h>
 
 /* Where a simulation stopped. The first eight are those of loop_numbers.py, the others are in wine_instance.py. */
 enum where {
     DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL,
+    /* of systems; the texts have positions of connected outputs, and their changes */
+    NOT_CONVERGED = 9, RESTORING, NOT_A_NUMBER, UNSETTLED, MISSING_AT_FIRST, MISSING_AFTER_START,
     CALLING = 20,   /* a function at the start of the simulation; the text names it */
     WRITING,        /* the first values; the text says which */
     TEXT,           /* a string parameter; the text is its position */
@@ -198,6 +201,7 @@ void say(unsigned status, const char *text); /* passes a message of the FMU on *
 int is_late(struct progress *progress, double time); /* to be called after each step */
 void *need(size_t count, size_t size);       /* zeroed memory */
 
+extern jmp_buf end_of_request; /* where give_up goes */
 extern const char *failing; /* the text of the next outcome */
 
 #endif

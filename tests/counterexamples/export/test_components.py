@@ -95,7 +95,7 @@ def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> N
             target.writestr(entry.filename, data)
     links = {f"plant.{odd['u']}": "pi.y", "pi.measured": f"plant.{odd['y']}"}
     whole = Problem.from_system(
-        System({"plant": renamed, "pi": path("Gain_2")}, links, isolate=False),
+        System({"plant": renamed, "pi": path("Gain_2")}, links),
         "G (plant.height.always <= 10)",
         inputs={"pi.r": (0.0, 2.0)},
         stop_time=1.0,

@@ -2,7 +2,8 @@
 
 import struct
 
-from falsifier.fmu.description import read_description
+from falsifier.core.model import ModelInfo
+from falsifier.fmu.description import Description, Slot, read_description
 from falsifier.fmu.process import encoding
 from tests.fmu.fixtures import path
 
@@ -26,3 +27,10 @@ def test_fixed_elements_follow_the_places_of_their_array() -> None:
     assert (storage, call, sign, is_boolean, row) == (*struct.unpack("<qqqdq", place)[:2], 1.0, 0, 0)
     assert offset == 8 * description.slot(second).offset
     assert encoding.fixed_elements(description, [first], [first]) == []
+
+
+def test_a_negated_alias_has_the_other_sign() -> None:
+    info = ModelInfo("M", fmi_version="1.0")
+    slots = {"a": Slot(0, "Real"), "b": Slot(0, "Real", negated=True)}
+    table = encoding.ports(Description(info, "", {}, slots), ["a", "b"])
+    assert struct.unpack("<qqqdqqqqdq", table[-80:])[3::5] == (1.0, -1.0)

@@ -1,6 +1,5 @@
 """SSP packages as systems."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,7 @@ MILLIMETRE = '<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/
 
 
 def local(file: Path) -> System:
-    return replace(read_package(file), isolate=False)
+    return read_package(file)
 
 
 @pytest.mark.parametrize("name", ["loop.ssp", "loop.ssd"])

@@ -7,9 +7,8 @@ from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import Coupling, System
-from falsifier.fmu.isolation import REGISTRY
 from tests.fmu.fixtures import path
-from tests.fmu.small_systems import LOOP, component, loop, run, sampled_loop, system
+from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
 
 
 def test_systems_travel_between_processes_and_are_equal_by_content() -> None:
@@ -57,19 +56,19 @@ def test_what_is_not_a_system_is_refused() -> None:
 def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
     copy = tmp_path / "model.fmu"
     copy.write_bytes(path("Plant_2").read_bytes())
-    model = System({"a": copy}, isolate=False, name="changed")
+    model = System({"a": copy}, name="changed")
     copy.write_bytes(path("Gain_2").read_bytes())
     with pytest.raises(ModelError, match=r"model\.fmu: the file has changed since the model was loaded"):
         run(model, "a.y")
 
 
 def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named() -> None:
-    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, LOOP, isolate=True)
+    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, LOOP)
+    found = []
     for _ in range(3):
-        found = run(model, "plant.x")["plant.x"]
-        assert found == pytest.approx(sampled_loop(0), abs=1e-9)
-    (fmu,) = [f for key, f in REGISTRY._fmus.items() if key[0] == model.key]
-    assert fmu._worker is not None and fmu._worker.simulations == 3
+        assert run(model, "plant.x")["plant.x"] == pytest.approx(sampled_loop(0), abs=1e-9)
+        found += pids(model)
+    assert len(found) == 3 and len(set(found)) == 1
     model.load()
     with pytest.raises(Exception, match=r"process crashed in component bad: signal SIGSEGV") as crash:
         run(model, "plant.x", parameters={"bad.misdeed": 1})

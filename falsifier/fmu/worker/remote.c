@@ -1,0 +1,171 @@
+/* A component with a process of its own, for libraries that cannot live in one process.
+ *
+ * The process is forked from that of the master before any library is loaded. Both share the component's
+ * exchange: the master writes a question and counts up the questions, the other process answers and counts up
+ * the answers. Both wait awake for a short time and sleep then. If the process ends by itself, that of the
+ * master ends in the same way: whoever waits for it then knows how, and which component ran. */
+
+#include <setjmp.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "platform.h"
+#include "system.h"
+
+/* Pages that nobody writes to take no memory. */
+#define SHARED_BYTES ((size_t)64 << 20)
+/* How often to look before sleeping, and how often between two moments in which others may have the processor;
+ * some 0.1 ms if nobody else wants it. */
+#define LOOKS 40000
+#define LOOKS_PER_YIELD 200
+/* Lengths of a sleep in ns. They grow, so that an idle process uses less than 1 % of a processor; an answer is
+ * noticed late by some 3 % of the time that it took. */
+#define FIRST_NAP 50000
+#define LONGEST_NAP 2000000
+
+struct process {
+    _Atomic uint64_t asked, answered;
+    long parent, id;
+    size_t plan_bytes; /* of a request behind this structure */
+    struct exchange exchange;
+    double numbers[];
+};
+
+/* The part of the memory that is not the structure, in bytes. */
+#define ROOM_BYTES (SHARED_BYTES - sizeof(struct process))
+
+static int is_over(const struct process *p, int is_master)
+{
+    return is_master ? has_ended(p->id) : has_other_parent(p->parent);
+}
+
+/* Wait until a counter reaches a number; return 0 if the process that counts has ended. */
+static int await(struct process *p, _Atomic uint64_t *counter, uint64_t number)
+{
+    int is_master = counter == &p->answered;
+    for (int k = 0; k < LOOKS; k++) {
+        if (atomic_load_explicit(counter, memory_order_acquire) == number)
+            return 1;
+        if (k % LOOKS_PER_YIELD == 0)
+            yield_processor();
+    }
+    for (long length = FIRST_NAP; atomic_load_explicit(counter, memory_order_acquire) != number;) {
+        nap(length);
+        length = length + length / 32 < LONGEST_NAP ? length + length / 32 : LONGEST_NAP;
+        if (is_over(p, is_master))
+            return atomic_load_explicit(counter, memory_order_acquire) == number;
+    }
+    return 1;
+}
+
+static uint64_t count_up(_Atomic uint64_t *counter)
+{
+    uint64_t number = atomic_load_explicit(counter, memory_order_relaxed) + 1;
+    atomic_store_explicit(counter, number, memory_order_release);
+    return number;
+}
+
+/* In the process of a component: take its own part of the plan that the master has left in the memory. */
+static void receive_plan(struct component *c)
+{
+    static double nothing;
+    struct process *p = c->process;
+    char *copy = need(p->plan_bytes, 1);
+    memcpy(copy, p->numbers, p->plan_bytes);
+    struct request r = {copy, copy + p->plan_bytes};
+    read_system_plan(&r, c->system, &nothing);
+}
+
+static struct outcome answer(struct component *c)
+{
+    if (c->exchange->task == TAKE_PLAN)
+        receive_plan(c);
+    return carry_out(c);
+}
+
+/* Answer until the master asks to end, or ends itself. */
+static void serve(struct component *c)
+{
+    struct process *p = c->process;
+    struct exchange *x = c->exchange;
+    while (await(p, &p->asked, atomic_load_explicit(&p->answered, memory_order_relaxed) + 1)) {
+        failing = "";
+        if (setjmp(end_of_request))
+            x->outcome = (struct outcome){0, IMPOSSIBLE};
+        else
+            x->outcome = answer(c);
+        snprintf(x->text, sizeof x->text, "%s", failing);
+        x->memory = most_memory_used();
+        count_up(&p->answered);
+        if (x->task == UNLOAD)
+            break;
+    }
+    end_process(0);
+}
+
+/* Fork the process of a component, which has nothing of the others and of the master but this memory. */
+void start_process(struct component *c)
+{
+    struct process *p = c->process = shared_memory(SHARED_BYTES);
+    if (!p)
+        give_up("not enough memory for the processes of the components");
+    c->exchange = &p->exchange;
+    p->parent = own_process();
+    p->id = split_process();
+    if (p->id < 0)
+        give_up("components cannot have processes of their own here; use isolation = \"together\"");
+    if (p->id)
+        return;
+    for (size_t k = 0; k < c->system->count; k++) {
+        struct component *other = &c->system->components[k];
+        if (other != c && other->process) {
+            release_memory(other->process, SHARED_BYTES);
+            other->process = NULL;
+        }
+    }
+    serve(c);
+}
+
+/* Wait for the end of a process that was asked to unload its library. */
+void end_process_of(struct component *c)
+{
+    while (!has_ended(c->process->id))
+        nap(FIRST_NAP);
+    release_memory(c->process, SHARED_BYTES);
+    c->process = NULL;
+}
+
+/* Ask the process of a component; if it has ended, end in the same way. */
+struct outcome ask_process(struct component *c)
+{
+    struct process *p = c->process;
+    if (!await(p, &p->answered, count_up(&p->asked)))
+        end_like(p->id);
+    struct exchange *x = c->exchange;
+    x->text[sizeof x->text - 1] = '\0'; /* the FMU may have written there */
+    failing = x->text;
+    if (x->outcome.where == IMPOSSIBLE)
+        give_up("%s", failing);
+    return x->outcome;
+}
+
+/* Send a plan to the process of a component. */
+void send_plan(struct component *c, const struct request *r)
+{
+    struct process *p = c->process;
+    p->plan_bytes = (size_t)(r->end - r->at);
+    if (p->plan_bytes > ROOM_BYTES)
+        give_up("the plan of the system is too large for the processes of its components");
+    memcpy(p->numbers, r->at, p->plan_bytes);
+}
+
+/* Memory for the numbers that a component is given and that are read from it. */
+double *exchanged_numbers(struct component *c, size_t count)
+{
+    if (!c->process)
+        return need(count, sizeof(double));
+    if (count > ROOM_BYTES / sizeof(double))
+        give_up("its variables are too many for a process of its own; use isolation = \"together\"");
+    return c->process->numbers;
+}

@@ -1,0 +1,229 @@
+"""Systems against what they are by their equations: the plant's exact response to inputs held over a step."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from falsifier.core.signals import Signal
+from falsifier.errors import SimulationError
+from falsifier.fmu import Component, Connection, Coupling
+from falsifier.fmu.systems.network import Method
+from tests.fmu.fixtures import path
+from tests.fmu.small_systems import LOOP, STEP, component, loop, run, sampled_loop, solved, system
+
+DELAY = Coupling(loops="delay")
+
+
+@pytest.mark.parametrize("pi", ["Gain_2", "Gain_3"])
+@pytest.mark.parametrize("plant", ["Plant_2", "Plant_3"])
+def test_gauss_seidel_has_no_delay_and_jacobi_one_step(plant: str, pi: str) -> None:
+    for coupling, late in ((Coupling(), 0), (Coupling("jacobi"), 1)):
+        found = run(loop(coupling, plant=plant, pi=pi), "plant.x", "pi.y")
+        expected = sampled_loop(late)
+        np.testing.assert_allclose(found["plant.x"], expected, atol=1e-9)
+        shown = 2.0 * (1.0 - (expected if not late else np.concatenate([expected[:1], expected[:-1]])))
+        np.testing.assert_allclose(found["pi.y"], shown, atol=1e-9)
+
+
+def test_a_smaller_communication_step_keeps_the_output_grid() -> None:
+    found = run(loop(), "plant.x", step_size=0.02)
+    np.testing.assert_allclose(found["plant.x"], sampled_loop(0, steps=50, step=0.02)[::5], atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["gauss-seidel", "jacobi"])
+def test_a_component_with_a_step_of_its_own_holds_its_outputs_until_the_next(method: str) -> None:
+    model = system(
+        {"plant": "Plant_2", "pi": component("Gain_2", 0.2)},
+        LOOP,
+        Coupling(method),  # type: ignore[arg-type]
+    )
+    x, u, before = [0.0], 2.0, 0.0
+    for k in range(10):
+        x.append(u + (x[-1] - u) * float(np.exp(-0.05)))
+        if (
+            k % 2
+        ):  # at the end of its step the controller sees the plant then, with Jacobi as at its beginning
+            u = 2.0 * (1.0 - (x[-1] if method == "gauss-seidel" else before))
+            before = x[-1]
+    np.testing.assert_allclose(run(model, "plant.x")["plant.x"], x, atol=1e-9)
+
+
+def test_half_the_communication_step_leaves_own_steps_alone() -> None:
+    model = system({"plant": component("Plant_2", 0.2), "pi": component("Gain_2", 0.2)}, LOOP)
+    coarse, fine = run(model, "plant.x"), run(model, "plant.x", step_size=0.05)
+    np.testing.assert_allclose(coarse["plant.x"], fine["plant.x"], atol=1e-12)
+
+
+def test_linear_extrapolation_makes_the_coupling_one_order_better() -> None:
+    """b follows a, whose output is known at both ends of each step."""
+    wave = {"a.u": Signal((0.0, 4.0), (0.0, 4.0), "linear")}
+
+    def error(extrapolation: str, step: float) -> float:
+        link = Connection("a.y", extrapolation=extrapolation)  # type: ignore[arg-type]
+        model = system({"a": "Plant_2", "b": "Plant_2"}, {"b.u": link})
+        finest = system({"a": "Plant_2", "b": "Plant_2"}, {"b.u": Connection("a.y", extrapolation="linear")})
+        exact = run(finest, "b.x", stop=4.0, interval=0.4, step_size=0.001, signals=wave)["b.x"]
+        found = run(model, "b.x", stop=4.0, interval=0.4, step_size=step, signals=wave)["b.x"]
+        return float(np.abs(found - exact).max())
+
+    # The input of a is held too, which costs the same in all of these; constant inputs have no such error.
+    wave = {"a.u": Signal((0.0,), (1.0,))}
+    assert error("hold", 0.1) / error("hold", 0.05) == pytest.approx(2.0, rel=0.1)
+    assert error("linear", 0.1) / error("linear", 0.05) == pytest.approx(4.0, rel=0.1)
+
+
+def test_factors_and_offsets_and_units_are_applied() -> None:
+    link = Connection("a.y", factor=2.0, offset=0.5)
+    model = system(
+        {"a": "Gain_2", "b": "Gain_2"}, {"b.r": link, "b.measured": Connection("a.y", offset=-1.0)}
+    )
+    found = run(model, "b.y")  # a.y = 2, so b.y = 2 (4.5 - 1)
+    np.testing.assert_allclose(found["b.y"], 7.0)
+    millimetres = system({"plant": "Plant_2", "pi": "Gain_2mm"}, LOOP)
+    found = run(millimetres, "plant.x", parameters={"pi.k": 0.002}, signals={"pi.r": Signal((0.0,), (1.0,))})
+    # u = 0.002 (1 - 1000 x) = 0.002 - 2 x: the gain of the other loop, with a smaller reference.
+    np.testing.assert_allclose(found["plant.x"], 0.001 * sampled_loop(0), atol=1e-12)
+
+
+def test_a_loop_at_initialisation_converges_to_its_solution() -> None:
+    """a.y = ka (1 - b.y), b.y = kb (1 - a.y)."""
+    model = system({"a": "Gain_2", "b": "Gain_3"}, {"a.measured": "b.y", "b.measured": "a.y"}, DELAY)
+    found = run(model, "a.y", "b.y", parameters={"a.k": 0.5, "b.k": 0.8})
+    a = 0.5 * (1.0 - 0.8) / (1.0 - 0.5 * 0.8)
+    np.testing.assert_allclose(found["a.y"], a, atol=1e-8)
+    np.testing.assert_allclose(found["b.y"], 0.8 * (1.0 - a), atol=1e-8)
+
+
+def test_a_loop_that_does_not_converge_is_named_with_its_variables() -> None:
+    model = system({"a": "Gain_2", "b": "Gain_3"}, {"a.measured": "b.y", "b.measured": "a.y"}, DELAY)
+    with pytest.raises(
+        SimulationError,
+        match=r"initialisation does not converge: after 100 rounds .*: a\.y \(by .*\), b\.y \(by .*in a loop",
+    ) as failed:
+        run(model, "a.y")
+    assert failed.value.time == 0.0
+
+
+def implicit(steps: int, step: float, *, gain: float, direct: float) -> NDArray[np.float64]:
+    """States of a lead whose input u = gain (1 - x - direct u) is held, with x at the step's end; T = 2."""
+    x, decay = [0.0], float(np.exp(-step / 2.0))
+    for _ in range(steps):
+        u = gain * (1.0 - x[-1] * decay) / (1.0 + gain * direct + gain * (1.0 - decay))
+        x.append(u + (x[-1] - u) * decay)
+    return np.array(x)
+
+
+@pytest.mark.parametrize("lead", [path("Lead_2"), path("Lead_3"), solved("Lead_2"), solved("Lead_3")])
+@pytest.mark.parametrize("pi", ["Gain_2", "Gain_3"])
+def test_a_direct_loop_is_iterated_to_its_solution(lead: Path | Component, pi: str) -> None:
+    """Both outputs depend on each other at once; with a delay, they would be those of the step before."""
+    each = lead if isinstance(lead, Component) else Component(lead)
+    model = system({"pi": pi, "plant": each}, LOOP, Coupling(loops="iterate", tolerance=1e-12))
+    assert model.network.loops == ((0, 2),)
+    assert "pi, plant repeat their steps until the outputs no longer change" in model.info.notes[0:2]
+    for _ in range(2):
+        found = run(model, "plant.x", "plant.y", "pi.y", parameters={"pi.k": 1.0})
+        np.testing.assert_allclose(found["plant.x"], implicit(10, STEP, gain=1.0, direct=0.5), atol=1e-8)
+        np.testing.assert_allclose(found["plant.y"], found["plant.x"] + 0.5 * found["pi.y"], atol=1e-8)
+        np.testing.assert_allclose(found["pi.y"], 1.0 - found["plant.y"], atol=1e-8)
+    model.close()
+
+
+def test_components_with_steps_of_their_own_iterate_when_they_meet() -> None:
+    """The controller's value is held for two steps; where both step, they agree."""
+    pi = component("Gain_2", 0.2)
+    model = system({"plant": "Lead_2", "pi": pi}, LOOP, Coupling(loops="iterate"))
+    found = run(model, "plant.x", "plant.y", "pi.y", parameters={"pi.k": 1.0})
+    u = found["pi.y"]
+    np.testing.assert_allclose(u[2::2], (1.0 - found["plant.y"])[2::2], atol=1e-8)
+    assert u[2:10:2].tolist() == u[3:11:2].tolist()
+    decay = float(np.exp(-0.05))
+    np.testing.assert_allclose(
+        found["plant.x"][1:], u[1:] + (found["plant.x"][:-1] - u[1:]) * decay, atol=1e-9
+    )
+
+
+def test_a_step_that_does_not_converge_is_named_with_its_variables() -> None:
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "other": "Plant_2"}, LOOP, Coupling(loops="iterate"))
+    late = {"pi.r": Signal((0.0, 0.3), (0.0, 1.0), "constant")}
+    message = (
+        r"^system: the loop of pi, plant does not converge at t = 0\.3 s: after 100 rounds, these still "
+        r"change: plant\.y \(by .*\), pi\.y \(by .*\); raise .*loops = \"delay\""
+    )
+    with pytest.raises(SimulationError, match=message) as failed:
+        run(model, "plant.y", signals=late, parameters={"pi.k": 4.0})
+    assert failed.value.time == pytest.approx(0.3)
+    assert run(model, "plant.y", signals=late, parameters={"pi.k": 0.5})["plant.y"][-1] > 0.0
+
+
+def test_components_of_a_loop_that_fail_while_they_iterate_are_named() -> None:
+    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, links, Coupling(loops="iterate"))
+    with pytest.raises(SimulationError, match=r"^bad: the step returned error at t = 0\.5 s"):
+        run(model, "plant.y", parameters={"bad.misdeed": 9, "pi.k": 1.0})
+
+
+@pytest.mark.parametrize("coupling", [Coupling(), Coupling(method="jacobi"), Coupling(loops="iterate")])
+def test_an_output_that_becomes_nan_is_named_and_not_the_component_that_receives_it(
+    coupling: Coupling,
+) -> None:
+    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
+    plant = "Lead_2" if coupling.loops == "iterate" else "Plant_2"
+    model = system({"plant": plant, "pi": "Gain_2", "bad": "Misdeeds_2"}, links, coupling)
+    with pytest.raises(SimulationError, match=r"^bad: bad\.y became nan at t = 0\.5 s"):
+        run(model, "plant.x", parameters={"bad.misdeed": 5.0, "pi.k": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("parameter", "named"),
+    [("plant.x", r"plant: plant\.y"), ("pi.k", r"pi: pi\.y"), ("bad.k", r"bad: bad\.y")],
+)
+def test_an_output_that_is_nan_at_time_0_is_named_and_not_the_loop_that_it_spreads_in(
+    parameter: str, named: str
+) -> None:
+    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Gain_3"}, links, DELAY)
+    with pytest.raises(SimulationError, match=f"^{named} is nan at t = 0 s, in the init") as failed:
+        run(model, "plant.x", parameters={"pi.k": 0.5, parameter: float("nan")})
+    assert failed.value.time == 0.0
+    assert np.isfinite(run(model, "plant.x", parameters={"pi.k": 0.5})["plant.x"]).all()
+
+
+@pytest.mark.parametrize("method", ["gauss-seidel", "jacobi"])
+def test_an_output_that_is_nan_after_the_initialisation_is_named_and_not_the_component_that_receives_it(
+    method: Method,
+) -> None:
+    """It samples its input at time 0, when initialisation has ended."""
+    links = {"plant.u": "ticker.sampled"}
+    model = system({"ticker": "Ticker_3", "plant": "Plant_2"}, links, Coupling(method))
+    message = r"^ticker: ticker\.sampled is nan at t = 0 s, after the initialisation"
+    with pytest.raises(SimulationError, match=message):
+        run(model, "plant.y", parameters={"ticker.u": float("nan")})
+
+
+def test_discrete_inputs_of_fmi_3_change_at_events() -> None:
+    """The second Ticker counts its events; its input is continuous, those of Echo are discrete."""
+    model = system(
+        {"a": "Echo_3", "b": "Echo_3"}, {"b.in_Int16": "a.out_Int16", "b.in_Boolean": "a.out_Boolean"}
+    )
+    ramp = {"a.in_Int16": Signal((0.0, 1.0), (0.0, 10.0), "linear"), "a.in_Boolean": Signal((0.0,), (1.0,))}
+    found = run(model, "a.out_Int16", "b.out_Int16", "b.out_Boolean", signals=ramp)
+    np.testing.assert_array_equal(found["b.out_Int16"], found["a.out_Int16"])
+    assert found["a.out_Int16"].tolist() == [0, *range(10)]
+    assert found["b.out_Boolean"].tolist() == [1.0] * 11
+
+
+def test_the_time_limit_counts_for_the_whole_system() -> None:
+    with pytest.raises(SimulationError, match=r"system: stopped at t = .* after the time limit of") as late:
+        run(loop(), "plant.x", stop=1000.0, interval=0.01, time_limit=1e-9)
+    assert late.value.status == "timeout"
+
+
+def test_values_that_do_not_fit_their_type_are_refused_with_the_component() -> None:
+    model = system({"a": "Echo_3"}, {})
+    with pytest.raises(
+        SimulationError, match=r"^a: values from 0 to 300 do not fit 'in_Int8', .* -128 to 127"
+    ):
+        run(model, "a.out_Int8", signals={"a.in_Int8": Signal((0.0, 1.0), (0.0, 300.0), "linear")})

@@ -1,0 +1,109 @@
+"""Components in processes of their own do what they do in one process, and end it as they end themselves."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier.core.model import Experiment
+from falsifier.core.signals import Signal
+from falsifier.errors import ModelError, SimulationError
+from falsifier.fmu import Component, Connection, Coupling
+from tests.fmu.small_systems import LOOP, component, pids, run, solved, system
+from tests.fmu.support import ALLOCATE, CRASH, HANG
+from tests.patience import wait_until
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked, and end with a parent")
+EACH = Coupling(isolation="each")
+LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
+BAD = {**LOOP, "pi.r": "bad.y"}
+
+
+@pytest.mark.parametrize(
+    ("plant", "pi", "links", "coupling"),
+    [
+        ("Plant_2", component("Gain_3", 0.2), LINEAR, Coupling()),
+        ("Plant_3", "Gain_2", LOOP, Coupling("jacobi")),
+        ("Lead_3", "Gain_2", LOOP, Coupling(loops="iterate")),
+        (solved("Lead_2"), "Gain_3", LINEAR, Coupling(loops="iterate")),
+        (solved("Lag_3", 0.2), "Gain_2", LINEAR, Coupling("jacobi")),
+    ],
+)
+def test_trajectories_are_those_of_one_process_to_the_last_digit(
+    plant: str | Component, pi: str | Component, links: dict[str, str | Connection], coupling: Coupling
+) -> None:
+    """Also when instances are used again."""
+    drive = {"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}
+    outputs = ("plant.y", "plant.x", "pi.y")
+    found = []
+    for isolation in ("together", "each"):
+        both = Coupling(coupling.method, coupling.loops, isolation=isolation)
+        model = system({"plant": plant, "pi": pi}, links, both)
+        runs = [run(model, *outputs, signals=drive, parameters={"pi.k": gain}) for gain in (0.5, 0.25, 0.5)]
+        np.testing.assert_array_equal(runs[0]["plant.y"], runs[2]["plant.y"])
+        found.append([[each[name] for name in outputs] for each in runs])
+        model.close()
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+def test_values_of_all_types_and_events_pass() -> None:
+    names = ("Float64", "Float32", "Int8", "UInt64", "Boolean", "Enumeration")
+    links = {f"second.in_{n}": f"first.out_{n}" for n in names}
+    model = system({"first": "Echo_3", "second": "Echo_3"}, links, EACH)
+    steps = {"first.in_Int8": (-5, 3), "first.in_Boolean": (1, 0), "first.in_Float32": (2, 1)}
+    signals = {name: Signal((0.0, 0.45), values, "constant") for name, values in steps.items()}
+    found = run(model, "second.out_Int8", "second.out_Boolean", "second.out_Float32", signals=signals)
+    assert found["second.out_Int8"][[1, -1]].tolist() == [-5.0, 3.0]
+    assert found["second.out_Boolean"][[1, -1]].tolist() == [1.0, 0.0]
+    assert found["second.out_Float32"][[1, -1]].tolist() == [2.0, 1.0]
+    model.close()
+
+
+def children(pid: int | str) -> list[str]:
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+def test_a_component_that_crashes_is_named_and_the_next_simulation_works() -> None:
+    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, BAD, EACH)
+    run(model, "plant.y")
+    (guard,) = pids(model)
+    (worker,) = children(guard)
+    others = children(worker)
+    assert len(others) == 3
+    for each in others:  # nothing but what every program has
+        assert {file.name for file in Path(f"/proc/{each}/fd").iterdir()} == {"0", "1", "2"}
+    with pytest.raises(SimulationError, match=r"crashed in component bad: .*SIGSEGV") as failed:
+        run(model, "plant.y", parameters={"bad.misdeed": CRASH})
+    assert failed.value.status == "crashed"
+    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in others))
+    assert run(model, "plant.y").times[-1] == 1.0
+    model.close()
+
+
+def test_a_component_that_floods_memory_is_named() -> None:
+    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, BAD, EACH)
+    with pytest.raises(SimulationError, match=r"^bad: the step returned error .*no memory for the table"):
+        run(model, "plant.y", parameters={"bad.misdeed": ALLOCATE})
+    model.close()
+
+
+def test_a_component_that_hangs_is_named_and_ended() -> None:
+    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, BAD, EACH)
+    run(model, "plant.y")
+    with pytest.raises(SimulationError, match=r"in component bad .*time limit"):
+        run(model, "plant.y", parameters={"bad.misdeed": HANG}, time_limit=0.5)
+    model.close()
+
+
+def test_strings_are_set(tmp_path: Path) -> None:
+    (tmp_path / "gain.txt").write_text("2.5")
+    model = system({"table": "Table_3", "pi": "Gain_2"}, {"pi.r": "table.y"}, EACH)
+    experiment = Experiment(1.0, 0.5, ("table.y",), strings=(("table.fileName", str(tmp_path / "gain.txt")),))
+    assert model.simulate({"table.u": Signal((0.0,), (1.0,))}, {}, experiment)["table.y"][-1] == 2.5
+    model.close()
+
+
+def test_a_component_that_cannot_be_loaded_is_named() -> None:
+    with pytest.raises(ModelError, match="first"):
+        run(system({"first": "NeedsTool_2", "pi": "Gain_2"}, {}, EACH), "pi.y")
