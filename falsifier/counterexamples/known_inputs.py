@@ -6,13 +6,12 @@ from pathlib import Path
 from falsifier.core.candidate import Candidate
 from falsifier.core.fitting import Fitted, fit
 from falsifier.counterexamples.store import load
+from falsifier.engines.starting import KNOWN
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.problem import Problem
 from falsifier.search import manifest
 from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
-
-ORIGIN = "known"
 
 
 def known_inputs(place: Path, problem: Problem) -> Fitted:
@@ -27,7 +26,7 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
         SpecError: if the place is none of these, or the run simulated nothing with success.
         CandidateError: naming the place and what does not fit the search space.
     """
-    found = replace(_contained(place, problem), origin=ORIGIN, rationale=f"from {place}")
+    found = replace(_contained(place, problem), origin=KNOWN, rationale=f"from {place}")
     try:
         return fit(problem.space, found)
     except CandidateError as error:

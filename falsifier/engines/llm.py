@@ -12,7 +12,7 @@ from falsifier.core.words import in_one_line
 from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
 from falsifier.engines.random_change import random_change
-from falsifier.engines.stand_ins import StandIns
+from falsifier.engines.stand_ins import RANDOM_CHANGE, StandIns
 from falsifier.engines.told import doubts_told, reply_form, told_context, told_view
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
@@ -179,7 +179,7 @@ class LLMEngine:
         if self._disguise:
             changed = self._disguise.canonical(changed)
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
-        replacement = replace(changed, origin="random change", rationale=rationale)
+        replacement = replace(changed, origin=RANDOM_CHANGE, rationale=rationale)
         self._stand_ins.because(_RANDOM, error)
         real = self._disguise.revealed(replacement) if self._disguise else replacement
         self._stand_ins.proposed(_RANDOM, [real])

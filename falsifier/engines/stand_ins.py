@@ -8,6 +8,8 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.evaluation.evaluate import Evaluation
 
+# Origin of candidates that are simulated in place of a single answer.
+RANDOM_CHANGE = "random change"
 # Characters of a reason: rejected replies are quoted in it, and what is wrong stands at the beginning.
 _LONGEST_REASON = 240
 

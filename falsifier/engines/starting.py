@@ -10,6 +10,9 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
 
+# Origin of candidates that a search starts from.
+KNOWN = "known"
+
 
 class Starting:
     """Proposes known candidates first, then what another engine suggests, which learns from all of them.

@@ -50,15 +50,15 @@ class BoundedChat:
             request = request.model_copy(update={"deadline": monotonic() + left})
         try:
             return self.inner.complete(request)
-        except ChatError:
-            self._check(ahead=_CLOCK_TOLERANCE)
+        except ChatError as error:
+            self._check(ahead=_CLOCK_TOLERANCE, cause=error)
             raise
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Tell the inner chat."""
         self.inner.accepted(request, reply)
 
-    def _check(self, *, ahead: float = 0.0) -> None:
+    def _check(self, *, ahead: float = 0.0, cause: ChatError | None = None) -> None:
         spent = self.spent()
         if limit := self.budget.exceeded(replace(spent, seconds=spent.seconds + ahead)):
-            raise LimitReached(limit)
+            raise LimitReached(limit) from cause

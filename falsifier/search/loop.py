@@ -9,6 +9,8 @@ from time import perf_counter
 from typing import NamedTuple
 
 from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.engines.stand_ins import RANDOM_CHANGE
+from falsifier.engines.starting import KNOWN
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
@@ -48,6 +50,7 @@ def search(
     levels: Sequence[Level] = (),
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
+    prepared: float = 0.0,
 ) -> list[Result]:
     """Falsify one or more requirements of one system.
 
@@ -70,6 +73,7 @@ def search(
             of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
+        prepared: seconds that the preparation of the run took, such as imports; they count.
 
     Returns:
         One result per problem, in their order.
@@ -86,14 +90,12 @@ def search(
     beside = scouts if objective != "simulations" and scouts else [None] * len(problems)
     targets = [Target(p, e, s) for p, e, s in zip(problems, engines, beside, strict=True)]
     levels = tuple(levels) or (Level(0, problems[0].space),)
-    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners), objective)
+    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners), objective, prepared)
     status: ResultStatus
     try:
         loop.attach()
         reason = loop.run(jobs, in_batches=in_batches)
-        status = "not falsified"
-        if loop.spent.has_mostly_failed:
-            status, reason = "failed", loop.failure_text()
+        status, reason = loop.concluded(reason)
     except KeyboardInterrupt:
         status, reason = "interrupted", "stopped by the user"
     except ChatError as error:
@@ -127,6 +129,7 @@ class _Loop:
         directory: Path | None,
         listeners: tuple[Listener, ...],
         objective: Objective | None,
+        prepared: float,
     ) -> None:
         self.targets = targets
         self.levels = levels
@@ -140,8 +143,9 @@ class _Loop:
         self.last: Proposer = "engine"
         self.turns = self.untold_scouts = 0
         self.count = 0
-        self.last_error = ""
-        self.started = perf_counter() - steps.seconds
+        self.last_error = self.last_defect = ""
+        self.is_answered = False
+        self.started = perf_counter() - prepared - steps.seconds
         self.spent = steps.unrepeated
         self.unrecorded = ""
 
@@ -183,6 +187,7 @@ class _Loop:
             try:
                 self.ask(standing[self.turns % len(standing)], move)
             except LimitReached as reached:
+                self.last_defect = str(reached.__cause__ or self.last_defect)
                 return self.failure_text() if self.all_failed() else str(reached)
         return "all requirements are falsified"
 
@@ -206,6 +211,23 @@ class _Loop:
             costs=self.costs,
         )
         return next_move(situation)
+
+    def concluded(self, reason: str) -> tuple[ResultStatus, str]:
+        """Status and reason of a search that came to its end.
+
+        It failed if most simulations did, if there was none, or if a language model that leads it gave no
+        usable answer, so that all candidates are known ones or stand-ins.
+        """
+        if self.spent.has_mostly_failed:
+            return "failed", self.failure_text()
+        if self.last_defect and not self.is_answered:
+            reason = f"{reason}; the language model gave no usable answer: {self.last_defect}"
+        asks = any(isinstance(target.engine, AsksLLM) for target in self.targets)
+        stand_ins = (KNOWN, RANDOM_CHANGE) if asks and not self.is_answered else ()
+        evaluations = (evaluation for target in self.targets for evaluation in target.evaluations)
+        if all(evaluation.candidate.origin in stand_ins for evaluation in evaluations):
+            return "failed", reason if self.count else f"{reason}; nothing was simulated"
+        return "not falsified", reason
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
@@ -326,6 +348,8 @@ class _Loop:
 
     def exchanged(self, exchange: Exchange) -> None:
         """Count and announce an exchange with a language model."""
+        self.is_answered = self.is_answered or exchange.problem is None
+        self.last_defect = exchange.problem or self.last_defect
         self.count_requests(exchange.requests, exchange.usage)
         self.emit(Exchanged(exchange=exchange, spent=self.clock()))
 

@@ -24,7 +24,8 @@ class Result:
     Attributes:
         problem: what was searched.
         status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
-            ``interrupted`` or ``failed`` (the language model, or more than half of the simulations).
+            ``interrupted`` or ``failed`` (the language model gave no usable answer, more than half of the
+            simulations failed, or there was none).
         reason: why the run ended, in words.
         counterexample: the confirmed violation, or None.
         best: evaluation with the smallest robustness, or None if every simulation failed.

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
 from typing import overload
 
 from falsifier.core.arguments import instance, whole
@@ -13,7 +14,7 @@ from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import AsksLLM, Engine
-from falsifier.engines.starting import Starting
+from falsifier.engines.starting import KNOWN, Starting
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
@@ -281,6 +282,7 @@ def carry_out(
         resume: continue from the directory's journal; without a journal, start.
         patience: time in s to wait for another process that writes to the directory.
     """
+    started = perf_counter()
     if engine is not None and len(problems) > 1:
         raise SpecError(
             "an engine made in Python can search only one requirement: pass the name of an engine instead"
@@ -303,7 +305,7 @@ def carry_out(
         told = told_problems(request, problems, described.contexts if described else recorded)
         made = [engine] if engine is not None else _engines(request, told, levels, chat)
         scouts = make_scouts(request, problems)
-        known = deque(map(Candidate.from_json, request.start_from))
+        known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
         for problem in problems:
             stack.callback(problem.model.close)
@@ -331,6 +333,7 @@ def carry_out(
             levels=levels,
             directory=directory,
             listeners=all_listeners,
+            prepared=perf_counter() - started,
         )
 
 

@@ -28,7 +28,7 @@ def result_text(result: Result) -> str:
     shown = result.counterexample.evaluation if result.counterexample else result.best
     if result.counterexample is not None:
         lines.append(f"  confirmed      {result.counterexample.reason}")
-    else:
+    elif result.status != "failed":
         lines.append(f"  reason         {result.reason}")
     if result.objective == "time":
         lines.append(f"  objective      time; {_scouted(result)}")
@@ -56,6 +56,8 @@ def result_text(result: Result) -> str:
             lines.append(_continue_line(result.directory))
         elif result.status == "not falsified" and result.best is not None:
             lines.append(_closer_line(result.directory))
+    if result.status == "failed":
+        lines.append(f"failed: {result.reason}")
     return "\n".join(map(one_line, lines))
 
 
@@ -98,6 +100,7 @@ def results_text(results: Sequence[Result]) -> str:
     directories = {result.directory for result in results}
     if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
         lines.append(_continue_line(results[0].directory))
+    lines += dict.fromkeys(f"failed: {result.reason}" for result in results if result.status == "failed")
     return "\n".join(map(one_line, lines))
 
 

@@ -105,3 +105,26 @@ def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> Non
     assert "notes.md" not in falsifier("prompt", "AT1", cwd=tmp_path).out
     useless = falsifier("run", "AT1", "--engine", "cma", "--context", "notes.md", cwd=tmp_path)
     assert (useless.code, "--context: applies to language models and" in useless.err) == (2, True)
+
+
+def test_a_run_without_a_usable_answer_fails_and_says_why_in_the_last_line(tmp_path: Path) -> None:
+    with serving(*[Step("[]")] * 6) as server:
+        limits = ("--max-tokens", "200", "--price", "1:1", "--no-cache")
+        done = falsifier(*at1(server.url, *limits, "--out", "run"), cwd=tmp_path, env=ENV)
+        again = falsifier(*at1(server.url, *limits, "--json"), cwd=tmp_path, env=ENV)
+    assert (done.code, again.code, again.json["status"]) == (3, 3, "failed")
+    last = done.out.splitlines()[-1]
+    assert last.startswith("failed: the budget of 200 tokens is used up; the language model gave no usable")
+    assert "nothing was simulated" in last
+
+
+def test_a_campaign_counts_a_run_without_a_usable_answer_as_failed(tmp_path: Path) -> None:
+    with serving(*[Step("[]")] * 6) as server:
+        done = falsifier(
+            *("bench", "AT1", "--llm", "openai/gpt-5-mini", "--api-base", server.url, "--runs", "1"),
+            *("--max-tokens", "200", "--price", "1:1", "--no-cache", "--out", "c", "--json"),
+            cwd=tmp_path,
+            env=ENV,
+        )
+    assert done.code == 3, done.err
+    assert "1 run failed" in done.err

@@ -6,11 +6,14 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace, ValueKind
 from falsifier.engines import make_engine
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.messages import ChatReply, ChatRequest, Usage
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.search.assurance.assess import assess
 from falsifier.search.budget import Budget
@@ -198,3 +201,60 @@ def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
     result = run(problem, engine=engine, budget=8)
     assert result.spent.simulations == 8
     assert {e.candidate.signals["u"].values for e in result.evaluations} <= {(-1.0,), (0.0,), (1.0,)}
+
+
+def unusable(request: ChatRequest) -> ChatReply:
+    """Answer what cannot be read, for 100 tokens."""
+    return ChatReply(text="[]", usage=Usage(prompt_tokens=90, completion_tokens=10, cost=0.0))
+
+
+@pytest.mark.parametrize(("tokens", "simulated"), [(150, 0), (350, 1)])
+def test_a_language_model_without_a_usable_answer_is_a_failure(tokens: int, simulated: int) -> None:
+    """Also if random samples were simulated in place of an answer."""
+    result = falsify(lag_problem(), llm=ScriptedChat(unusable), budget=Budget(None, tokens=tokens))
+    assert (result.status, result.spent.simulations) == ("failed", simulated)
+    assert f"the budget of {tokens} tokens is used up; the language model gave no usable" in result.reason
+    assert result.reason.endswith("nothing was simulated") == (not simulated)
+    known = falsify(
+        lag_problem(),
+        llm=ScriptedChat(unusable),
+        budget=Budget(None, tokens=tokens),
+        start_from=[Candidate({"u": Signal((0.0,), (0.1,))})],
+    )
+    assert (known.status, known.spent.simulations) == ("failed", simulated + 1)
+
+
+def test_after_one_usable_answer_a_limit_is_the_end_of_the_search() -> None:
+    script = ['{"signals": [{"name": "u", "values": [0, 0, 0, 0]}]}', *["[]"] * 9]
+    replies = iter(script)
+
+    def answer(request: ChatRequest) -> ChatReply:
+        return unusable(request).model_copy(update={"text": next(replies)})
+
+    result = falsify(lag_problem(), llm=ScriptedChat(answer), budget=Budget(None, tokens=250))
+    assert (result.status, result.spent.simulations) == ("not falsified", 1)
+
+
+def test_a_search_without_a_simulation_is_a_failure_and_its_preparation_counts() -> None:
+    problem = lag_problem()
+    engine = make_engine("uniform", problem, seed=1)
+    (result,) = search([problem], [engine], Budget(5, seconds=60.0), prepared=61.0)
+    assert (result.status, result.evaluations) == ("failed", ())
+    assert result.reason == "the time limit of 60 s is reached; nothing was simulated"
+    assert result.spent.seconds > 61
+
+
+def test_a_hybrid_goes_on_without_its_language_model() -> None:
+    result = falsify(
+        lag_problem("G[0,10] (x <= 2)"),
+        "hybrid",
+        llm=ScriptedChat(unusable),
+        budget=Budget(12),
+    )
+    assert (result.status, result.spent.simulations) == ("not falsified", 12)
+
+
+def test_what_prepares_a_run_counts_such_as_the_import_of_litellm(monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks = iter([0.0, 61.0])
+    monkeypatch.setattr("falsifier.search.run.perf_counter", lambda: next(ticks))
+    assert falsify(lag_problem(), "uniform", budget=Budget(5, seconds=60.0)).status == "failed"
