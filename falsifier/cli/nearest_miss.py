@@ -18,7 +18,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.terminal import warn
-from falsifier.views.text import evaluation_json
+from falsifier.views.text import broken_rows, evaluation_json
 
 
 def nearest_miss_line(miss: NearestMiss) -> str:
@@ -71,6 +71,7 @@ def shrink_nearest_miss(
     lines = [nearest_miss_line(miss), shrunk_line(problem, shrunk, budget)]
     if confirmation is not None:
         lines.append(f"  violated       this simpler input violates the requirement: {confirmation.reason}")
+        lines += [f"  {row}" for row in broken_rows(found.verdict)]
     else:
         tenth = ", a tenth more than before; --within changes it" if within is None else ""
         allowed = f"up to {signed(-shrunk.least_margin)} was allowed{tenth}"

@@ -67,6 +67,7 @@ class StoredCounterexample(BaseModel):
     robustness: float = Field(allow_inf_nan=False)
     critical_time: float
     predicate: str
+    what_broke: str = Field("", description="What did not hold, and when, in words.")
     outcome: Outcome
     reason: str
     fmu_sha256: str | None = None
@@ -130,6 +131,7 @@ def _content(
         robustness=verdict.robustness,
         critical_time=verdict.critical_time,
         predicate=verdict.predicate,
+        what_broke=verdict.breach.text if verdict.breach else "",
         outcome=outcome,
         reason=reason,
         fmu_sha256=fmu_sha256,

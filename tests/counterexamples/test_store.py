@@ -169,6 +169,7 @@ def test_the_formula_is_kept_as_text() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9 or u < -2)")
     stored = to_store(violation(problem))
     assert parse(stored.formula) == problem.requirement.formula
+    assert stored.what_broke.startswith("alternative 1 of 2: x <= 0.9 was violated from ")
 
 
 def test_a_path_may_be_a_text(tmp_path: Path) -> None:

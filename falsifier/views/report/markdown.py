@@ -13,7 +13,6 @@ from falsifier.views.report.content import (
     run_command,
     unshown_lines,
 )
-from falsifier.views.text import broken_lines
 
 
 def markdown_report(directory: Path) -> str:
@@ -40,7 +39,8 @@ def _section(section: Section) -> str:
     run = min((run for run in section.runs if run.falsified), key=lambda run: run.simulations)
     lines = [f"## {markdown_text(section.heading)}: falsified", markdown_code(section.formula)]
     if run.verdict is not None:
-        lines += [f"- {markdown_text(one_line(line))}" for line in broken_lines(run.verdict)]
+        if run.verdict.breach is not None:
+            lines.append(f"What broke: {markdown_text(one_line(run.verdict.breach.text))}.")
         lines.append(
             f"Robustness {signed(run.verdict.robustness)} at t = {run.verdict.critical_time:.6g} s, "
             f"decided by {markdown_code(run.verdict.predicate)}, after "

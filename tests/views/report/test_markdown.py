@@ -11,4 +11,6 @@ def test_markdown_has_the_table_and_one_counterexample_a_requirement(campaign: P
     assert "## NEVER: what this does not show" in text
     assert "## HARD: falsified" in text
     assert "`G[0,10] (x <= 0.6)`" in text
+    assert "What broke: x \\<= 0.6 was violated from " in text
+    assert text.index("What broke") < text.index("Robustness -")
     assert "falsifier replay" in text
