@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.options import json_option, out_option, profile_option, template_option, with_template
+from falsifier.cli.options import (
+    json_option,
+    out_option,
+    policy_changes,
+    policy_options,
+    profile_option,
+    template_option,
+    with_template,
+)
 from falsifier.cli.output import say
 from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.core.files import bundled
@@ -18,11 +26,11 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import parameterization_text
 from falsifier.errors import SpecError
-from falsifier.fmu import is_package, read_package
+from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems, load_source
-from falsifier.problem.models import is_system, make_system
+from falsifier.problem.models import is_system, make_system, rights_of
 from falsifier.problem.problem import Problem, held_text
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
@@ -59,6 +67,7 @@ _PICTURES = (".svg", ".png", ".pdf")
     help="Draw the components and connections of a system: as text, or with --out as a picture.",
 )
 @out_option("Picture to write with --diagram; its extension determines the format (.svg, .png, .pdf).")
+@policy_options
 @json_option
 def info(
     *,
@@ -69,6 +78,7 @@ def info(
     drawn: bool,
     out: Path | None,
     as_json: bool,
+    **options: Any,
 ) -> None:
     """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
@@ -84,7 +94,7 @@ def info(
         return
     if names:
         raise click.UsageError("--names applies to Simulink files only")
-    source = _named(fmu)
+    source, changes = _named(fmu), policy_changes(options)
     if drawn or out:
         _check_diagram(fmu, drawn=drawn, alone=not (as_json or checked or everything), out=out)
         if isinstance(source, Path):
@@ -92,13 +102,14 @@ def info(
         _draw_diagram(source, out)
         return
     found = read_info(source) if isinstance(source, Path) else source.info
-    found = replace(found, notes=(*found.notes, *_binary_notes(source)))
+    rights = rights_of(_spec_of(fmu), [changes])
+    found = replace(found, notes=(*found.notes, *_binary_notes(source), rights_text(*rights)))
     if as_json:
         say(info_json(found))
         return
     say(info_text(found, everything=everything))
     if checked:
-        _print_convergence(source, found)
+        _print_convergence(source, found, *rights)
 
 
 def _check_diagram(fmu: Path, *, drawn: bool, alone: bool, out: Path | None) -> None:
@@ -234,7 +245,9 @@ def _schema(what: str) -> dict[str, Any]:
     return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
 
 
-def _print_convergence(source: "Path | System", found: ModelInfo) -> None:
+def _print_convergence(
+    source: "Path | System", found: ModelInfo, allow: tuple[str, ...], deny: tuple[str, ...]
+) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.fmu import FmuModel, System
     from falsifier.fmu.step_effect import step_convergence
@@ -253,10 +266,14 @@ def _print_convergence(source: "Path | System", found: ModelInfo) -> None:
         for v in found.inputs
         if v.kind == "real" and v.low is not None and v.high is not None
     }
-    model = FmuModel(source, interface=interface) if isinstance(source, Path) else source
+    model: FmuModel | System
+    if isinstance(source, Path):
+        model = FmuModel(source, interface=interface, allow=allow, deny=deny)
+    else:
+        model = replace(source, allow=allow, deny=deny)
     try:
         movements = step_convergence(model, experiment, signals)
-        advice = _step_advice(source, experiment, signals) if isinstance(source, System) else ""
+        advice = _step_advice(model, experiment, signals) if isinstance(model, System) else ""
     finally:
         model.close()
     say(
@@ -306,18 +323,22 @@ def _binary_notes(source: "Path | System") -> tuple[str, ...]:
 
 def _named(given: Path) -> "Path | System":
     """Return the FMU that is given, or the FMU or system of the spec or bundled name that is given."""
-    if given.suffix == ".toml":
-        return _of_spec(given)
     if is_package(given):
         return read_package(given)
-    if given.parent == Path() and not given.suffix and not (given.is_file() or _bundled_fmu(given).is_file()):
-        return _of_spec(find_spec(str(given))[0])  # the name of a bundled requirement
-    return _existing_fmu(given)
-
-
-def _of_spec(path: Path) -> "Path | System":
+    path = _spec_of(given)
+    if path is None:
+        return _existing_fmu(given)
     spec = read_spec(path)
     return make_system(spec, path) if is_system(spec) else _existing_fmu(path.parent / (spec.model.fmu or ""))
+
+
+def _spec_of(given: Path) -> Path | None:
+    """Return the spec that is given, or that of the bundled requirement whose name is; None for an FMU."""
+    if given.suffix == ".toml":
+        return given
+    if given.parent == Path() and not given.suffix and not (given.is_file() or _bundled_fmu(given).is_file()):
+        return find_spec(str(given))[0]
+    return None
 
 
 def _one_fmu(given: Path) -> Path:

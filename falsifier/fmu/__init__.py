@@ -2,7 +2,7 @@
 
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
-from falsifier.fmu.process import stop_simulations, watching
+from falsifier.fmu.process import rights_text, stop_simulations, watching
 from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.ssp import is_package, read_package
@@ -25,6 +25,7 @@ __all__ = [
     "read_info",
     "read_package",
     "resolved",
+    "rights_text",
     "stop_simulations",
     "watching",
     "with_local_files",

@@ -18,8 +18,8 @@ from falsifier.fmu import (
     read_package,
     resolved,
 )
-from falsifier.problem.sections import ModelChanges
-from falsifier.problem.spec import Spec
+from falsifier.problem.sections import ModelChanges, ModelSection
+from falsifier.problem.spec import Spec, read_spec
 
 
 def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
@@ -36,19 +36,40 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     """
     stated = [layer.logging for layer in layers if layer.logging is not None]
     logging = stated[-1] if stated else spec.model.logging
-    allowed = (*spec.model.allow, *(word for layer in layers for word in layer.allow))
-    allow = resolved(allowed, path.parent)
-    deny = (*spec.model.deny, *(word for layer in layers for word in layer.deny))
-    try:
-        Policy.of(allow, deny)
-    except SpecError as error:
-        raise SpecError(str(error), file=str(path), key="model") from None
+    allow, deny = rights_of(path, layers, spec.model)
     if is_system(spec):
         _check_interface(spec, layers, str(path))
         return replace(make_system(spec, path, logging=logging), allow=allow, deny=deny)
     fmu = _existing(path, spec.model.fmu or "", "model.fmu")
     interface = _interface(spec, layers, read_info(fmu), str(path))
     return FmuModel(fmu, interface=interface, logging=logging, allow=allow, deny=deny)
+
+
+def rights_of(
+    path: Path | None, layers: Sequence[ModelChanges], section: ModelSection | None = None
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what the FMUs may do and may not do, as a spec and what overrides it say together.
+
+    Args:
+        path: path of the spec file; None if there is none.
+        layers: sections that add to the spec's.
+        section: the spec's own; None: it is read from the file.
+
+    Raises:
+        SpecError: naming what is unknown.
+    """
+    if section is None:
+        section = read_spec(path).model if path is not None else ModelSection()
+    words = (*section.allow, *(word for layer in layers for word in layer.allow))
+    allow = resolved(words, path.parent if path is not None else Path())
+    deny = (*section.deny, *(word for layer in layers for word in layer.deny))
+    try:
+        Policy.of(allow, deny)
+    except SpecError as error:
+        if path is None:
+            raise
+        raise SpecError(str(error), file=str(path), key="model") from None
+    return allow, deny
 
 
 def is_system(spec: Spec) -> bool:

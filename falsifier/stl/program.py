@@ -1,4 +1,4 @@
-"""A compiled formula: its steps, and the place of each part's values in the buffer."""
+"""A compiled formula: the steps for the kernels, and the place of each part's values in the buffer."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.stl.formula import Formula, Predicate
-from falsifier.stl.steps import Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,24 +73,24 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Steps, and the place of each part's values.
+    """Steps for the kernels, and the place of each part's values.
 
     Attributes:
         root: the whole formula.
         signals: names of the signals, in their order in the buffer.
         step: sampling step in s.
         samples: number of samples of one trajectory.
-        times: the time grid in s, shape (n,).
-        steps: what fills the buffer, in order.
+        rows: steps as described in opcodes, shape (r, 6).
+        numbers: two constants for each step, shape (r, 2).
         size: length of the buffer.
-        checked: the predicate that each check is for, and its place, by the number of the step.
+        checked: the predicate that each CHECK row checks, and its place, by row.
     """
 
     root: Part
     signals: tuple[str, ...]
     step: float
     samples: int
-    times: NDArray[np.float64]
-    steps: tuple[Step, ...]
+    rows: NDArray[np.int64]
+    numbers: NDArray[np.float64]
     size: int
     checked: dict[int, tuple[Predicate, Place]]

@@ -4,7 +4,7 @@ from falsifier.fmu.process import encoding, outcome
 from falsifier.fmu.process.connection import Reply, Request, Where
 from falsifier.fmu.process.order import FmuOrder, Order, is_held, library_of, value_checks
 from falsifier.fmu.process.patience import watching
-from falsifier.fmu.process.registry import REGISTRY, stop_simulations
+from falsifier.fmu.process.registry import REGISTRY, rights_text, stop_simulations
 from falsifier.fmu.process.reuse import REUSES, Reuse
 from falsifier.fmu.process.room import Room
 from falsifier.fmu.process.runner import Runner
@@ -24,6 +24,7 @@ __all__ = [
     "is_held",
     "library_of",
     "outcome",
+    "rights_text",
     "stop_simulations",
     "value_checks",
     "watching",

@@ -173,15 +173,17 @@ class Told:
     Attributes:
         cause: what ended the process, empty if the guard does not know.
         refusals: what was refused before, and how it can be allowed; empty if nothing.
+        enforced: what is enforced, as bits of ``enum enforced`` in worker/sandbox.h.
     """
 
     cause: str = ""
     refusals: str = ""
+    enforced: int = 0
 
 
 def read_told(data: bytes) -> Told:
     """Return what a guard's bytes say; they contain names that an FMU has chosen."""
-    causes, refused = [], []
+    causes, refused, enforced = [], [], 0
     for part in dict.fromkeys(data.split(b"\0")):
         kind, path = part[:1], printable(os.fsdecode(part[1:]).encode("utf-8", "replace").decode())
         match kind:
@@ -189,6 +191,8 @@ def read_told(data: bytes) -> Told:
                 causes.append(f"the FMU replaced its program by {path}")
             case b"m":
                 causes.append("the FMU used more memory than it may")
+            case b"e":
+                enforced = ord(part[1:2] or b"0") - ord("0")
             case b"w":
                 advice = _ADVICE.format(f"write:{Path(path).parent}")
                 refused.append(f"tried to change {path}, which was refused; {advice}")
@@ -203,7 +207,7 @@ def read_told(data: bytes) -> Told:
                 refused.append("tried to start more processes than it may")
     shown = refused[:_SHOWN_REFUSALS]
     more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
-    return Told("; ".join(causes), f"the FMU {'; it '.join(shown)}{more}" if shown else "")
+    return Told("; ".join(causes), f"the FMU {'; it '.join(shown)}{more}" if shown else "", enforced)
 
 
 def policy_text(policy: Policy, enforced: int) -> str:
@@ -213,23 +217,18 @@ def policy_text(policy: Policy, enforced: int) -> str:
         policy: what users have allowed and denied.
         enforced: bits of ``enum enforced`` in worker/sandbox.h.
     """
-    files, calls = bool(enforced & _FILES), bool(enforced & _SYSTEM_CALLS)
-    may = [f"change files in its own folders{_also(policy.writable)}"]
-    may.append("open network connections" if policy.network else "")
-    may.append("execute programs" if policy.programs else "")
-    lacking = []
-    if not files:
-        lacking.append("that it changes no other files" + (" on purpose" if enforced & _REFUSALS else ""))
-        lacking.append("that it reads no keys")
-    if not enforced & _PROCESSES:
-        lacking.append("that it leaves other processes alone")
-    if not calls and not policy.network:
-        lacking.append("that it opens no connections")
-    if not calls and not policy.programs and not files:
-        lacking.append("that it executes no programs")
-    text = "the FMU may " + ", ".join(filter(None, may))
-    return text if not lacking else f"{text}; this system does not enforce {', '.join(lacking)}"
-
-
-def _also(paths: Iterable[Path]) -> str:
-    return "".join(f" and {path}" for path in paths)
+    places = "".join(f" and {path}" for path in policy.writable)
+    connecting, executing = "open network connections", "execute programs"
+    may = [f"change files in its own folders{places}"]
+    may += [connecting] * policy.network + [executing] * policy.programs
+    # What it may not do, and which of these bits keep it from that.
+    may_not = [("change other files", _FILES), ("read known places of keys", _FILES)]
+    may_not += [] if policy.programs else [(executing, _FILES | _SYSTEM_CALLS)]
+    may_not += [] if policy.network else [(connecting, _SYSTEM_CALLS)]
+    may_not.append(("reach other processes", _PROCESSES))
+    text = f"the FMU may {', '.join(may)}; it may not {', '.join(what for what, _ in may_not)}"
+    lacking = [what for what, bits in may_not if not enforced & bits]
+    if not lacking:
+        return text
+    only = ", except against mistakes" if enforced & _REFUSALS and not enforced & _FILES else ""
+    return f"{text}; of that, this system does not enforce: {', '.join(lacking)}{only}"

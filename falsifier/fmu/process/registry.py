@@ -7,7 +7,9 @@ from collections.abc import Collection, Hashable, Iterable
 
 from falsifier.core import operating_system
 from falsifier.errors import ModelError
+from falsifier.fmu.process import start
 from falsifier.fmu.process.order import Order
+from falsifier.fmu.process.policy import Policy
 from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.start import Workplace
 
@@ -95,6 +97,20 @@ def _close(runners: Iterable[Runner]) -> None:
 
 
 REGISTRY = Registry()
+
+
+def rights_text(allow: Iterable[str] = (), deny: Iterable[str] = ()) -> str:
+    """Say in one line what FMUs may do on this machine, and what of that it does not enforce.
+
+    Args:
+        allow: what users allow; see Policy.
+        deny: what they deny.
+
+    Raises:
+        SpecError: if one of these is unknown.
+        ModelError: if FMUs cannot be run on this machine.
+    """
+    return start.rights_text(REGISTRY.workplace(), Policy.of(allow, deny))
 
 
 def stop_simulations(threads: Collection[int]) -> None:

@@ -6,6 +6,7 @@ import stat
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Mapping
 from functools import lru_cache
 from hashlib import sha256
@@ -20,12 +21,14 @@ from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_pa
 from falsifier.fmu.output import Output
 from falsifier.fmu.process.encoding import text
 from falsifier.fmu.process.environment import protect_secrets, worker_environment
-from falsifier.fmu.process.policy import Policy, encoded, hidden_places
+from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
 from falsifier.fmu.process.room import Memory
 
 WORKER = Path(__file__).parents[1] / "worker"
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
+# A worker has told what is enforced after at most the first; it is looked for after the second.
+_SETUP_SECONDS, _LOOKING_SECONDS = 10.0, 0.001
 # What Wine would start besides the worker, or ask the user to install.
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
@@ -165,6 +168,22 @@ class Started:
         self.output.close()
         self.memory.close()
         operating_system.remove_tree(self.scratch)
+
+
+def rights_text(workplace: Workplace, policy: Policy) -> str:
+    """Say in one line what FMUs may do, and what this system does not enforce; starts a worker to see that.
+
+    Raises:
+        ModelError: if there is no program for this machine.
+    """
+    told, until = b"", time.monotonic() + _SETUP_SECONDS
+    if sys.platform != "win32":
+        started = Started(workplace, workplace.scratch(), policy, through_wine=False)
+        while not told.endswith(b"\0") and time.monotonic() < until:
+            told += started.program.told()
+            time.sleep(_LOOKING_SECONDS)
+        started.end()
+    return policy_text(policy, read_told(told).enforced)
 
 
 def crash_code(exception: int) -> int:

@@ -26,6 +26,7 @@ enum { REPLIES = 3, ROOM = 4, LAST = ROOM };
 
 /* A copy of descriptor 0, so that the FMU does not read requests from its standard input. */
 static int requests;
+static struct stat replies;
 static char working_folder[4096];
 
 /* Descriptors of the parent that it did not mean to pass on. */
@@ -52,6 +53,7 @@ void start_platform(void (*report)(unsigned code))
         dup2(nothing, STDIN_FILENO);
         close(nothing);
     }
+    fstat(REPLIES, &replies);
     /* Programs that the FMU starts do not get the others. */
     for (int descriptor = REPLIES; descriptor <= LAST; descriptor++)
         fcntl(descriptor, F_SETFD, FD_CLOEXEC);
@@ -133,6 +135,10 @@ static int write_all(int target, const char *at, size_t count)
 
 int send_bytes(const void *source, size_t count)
 {
+    struct stat now;
+    /* The FMU may have put something else in its place. */
+    if (fstat(REPLIES, &now) || now.st_ino != replies.st_ino || now.st_dev != replies.st_dev)
+        return 0;
     return write_all(REPLIES, source, count);
 }
 

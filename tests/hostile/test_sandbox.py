@@ -1,0 +1,286 @@
+"""FMUs that change, read, execute and signal what is not theirs: it is refused, and failures say so.
+
+Everything that they try is of fixed names in a folder of the test, and each test runs in a process that can
+change nothing outside that folder whatever the worker's own sandbox lets through (``cage``).
+"""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.fmu.fixtures import path
+from tests.hostile import cage
+from tests.hostile.test_fmus import children, have_ended
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux"),
+    pytest.mark.skipif(cage.version() < 3, reason="this system cannot confine hostile tests a second time"),
+]
+
+# As in tests/fixtures/fmus/src/hostile.h; CRASH makes a simulation fail after a misdeed.
+CRASH = 11
+CHANGE, READ_KEY, EXECUTE, BECOME, MEDDLE, DAEMONISE, BIG_FILE, SHARE, SHUT, REDIRECT, CONNECT = range(13, 24)
+CLOSE = 9
+HOW = {
+    "create": 0,
+    "overwrite": 1,
+    "rename": 2,
+    "truncate": 3,
+    "delete": 4,
+    "make a folder": 5,
+    "make a link": 6,
+    "link": 7,
+    "link into its folder": 8,
+    "change permissions": 9,
+    "truncate while opening for reading": 10,
+    "write through a link": 11,
+    "change permissions of an open file": 12,
+    "move a file out of its folder": 13,
+    "change times": 14,
+}
+
+SCRIPT = """
+import os, sys
+from pathlib import Path
+from tests.hostile import cage
+cage.enter(Path(os.environ["TMPDIR"]))
+{before}
+from falsifier.core.model import Experiment
+from falsifier.errors import FalsifierError
+from falsifier.fmu import FmuModel
+
+fmu, misdeed, variant, *rights = sys.argv[1:]
+allow = [each for each in rights if each != "network"]
+model = FmuModel(Path(fmu), allow=tuple(allow), deny=tuple(set(rights) - set(allow)))
+def tried(misdeed, variant=0):
+    experiment = Experiment(1.0, 0.1, ("y",), None, None, 60.0)
+    try:
+        found = model.simulate({}, {"misdeed": misdeed, "variant": variant, "moment": 0.86}, experiment)
+        return f"{found['y'][-1]:g} {' '.join(found.log)}"
+    except FalsifierError as error:
+        return f"{type(error).__name__} {getattr(error, 'status', '')}: {error}"
+print(tried(int(misdeed), int(variant)), flush=True)
+"""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder of the test with a home, and files that hostile FMUs are led to."""
+
+    root: Path
+
+    @property
+    def home(self) -> Path:
+        return self.root / "home"
+
+    @property
+    def work(self) -> Path:
+        """Where falsifier and the FMUs have their folders."""
+        return self.root / "tmp"
+
+    def run(
+        self,
+        misdeed: int,
+        variant: int = 0,
+        *rights: str,
+        at: Path | None = None,
+        before: str = "",
+        more: str = "",
+    ) -> str:
+        """Let an FMU do something to files of fixed names in a folder; return what came of it."""
+        script = SCRIPT.replace("{before}", before) + more
+        numbers = (str(misdeed), str(variant))
+        return subprocess.run(
+            [sys.executable, "-c", script, str(path("Hostile_2")), *numbers, *rights],
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(sys.path),
+                "PYTHONDONTWRITEBYTECODE": "1",
+                "HOME": str(self.home),
+                "TMPDIR": str(self.root),
+                "HOSTILE_LICENSE": str(at or self.home),
+            },
+        ).stdout
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    found = Place(tmp_path)
+    (found.home / ".ssh").mkdir(parents=True)
+    (found.home / ".ssh" / "id").write_text("hostile-test-secret")
+    (found.home / "victim").write_text("content")
+    return found
+
+
+def content(folder: Path) -> dict[str, tuple[int, bytes]]:
+    """Modes and contents of the files and links of a folder, by name."""
+    return {
+        each.name: (each.lstat().st_mode, each.read_bytes() if each.is_file() else b"")
+        for each in folder.iterdir()
+        if not each.name.startswith("falsifier-fmu-")
+    }
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_files_of_others_cannot_be_changed(place: Place, how: str) -> None:
+    before = content(place.home)
+    times = (place.home / "victim").stat().st_mtime_ns
+    assert place.run(CHANGE, HOW[how]).split()[0] == "0"
+    assert content(place.home) == before
+    assert (place.home / "victim").stat().st_mtime_ns == times
+
+
+@pytest.mark.parametrize("how", ["create", "overwrite", "rename", "truncate", "delete"])
+def test_nor_can_those_beside_its_folder(place: Place, how: str) -> None:
+    (place.root / "victim").write_text("content")
+    before = content(place.root)
+    assert place.run(CHANGE, HOW[how], at=place.root).split()[0] == "0"
+    assert content(place.root) == before
+
+
+OTHER = """
+model.close()
+other = FmuModel(Path(fmu).with_name("Lag_2.fmu"))
+other.simulate(dict(), dict(), Experiment(1.0, 0.1, ("y",)))
+found = Path(os.environ["TMPDIR"]).glob("*/*/modelDescription.xml")
+(folder,) = (each.parent for each in found if 'modelName="Lag"' in each.read_text())
+(folder / "victim").write_text("content")
+os.environ["HOSTILE_LICENSE"] = str(folder)
+before = sorted(folder.rglob("*"))
+print(*(tried({}, k).split()[0] for k in range({})))
+print((folder / "victim").read_text(), sorted(folder.rglob("*")) == before)
+"""
+
+
+def test_nor_can_the_unpacked_files_of_another_fmu(place: Place) -> None:
+    said = place.run(0, 0, more=OTHER.format(CHANGE, len(HOW))).splitlines()
+    assert said[1:] == [" ".join("0" * len(HOW)), "content True"]
+
+
+def test_its_own_folder_is_its_own(place: Place) -> None:
+    assert place.run(CHANGE, -1).split()[0] == "1"
+
+
+def test_a_folder_can_be_allowed(place: Place) -> None:
+    (place.home / "logs").mkdir()
+    (place.home / "logs" / "victim").write_text("content")
+    allowed = f"write:{place.home / 'logs'}"
+    assert place.run(CHANGE, HOW["create"], allowed, at=place.home / "logs").split()[0] == "1"
+    assert place.run(CHANGE, HOW["overwrite"], allowed, at=place.home / "logs").split()[0] == "1"
+    assert (place.home / "logs" / "victim").read_text() == "!ontent"
+    assert place.run(CHANGE, HOW["overwrite"], allowed).split()[0] == "0", "not those above it"
+    assert (place.home / "victim").read_text() == "content"
+
+
+def test_keys_cannot_be_read_unless_that_is_allowed(place: Place) -> None:
+    assert place.run(READ_KEY).split()[0] == "0"
+    assert place.run(READ_KEY, 0, f"read:{place.home / '.ssh'}").split()[0] == "1"
+
+
+def test_programs_cannot_be_executed_unless_that_is_allowed(place: Place) -> None:
+    assert place.run(EXECUTE).split()[0] == "0"
+    assert place.run(EXECUTE, 0, "programs").split()[0] == "1"
+
+
+def test_connections_can_be_denied(place: Place) -> None:
+    assert place.run(CONNECT).split()[0] == "1", "for licence servers"
+    assert place.run(CONNECT, 0, "network").split()[0] == "0"
+
+
+@pytest.fixture
+def decoy() -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(["sleep", "1000"])
+    yield process
+    process.kill()
+    process.wait()
+
+
+def test_other_processes_are_out_of_reach(
+    place: Place, decoy: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOSTILE_LICENSE_PID", str(decoy.pid))
+    assert place.run(MEDDLE).split()[0] == "0"
+    assert decoy.poll() is None
+
+
+def test_a_daemon_ends_with_the_process(place: Place) -> None:
+    said = place.run(DAEMONISE)
+    pids = children((said,))
+    assert len(pids) == 1 and have_ended(pids)
+
+
+def test_a_failure_tells_what_was_refused_before(place: Place) -> None:
+    said = place.run(CHANGE, 100 + HOW["overwrite"])
+    assert said.startswith("SimulationError failed")
+    assert str(place.home / "victim") in said and f"--allow write:{place.home}" in said
+    said = place.run(EXECUTE, 100)
+    assert "/bin/sh" in said and "--allow programs" in said
+    assert "refused" not in place.run(CRASH)
+
+
+@pytest.mark.parametrize("misdeed", [CLOSE, REDIRECT])
+def test_an_fmu_that_loses_its_descriptors_has_cut_its_connection(place: Place, misdeed: int) -> None:
+    said = place.run(misdeed)
+    assert said.startswith("SimulationError crashed") and "cut the connection" in said
+    assert signal.Signals.SIGKILL.name not in said
+
+
+def test_descriptors_cannot_be_shut_down(place: Place) -> None:
+    assert place.run(SHUT).split()[0] == "10"
+
+
+def test_a_replaced_program_is_named(place: Place) -> None:
+    said = place.run(BECOME, 0, "programs")
+    assert said.startswith("SimulationError crashed") and "replaced its program by /bin/true" in said
+    assert place.run(BECOME).split()[0] == "0"
+
+
+def test_a_file_cannot_outgrow_the_limit(place: Place) -> None:
+    assert place.run(BIG_FILE).split()[0] == "-1", "writing fails, and the simulation goes on"
+
+
+SMALL = """
+from falsifier.fmu.process import start
+start._MEMORY_SHARE = 1e8 / start.operating_system.machine_memory()
+print(tried({}))
+"""
+
+
+def test_shared_memory_counts(place: Place) -> None:
+    said = place.run(0, 0, more="model.close()\n" + SMALL.format(SHARE)).splitlines()
+    assert said[1].startswith("SimulationError crashed") and "more memory than it may" in said[1]
+
+
+# Landlock's first call, and the flag with which a filter of system calls asks a guard.
+NO_LANDLOCK = "import errno; cage.without(444, errno.EOPNOTSUPP)"
+NO_GUARD = "import errno; cage.without(317 if os.uname().machine == 'x86_64' else 277, errno.EBUSY, 8)"
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_without_landlock_mistakes_are_stopped_all_the_same(place: Place, how: str) -> None:
+    before = content(place.home)
+    assert place.run(CHANGE, HOW[how], before=NO_LANDLOCK).split()[0] == "0"
+    assert content(place.home) == before
+    assert place.run(CHANGE, -1, before=NO_LANDLOCK).split()[0] == "1"
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_without_a_guard_that_is_asked_nothing_can_be_changed_either(place: Place, how: str) -> None:
+    before = content(place.home)
+    assert place.run(CHANGE, HOW[how], before=NO_GUARD).split()[0] == "0"
+    assert content(place.home) == before
+
+
+def test_without_a_guard_that_is_asked_programs_are_not_executed(place: Place) -> None:
+    assert place.run(EXECUTE, before=NO_GUARD).split()[0] == "0"
+    assert place.run(EXECUTE, 0, "programs", before=NO_GUARD).split()[0] == "1"
+    assert place.run(MEDDLE, before=NO_GUARD).split()[0] == "0"
