@@ -51,18 +51,23 @@ def margin_words(robustness: float, predicate: str = "") -> str:
     ('violated by this margin', 'holds with this margin; below 0 is a violation')
     >>> margin_words(on_limit(">"), "load > 0")
     'violated: exactly on the limit, which > does not allow'
+    >>> margin_words(on_limit(">"), "gear == 3")  # a condition: what followed from it failed
+    'violated, by a margin of 0: gear == 3 holds exactly on its limit'
     """
     if is_on_limit(robustness):
         if robustness > 0:
             return "holds: exactly on the limit, which is allowed"
-        return f"violated: exactly on the limit{_forbidden(predicate)}"
+        return _violated_on_limit(predicate)
     if robustness < 0:
         return "violated by this margin"
     return "holds with this margin; below 0 is a violation"
 
 
-def _forbidden(predicate: str) -> str:
+def _violated_on_limit(predicate: str) -> str:
     comparison = parse(predicate) if predicate else None
-    if isinstance(comparison, Predicate) and on_limit(comparison.operator) < 0:
-        return f", which {comparison.operator} does not allow"
-    return ", which is not allowed"  # for example under a negation
+    if not isinstance(comparison, Predicate):
+        return "violated: exactly on the limit"
+    if on_limit(comparison.operator) < 0:
+        return f"violated: exactly on the limit, which {comparison.operator} does not allow"
+    # It is under a negation, or the condition of what failed.
+    return f"violated, by a margin of 0: {predicate} holds exactly on its limit"
