@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.errors import FormulaError
-from falsifier.stl import opcodes as op
+from falsifier.stl import steps as op
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, number_text
 from falsifier.stl.formula import (
     Always,
@@ -84,8 +84,7 @@ class _Compiler:
     samples: int
     needs: dict[Node, tuple[int, int]] = field(default_factory=dict)
     places: dict[Node, Place] = field(default_factory=dict)
-    rows: list[tuple[int, int, int, int, int, int]] = field(default_factory=list)
-    numbers: list[tuple[float, float]] = field(default_factory=list)
+    steps: list[op.Step] = field(default_factory=list)
     checked: dict[int, tuple[Predicate, Place]] = field(default_factory=dict)
     size: int = 0
 
@@ -137,7 +136,7 @@ class _Compiler:
 
     def _emit(
         self,
-        code: int,
+        make: op.Maker,
         first: int,
         second: int,
         *,
@@ -147,8 +146,9 @@ class _Compiler:
         q: float = 0.0,
     ) -> int:
         """Append one step and return the offset of its result."""
-        self.rows.append((code, self.size, first, second, length, width))
-        self.numbers.append((p, q))
+        out = slice(self.size, self.size + length)
+        a, b = slice(first, first + length + width), slice(second, second + length)
+        self.steps.append(make(out, a, b, p, q))
         self.size += length
         return self.size - length
 
@@ -208,9 +208,9 @@ class _Compiler:
             offset = self._emit(op.ABS, offset, 0, length=n)
         if node.operator == "==":
             offset = self._negated(offset, n)
-        self.checked[len(self.rows)] = node, Place(offset - first, first, first + n - 1)
-        self.rows.append((op.CHECK, 0, offset, 0, n, 0))
-        self.numbers.append((on_limit(node.operator), 0.0))
+        self.checked[len(self.steps)] = node, Place(offset - first, first, first + n - 1)
+        margins = slice(offset, offset + n)
+        self.steps.append(op.CHECK(margins, margins, margins, on_limit(node.operator), 0.0))
         return offset
 
     def _negated(self, offset: int, n: int) -> int:
@@ -301,8 +301,8 @@ class _Compiler:
             self.formula.signals,
             self.step,
             self.samples,
-            np.array(self.rows, dtype=np.int64).reshape(-1, 6),
-            np.array(self.numbers, dtype=np.float64).reshape(-1, 2),
+            np.arange(self.samples, dtype=np.float64) * self.step,
+            tuple(self.steps),
             self.size,
             self.checked,
         )

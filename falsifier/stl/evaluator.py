@@ -1,7 +1,6 @@
 """Runs a compiled formula on trajectories and explains why a trajectory cannot be evaluated."""
 
 from collections.abc import Mapping
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +8,10 @@ from numpy.typing import NDArray
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError, did_you_mean
 from falsifier.stl.program import Program
+from falsifier.stl.steps import run
 
 Floats = NDArray[np.float64]
+_TIME_TOLERANCE = 1e-6  # as a fraction of one sampling step
 
 
 def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
@@ -24,7 +25,6 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
     Raises:
         MonitorError: if the trajectory cannot be evaluated.
     """
-    kernels = _kernels()
     n, times = program.samples, trajectory.times
     if len(times) != n:
         raise MonitorError(
@@ -35,16 +35,17 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
     for name in program.signals:
         buffer[start : start + n] = trajectory[name]
         start += n
-    times = np.ascontiguousarray(times, dtype=np.float64)
-    status, position = kernels.judge(program.rows, program.numbers, buffer, start, times, program.step)
-    if status == kernels.FINE:
-        return buffer
-    if status == kernels.BAD_TIME:
+    uneven = np.absolute(times - program.times)
+    if not uneven.max() <= _TIME_TOLERANCE * program.step:
+        position = int(np.flatnonzero(~(uneven <= _TIME_TOLERANCE * program.step))[0])
         raise MonitorError(
             f"the time grid is not uniform: recorded time {position} is {times[position]:g} s, expected "
             f"{position * program.step:g} s"
         )
-    raise MonitorError(_problem(program, buffer, status, position))
+    problem = _run(program, buffer, start)
+    if problem:
+        raise MonitorError(problem)
+    return buffer
 
 
 def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
@@ -57,7 +58,6 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
     Raises:
         MonitorError: naming the first trajectory that cannot be evaluated, and the signal.
     """
-    kernels = _kernels()
     for name in program.signals:
         if name not in columns:
             raise MonitorError(f"no signal {name!r} in the batch; {did_you_mean(name, columns)}")
@@ -66,27 +66,34 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
     count = len(next(iter(columns.values()))) if columns else 0
     if shapes != {(count, program.samples)}:
         raise MonitorError(f"expected columns of shape (m, {program.samples}), got {sorted(shapes)}")
-    stacked = np.stack(used) if used else np.empty((0, count, program.samples))
-    buffer, result = np.empty(program.size), np.empty(count)
-    root = program.root.place.at(0)
-    status, which, position = kernels.judge_many(program.rows, program.numbers, buffer, stacked, root, result)
-    if status != kernels.FINE:
-        raise MonitorError(f"trajectory {which}: {_problem(program, buffer, status, position)}")
-    return result
-
-
-def _kernels() -> ModuleType:
-    from falsifier.stl import kernels
-
-    return kernels
-
-
-def _problem(program: Program, buffer: Floats, status: int, position: int) -> str:
+    buffer = np.empty((program.size, count))
     n = program.samples
-    if status == _kernels().BAD_SIGNAL:
-        signal, sample = divmod(position, n)
-        return f"signal {program.signals[signal]!r} is {buffer[position]} at {sample * program.step:g} s"
-    predicate, place = program.checked[position]
+    for i, column in enumerate(used):
+        buffer[i * n : (i + 1) * n] = column.T
+    if _run(program, buffer, n * len(used)):
+        for which in range(count):  # the first one with a problem is named
+            alone = np.array(buffer[:, which])
+            problem = _run(program, alone, n * len(used))
+            if problem:
+                raise MonitorError(f"trajectory {which}: {problem}")
+    return np.array(buffer[program.root.place.at(0)])
+
+
+def _run(program: Program, buffer: Floats, signals: int) -> str:
+    """Fill a buffer whose first part has the signals; return what is wrong, if anything is."""
+    if not np.isfinite(buffer[:signals]).all():
+        bad = int(np.flatnonzero(~np.isfinite(buffer[:signals]))[0]) if buffer.ndim == 1 else 0
+        signal, sample = divmod(bad, program.samples)
+        return f"signal {program.signals[signal]!r} is {buffer[bad]} at {sample * program.step:g} s"
+    failed = run(program.steps, buffer)
+    return "" if failed < 0 else _problem(program, buffer, failed)
+
+
+def _problem(program: Program, buffer: Floats, failed: int) -> str:
+    n = program.samples
+    predicate, place = program.checked[failed]
+    if buffer.ndim > 1:
+        return f"{predicate} has no finite value"
     margins = buffer[place.at(place.first) : place.at(place.last) + 1]
     sample = place.first + int(np.flatnonzero(~np.isfinite(margins))[0])
     here = {name: buffer[i * n + sample] for i, name in enumerate(program.signals)}

@@ -1,4 +1,4 @@
-"""A compiled formula: the steps for the kernels, and the place of each part's values in the buffer."""
+"""A compiled formula: its steps, and the place of each part's values in the buffer."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.stl.formula import Formula, Predicate
+from falsifier.stl.steps import Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +74,24 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Steps for the kernels, and the place of each part's values.
+    """Steps, and the place of each part's values.
 
     Attributes:
         root: the whole formula.
         signals: names of the signals, in their order in the buffer.
         step: sampling step in s.
         samples: number of samples of one trajectory.
-        rows: steps as described in opcodes, shape (r, 6).
-        numbers: two constants for each step, shape (r, 2).
+        times: the time grid in s, shape (n,).
+        steps: what fills the buffer, in order.
         size: length of the buffer.
-        checked: the predicate that each CHECK row checks, and its place, by row.
+        checked: the predicate that each check is for, and its place, by the number of the step.
     """
 
     root: Part
     signals: tuple[str, ...]
     step: float
     samples: int
-    rows: NDArray[np.int64]
-    numbers: NDArray[np.float64]
+    times: NDArray[np.float64]
+    steps: tuple[Step, ...]
     size: int
     checked: dict[int, tuple[Predicate, Place]]

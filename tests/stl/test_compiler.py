@@ -4,32 +4,31 @@ import numpy as np
 import pytest
 
 from falsifier.errors import FormulaError
-from falsifier.stl import opcodes, parse
+from falsifier.stl import parse
 from falsifier.stl.compiler import compile_formula, window_samples
 from falsifier.stl.formula import Window
 from falsifier.stl.program import Program
+from falsifier.stl.steps import run
 
 
 def compiled(text: str, *, samples: int = 101, **wanted: int) -> Program:
     return compile_formula(parse(text), step=0.1, samples=samples, **wanted)
 
 
-def lengths(program: Program, code: int) -> list[int]:
-    return [int(row[4]) for row in program.rows if row[0] == code]
+def computed(program: Program) -> int:
+    """Number of values beside the signals."""
+    return program.size - len(program.signals) * program.samples
 
 
 def test_nothing_outside_the_windows_is_computed() -> None:
     program = compiled("G[2,5] F[1,2] (x * y <= 1)")
-    assert lengths(program, opcodes.MULTIPLY) == [41], "from 3 to 7 s"
-    assert lengths(program, opcodes.WINDOW_MAXIMUM) == [31]
-    assert lengths(program, opcodes.WINDOW_MINIMUM) == [1]
+    assert computed(program) == 2 * 41 + 31 + 1, "products and margins from 3 to 7 s, then the windows"
     assert program.root.place.first == program.root.place.last == 0
 
 
 def test_a_part_that_stands_twice_is_computed_once_where_either_needs_it() -> None:
     program = compiled("G[0,2] (x*y <= 1) and G[4,5] (x*y <= 1)")
-    assert lengths(program, opcodes.MULTIPLY) == [51]
-    assert lengths(program, opcodes.CHECK) == [51]
+    assert computed(program) == 2 * 51 + 3
     assert (
         compiled("G[0,2] (x <= 1) and G[0,2] (x <= 1)").size
         < compiled("G[0,2] (x <= 1) and G[0,2] (x <= 2)").size
@@ -39,13 +38,13 @@ def test_a_part_that_stands_twice_is_computed_once_where_either_needs_it() -> No
 def test_values_at_several_samples_reach_further() -> None:
     program = compiled("G[0,2] (x <= 1)", first=10, last=30)
     assert (program.root.place.first, program.root.place.last) == (10, 30)
-    assert lengths(program, opcodes.CHECK) == [41]
+    assert computed(program) == 41 + 21
 
 
 def test_constants_are_worked_out_beforehand() -> None:
     program = compiled("x <= 2*3 + sqrt(16)")
-    assert not {int(code) for code in program.rows[:, 0]} & {opcodes.ADD, opcodes.SQRT, opcodes.MULTIPLY}
-    assert 10.0 in program.numbers
+    assert computed(program) == 1
+    assert len(program.steps) == 2, "the margin, and its check"
 
 
 @pytest.mark.parametrize(
@@ -76,6 +75,6 @@ def test_windows_are_counted_in_samples() -> None:
 def test_signals_lie_first_in_the_order_of_the_formula() -> None:
     program = compiled("G[0,1] (b <= a)", samples=11)
     assert program.signals == ("b", "a")
-    assert program.rows[0][2] == 11 and program.rows[0][3] == 0, "a - b"
-    assert program.size >= 33
-    assert program.rows.dtype == np.int64
+    buffer = np.concatenate([np.full(11, 2.0), np.full(11, 5.0), np.zeros(program.size - 22)])
+    assert run(program.steps, buffer) == -1
+    assert program.root.at(buffer, 0) == 3.0, "a - b"
