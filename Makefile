@@ -10,7 +10,7 @@ PIP_INSTALL := install --quiet --disable-pip-version-check --no-compile
 # of processor time instead of 6, and most others three to five times as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test lint types types-linux types-win32 types-darwin compiled pytest test-spawn docs notebooks fmus worker clean
+.PHONY: demo test lint types types-linux types-win32 types-darwin compiled pytest docs notebooks fmus worker clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
@@ -42,11 +42,6 @@ compiled: .venv/test
 
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest -n 2 --dist worksteal
-
-# The tests of simulations again, with each FMU worker started as on systems without fork. Takes several minutes.
-test-spawn: .venv/test
-	FALSIFIER_WORKERS=spawn $(BIN)/pytest -n 2 --dist worksteal tests/fmu tests/evaluation tests/hostile tests/search \
-		tests/problem tests/systems tests/counterexamples tests/campaigns
 
 docs: .venv/test
 	$(BIN)/mkdocs build --strict

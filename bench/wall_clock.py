@@ -50,9 +50,9 @@ class Slower:
         return self.model.info
 
     @property
-    def isolate(self) -> bool:
+    def has_own_processes(self) -> bool:
         """Whether it simulates in processes of its own."""
-        return bool(getattr(self.model, "isolate", False))
+        return bool(getattr(self.model, "has_own_processes", False))
 
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment

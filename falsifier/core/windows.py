@@ -1,33 +1,26 @@
-"""Processes, connections and memory on Windows; ``posix`` and ``linux`` offer the same elsewhere.
+"""Processes, connections and memory on Windows; ``posix`` offers the same elsewhere.
 
 Checked by mypy for Windows, but not run there yet.
 """
 
-import base64
 import contextlib
 import ctypes
-import mmap
 import msvcrt
 import os
-import select
-import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import wintypes
 from pathlib import Path
 
 assert sys.platform == "win32"
 
-HAS_FORK = SENDS_FILES = False
-FORKS_BY_DEFAULT = False
 
 _SYNCHRONIZE, _WAIT_FINISHED = 0x00100000, 0
-_NO_ACCESS = 0x01  # PAGE_NOACCESS
-_UNBUFFERED = 4  # _IONBF: Microsoft's C libraries know no line buffering
 _EXTENDED_LIMITS = 9  # JobObjectExtendedLimitInformation
 _LIMIT_PROCESS_MEMORY, _KILL_WITH_JOB = 0x00000100, 0x00002000
+_SYNCHRONIZE = 0x00100000
 _KILLED = 1  # exit code of what is ended here
 # Exit codes of processes that crashed (ntstatus.h).
 _CRASHES = {
@@ -39,8 +32,6 @@ _CRASHES = {
     0xC0000374: "heap corruption",
     0xC0000409: "abort",
 }
-# How often to look whether a process still lives: one cannot wait for that and for a socket together.
-_LOOKING_SECONDS = 0.1
 _PEEKING_SECONDS = 0.0005
 # Share of the machine's memory that a program may allocate.
 _MEMORY_SHARE = 0.8
@@ -90,93 +81,6 @@ class _MemoryStatus(ctypes.Structure):
         ("ullAvailVirtual", ctypes.c_uint64),
         ("ullAvailExtendedVirtual", ctypes.c_uint64),
     )
-
-
-class _MemoryCounters(ctypes.Structure):
-    _fields_ = (
-        ("cb", wintypes.DWORD),
-        ("PageFaultCount", wintypes.DWORD),
-        ("PeakWorkingSetSize", ctypes.c_size_t),
-        ("WorkingSetSize", ctypes.c_size_t),
-        ("QuotaPeakPagedPoolUsage", ctypes.c_size_t),
-        ("QuotaPagedPoolUsage", ctypes.c_size_t),
-        ("QuotaPeakNonPagedPoolUsage", ctypes.c_size_t),
-        ("QuotaNonPagedPoolUsage", ctypes.c_size_t),
-        ("PagefileUsage", ctypes.c_size_t),
-        ("PeakPagefileUsage", ctypes.c_size_t),
-    )
-
-
-class Child:
-    """A program with one end of a connection, in a job that ends with this process.
-
-    Args:
-        command: program and arguments; it calls ``receive_connection`` at its start.
-        environment: its environment.
-        connection: its end of the connection, which is closed when the program has received it.
-        output: descriptor of a file for what it prints; None: its messages go where this process's go.
-    """
-
-    def __init__(
-        self,
-        command: Sequence[str],
-        environment: Mapping[str, str],
-        connection: socket.socket,
-        output: int | None = None,
-    ) -> None:
-        self._connection = connection
-        try:
-            self._process = subprocess.Popen(
-                command,
-                env=environment,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL if output is None else output,
-                stderr=output,
-                creationflags=subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.CREATE_NO_WINDOW,
-                bufsize=0,
-            )
-            self.pid = self._process.pid
-            self._job = _job(_KILL_WITH_JOB)
-            _kernel.AssignProcessToJobObject(
-                wintypes.HANDLE(self._job), wintypes.HANDLE(_handle(self._process))
-            )
-            assert self._process.stdin is not None, "it is a pipe"
-            self._line = self._process.stdin
-            with contextlib.suppress(OSError):  # it has ended already
-                self._line.write(base64.b64encode(connection.share(self.pid)) + b"\n")
-        except BaseException:
-            connection.close()
-            raise
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether the process is running."""
-        return self._process.poll() is None
-
-    def settle(self) -> None:
-        """Close the program's end of the connection: it has received it."""
-        self._connection.close()
-
-    def wait(self, limit: float) -> None:
-        """Wait for the end of the process, at most this many seconds."""
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(limit)
-
-    def end(self) -> int:
-        """End the process and what it has started; return its exit code.
-
-        A process that has already ended keeps its own exit code.
-        """
-        self._connection.close()
-        _kernel.TerminateJobObject(wintypes.HANDLE(self._job), _KILLED)
-        with contextlib.suppress(OSError):
-            self._process.kill()
-        _kernel.CloseHandle(wintypes.HANDLE(self._job))
-        self._line.close()
-        return self._process.wait()
-
-    def forget(self) -> None:
-        """Leave the process to another one, of which this is a copy; there are none here."""
 
 
 class Program:
@@ -307,52 +211,16 @@ def machine_memory() -> int:
     return int(status.ullTotalPhys) if _kernel.GlobalMemoryStatusEx(ctypes.byref(status)) else 0
 
 
-def interpreter() -> str:
-    """Return the path of this Python, to start another one with.
-
-    That of a virtual environment would only start that of the installation, as another process.
-    """
-    return str(getattr(sys, "_base_executable", None) or sys.executable)
-
-
-def receive_connection() -> tuple[socket.socket, int]:
-    """Return the connection of a program that was started as a ``Child``, and a line to its parent.
-
-    The line is a descriptor; reading from it ends when the parent has ended.
-    """
-    said = b""
-    while not said.endswith(b"\n"):
-        part = os.read(0, 1)
-        if not part:
-            os._exit(1)  # the parent has ended
-        said += part
-    line = os.dup(0)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    return socket.fromshare(base64.b64decode(said)), line
-
-
 def on_fork(callback: Callable[[], None]) -> None:
     """Do nothing: processes are never forked here."""
 
 
-def open_life(pid: int) -> int | None:
-    """Open a handle that tells whether a process has ended; None if it has."""
-    return _kernel.OpenProcess(_SYNCHRONIZE, False, pid) or None  # noqa: FBT003
-
-
-def close_life(life: int) -> None:
-    """Close what ``open_life`` has opened."""
-    _kernel.CloseHandle(wintypes.HANDLE(life))
-
-
 def is_running(pid: int) -> bool:
     """Whether there is a process with this number; also if it is another user's, or cannot be asked."""
-    life = open_life(pid)
-    if life is not None:
-        close_life(life)
-    return life is not None or ctypes.get_last_error() != _NO_SUCH_PROCESS
+    process = _kernel.OpenProcess(_SYNCHRONIZE, False, pid)  # noqa: FBT003
+    if process:
+        _kernel.CloseHandle(wintypes.HANDLE(process))
+    return bool(process) or ctypes.get_last_error() != _NO_SUCH_PROCESS
 
 
 def exit_text(code: int) -> str:
@@ -361,66 +229,6 @@ def exit_text(code: int) -> str:
     if code in _CRASHES:
         return f"{_CRASHES[code]}, exit code 0x{code:X}"
     return f"it exited with code {code if code < 1 << 30 else hex(code)}"
-
-
-def limit_sending(sock: socket.socket, seconds: float) -> None:
-    """Let sending fail that takes longer than this; send small messages at once."""
-    sock.setsockopt(socket.SOL_SOCKET, 0x1005, max(1, int(seconds * 1e3)))  # SO_SNDTIMEO, in ms
-    # Pairs of sockets are TCP connections here.
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-
-def receive_now(sock: socket.socket, most: int, *, keep: bool = False) -> bytes:
-    """Receive what is there.
-
-    Args:
-        sock: where from.
-        most: maximum number of bytes.
-        keep: whether the next call receives it again.
-
-    Raises:
-        BlockingIOError: if nothing is there.
-    """
-    if not select.select([sock], [], [], 0)[0]:
-        raise BlockingIOError
-    return sock.recv(most, socket.MSG_PEEK if keep else 0)
-
-
-def wait_readable(sock: socket.socket, life: int | None, seconds: float) -> bool:
-    """Wait until there is something to receive.
-
-    Args:
-        sock: where from.
-        life: see ``open_life``; its end ends the wait, too.
-        seconds: longest time to wait.
-
-    Returns:
-        Whether there is something; False if the life has ended instead.
-
-    Raises:
-        TimeoutError: if neither happens in time.
-    """
-    until = time.monotonic() + seconds
-    while True:
-        left = max(0.0, until - time.monotonic())
-        ended = life is not None and _kernel.WaitForSingleObject(wintypes.HANDLE(life), 0) == _WAIT_FINISHED
-        # What the process sent before its end is still received.
-        if select.select([sock], [], [], 0.0 if ended else min(left, _LOOKING_SECONDS))[0]:
-            return True
-        if ended:
-            return False
-        if not left:
-            raise TimeoutError
-
-
-def send_descriptors(sock: socket.socket, descriptors: Sequence[int]) -> None:
-    """Raise an error: open files cannot be sent here, and only forked workers need that."""
-    raise OSError("open files cannot be sent to other processes on Windows")
-
-
-def receive_descriptors(sock: socket.socket, count: int) -> list[int]:
-    """Raise an error: see ``send_descriptors``."""
-    raise OSError("open files cannot be received from other processes on Windows")
 
 
 def yield_processor() -> None:
@@ -432,11 +240,6 @@ def start_silent_tracker() -> None:
     """Do nothing: the system frees the semaphores of processes that have ended."""
 
 
-def confine() -> bool:
-    """Return False: processes of one user are not kept apart here."""
-    return False
-
-
 def can_confine() -> bool:
     """Return False: see ``confine``."""
     return False
@@ -446,58 +249,9 @@ def hide_memory() -> None:
     """Do nothing: a process cannot hide its memory from others of the same user here."""
 
 
-def adopt_orphans() -> None:
-    """Do nothing: what a worker starts belongs to its job."""
-
-
-def end_descendants(keep: Collection[int] = ()) -> None:
-    """Do nothing: what a worker starts ends with its job."""
-
-
-def guarded_memory(size: int) -> memoryview:
-    """Allocate zeroed bytes that end where accessible memory ends.
-
-    Native code that writes past their end stops with an access violation there.
-    """
-    page = mmap.PAGESIZE
-    usable = -(-size // page) * page
-    memory = mmap.mmap(-1, usable + page)
-    guard = ctypes.addressof(ctypes.c_char.from_buffer(memory)) + usable
-    before = wintypes.DWORD()
-    _kernel.VirtualProtect(ctypes.c_void_p(guard), ctypes.c_size_t(page), _NO_ACCESS, ctypes.byref(before))
-    return memoryview(memory)[usable - size : usable]
-
-
-def limit_resources(memory_share: float) -> None:
-    """Allow this process only this share of the machine's memory."""
-    job = _job(_LIMIT_PROCESS_MEMORY, int(machine_memory() * memory_share))
-    _kernel.AssignProcessToJobObject(wintypes.HANDLE(job), wintypes.HANDLE(_kernel.GetCurrentProcess()))
-
-
 def memory_limits() -> dict[str, int]:
     """Return nothing: processes have no such limits here."""
     return {}
-
-
-def most_memory_used() -> int:
-    """Return how much memory this process has used at most, in KiB."""
-    counters = _MemoryCounters()
-    counters.cb = ctypes.sizeof(counters)
-    _kernel.K32GetProcessMemoryInfo(
-        wintypes.HANDLE(_kernel.GetCurrentProcess()), ctypes.byref(counters), counters.cb
-    )
-    return int(counters.PeakWorkingSetSize) >> 10
-
-
-def flush_lines() -> None:
-    """Let C's stdout write at once, so that what the FMU printed before a crash is not lost.
-
-    An FMU that contains a C library of its own has another stdout, which this does not reach.
-    """
-    with contextlib.suppress(OSError, AttributeError):
-        library = ctypes.CDLL("ucrtbase")
-        library.__acrt_iob_func.restype = ctypes.c_void_p
-        library.setvbuf(ctypes.c_void_p(library.__acrt_iob_func(1)), None, _UNBUFFERED, ctypes.c_size_t(0))
 
 
 def _job(flags: int, process_memory: int = 0) -> int:

@@ -43,7 +43,7 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    with _threads(jobs) if getattr(model, "isolate", False) else _processes(jobs) as executor:
+    with _threads(jobs) if getattr(model, "has_own_processes", False) else _processes(jobs) as executor:
         yield executor
 
 

@@ -42,7 +42,7 @@ class FmuModel:
 
     path: Path
     interface: Interface = "co-simulation"
-    isolate: ClassVar[bool] = True
+    has_own_processes: ClassVar[bool] = True
     logging: bool = field(default=False, kw_only=True)
     windows: bool = field(default=False, kw_only=True)
     allow: tuple[str, ...] = field(default=(), kw_only=True)

@@ -7,14 +7,11 @@ import falsifier
 
 PACKAGE = Path(falsifier.__file__).parent
 SYSTEMS = {
-    "core/linux.py",
     "core/posix.py",
     "core/posix_files.py",
     "core/windows.py",
     "core/windows_files.py",
 }
-# Used only where processes can be forked, or Wine can be installed.
-FORKING = {"fmu/forking.py", "fmu/nursery.py", "fmu/remote_component.py"}
 
 MODULES = {
     "fcntl",
@@ -87,7 +84,7 @@ def test_all_other_modules_take_it_from_one_place() -> None:
     wrong = []
     for path in sorted(PACKAGE.rglob("*.py")):
         place = path.relative_to(PACKAGE).as_posix()
-        if place in SYSTEMS | FORKING | {"core/operating_system.py"}:
+        if place in SYSTEMS | {"core/operating_system.py"}:
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module in ("falsifier.core", "falsifier"):

@@ -8,25 +8,6 @@ import pytest
 from falsifier.core import operating_system
 
 CORE = Path(operating_system.__file__).parent
-# Used by the forked way alone, or for Wine.
-UNIX_ONLY = {
-    "close_others",
-    "end_marked",
-    "fork",
-    "reap",
-    "kill",
-    "lead_group",
-    "end_group",
-    "end_with_parent",
-    "children",
-    "end_descendants_of",
-    "end_by",
-    "end_like",
-    "await_end",
-    "open_pipe",
-    "start_holding",
-    "wait_for_any",
-}
 
 
 def tree(name: str) -> ast.Module:
@@ -46,14 +27,9 @@ def functions(body: list[ast.stmt]) -> dict[str, str]:
     return {name: text for name, text in found.items() if not name.startswith("_")}
 
 
-@pytest.mark.parametrize(
-    ("windows", "others"), [("windows", ("posix", "linux")), ("windows_files", ("posix_files",))]
-)
-def test_windows_offers_the_same_functions(windows: str, others: tuple[str, ...]) -> None:
-    expected: dict[str, str] = {}
-    for other in others:
-        expected |= functions(tree(other).body)
-    assert functions(tree(windows).body) == {n: text for n, text in expected.items() if n not in UNIX_ONLY}
+@pytest.mark.parametrize(("windows", "other"), [("windows", "posix"), ("windows_files", "posix_files")])
+def test_windows_offers_the_same_functions(windows: str, other: str) -> None:
+    assert functions(tree(windows).body) == functions(tree(other).body)
 
 
 def test_all_that_is_offered_is_passed_on() -> None:

@@ -84,7 +84,7 @@ class System:
     name: str = field(default="system", kw_only=True)
     package: Path | None = field(default=None, kw_only=True, compare=False)
     key: str = field(default="", init=False, repr=False, compare=False)
-    isolate: ClassVar[bool] = True
+    has_own_processes: ClassVar[bool] = True
     logging: bool = field(default=False, kw_only=True)
     allow: tuple[str, ...] = field(default=(), kw_only=True)
     deny: tuple[str, ...] = field(default=(), kw_only=True)
