@@ -1,7 +1,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -52,9 +51,11 @@ def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
 
 
 def test_a_program_that_hangs_is_ended_at_once(tmp_path: Path) -> None:
-    policy = encoded(Policy(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", "sleep 1000"))
+    policy = encoded(
+        Policy(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", "echo here >&3; sleep 1000")
+    )
     with posix_files.sealed_file(8) as output, posix_files.sealed_file(8) as shared:
         path = [str(worker_program(tmp_path))]
         program = posix.Program(path, {}, output.fileno(), policy, shared.fileno())
-        time.sleep(0.01)
+        assert program.wait(HANG)
         assert program.end() == -9
