@@ -35,6 +35,7 @@ from falsifier.problem.problem import Problem, held_text
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
 from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
+from falsifier.problem.subject import problem_of_starter
 from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(*, fmus: tuple[Path, ...], out: Path | None, force: bool) -> None:
-    """Write a starter spec: valid as written; fill in ranges and requirements.
+    """Write a starter spec: fill in ranges and the requirement.
 
     FMU is an FMU or an SSP package. Several FMUs become the components of a system, to be connected in the
     spec.
@@ -173,8 +174,9 @@ def init(*, fmus: tuple[Path, ...], out: Path | None, force: bool) -> None:
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
     if path.exists() and not force:
         raise SpecError(f"{path} already exists: choose another --out, or add --force to replace it")
-    path.write_text(_starter(fmus, path), encoding="utf-8")
-    load_problems(str(path))
+    text = _starter(fmus, path)
+    problem_of_starter(text, path)
+    path.write_text(text, encoding="utf-8")
     command = f"falsifier run {shlex.quote(str(path))}"
     say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 

@@ -14,6 +14,9 @@ from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.renaming import renamed
 
+# What a starter spec has in place of a number; a model's own variable of this name goes before it.
+PLACEHOLDER = "LIMIT"
+
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
@@ -54,6 +57,10 @@ def parse_requirement(
     try:
         formula = parse(text)
         for name in formula.signals:
+            if name == PLACEHOLDER and name not in info:
+                raise FormulaError(
+                    f"{name} is a placeholder: write the number, or your requirement in place of this one"
+                )
             if name not in info:
                 raise FormulaError(f"unknown signal {name!r}; {similar(name, info)}")
         # One input has one name, whose values are known at every sample without asking the model.

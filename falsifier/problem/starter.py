@@ -14,20 +14,19 @@ from falsifier.errors import SpecError
 from falsifier.problem.defaults import DEFAULT_POINTS, default_interface
 from falsifier.problem.freedom import default_freedom
 from falsifier.problem.grid import choose_grid
+from falsifier.problem.requirement import PLACEHOLDER
 from falsifier.problem.sections import FreeSection
 from falsifier.stl.names import name_text
 
 # Stop time in s if the FMU specifies none.
 DEFAULT_STOP_TIME = 10.0
-# Bound of the placeholder requirement if the FMU specifies no max; no real output reaches it.
-_UNREACHED = 1e9
 # Maximum number of parameters, and of variables to write requirements about, that are listed.
 _SHOWN_PARAMETERS = 10
 _SHOWN_VARIABLES = 20
 
 
 def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
-    """Return the text of a spec file: it is valid as it is; comments say what to fill in.
+    """Return the text of a spec file: valid but for its requirement; comments say what to fill in.
 
     Args:
         fmu: path of an FMU or SSP package; or of the FMUs of a system without connections, by component.
@@ -189,10 +188,9 @@ def _requirement_table(info: ModelInfo) -> Table:
         shown = ", ".join(name_text(v.name) for v in candidates[:_SHOWN_VARIABLES])
         more = ", ..." if len(candidates) > _SHOWN_VARIABLES else ""
         table.add(_comment(f"The FMU declares no outputs. Requirements may name any variable: {shown}{more}"))
-    first = candidates[0]
-    bound = _UNREACHED if first.high is None else first.high
     stop_time = info.stop_time or DEFAULT_STOP_TIME
-    formula = f"G[0,{stop_time:.10g}] ({name_text(first.name)} <= {bound:.10g})"
+    # Nothing may be searched, or found to hold, before somebody has said what is required.
+    formula = f"G[0,{stop_time:.10g}] ({name_text(candidates[0].name)} <= {PLACEHOLDER})"
     table.add("formula", _noted(_formula_item(formula), "replace with the real requirement"))
     table.add("description", "")
     return table

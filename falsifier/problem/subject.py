@@ -15,14 +15,14 @@ from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec, load_source
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import parse_requirement
+from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.source import MODEL_FILES, ProblemSource
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.problem.starter import starter_spec
 from falsifier.stl import Formula, parse
 
-# Name of the requirement in a starter spec, which is only a placeholder.
-_PLACEHOLDER = "R1"
+# Name of the requirement in a starter spec, which is to be replaced.
+_STARTED = "R1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,24 @@ def _of_model(fmu: Path) -> Subject:
     info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
     path = fmu.with_suffix(".toml")
     text = starter_spec(Path(fmu.name), info)
-    joined = join(parse_spec(tomllib.loads(text), file=str(path)), _PLACEHOLDER, path=path)
-    return Subject(Problem.from_parts(joined), path, path.parent, text, is_new=True, free_grid=True)
+    problem = problem_of_starter(text, path)
+    return Subject(problem, path, path.parent, text, is_new=True, free_grid=True)
+
+
+def problem_of_starter(text: str, path: Path) -> Problem:
+    """Return the problem of a starter spec, with a number in place of its placeholder.
+
+    Args:
+        text: the spec.
+        path: file for which it is meant; its paths are relative to that file's folder.
+
+    Raises:
+        SpecError: if anything else of it is not valid.
+    """
+    content = tomllib.loads(text)
+    requirement = content["requirements"][_STARTED]
+    requirement["formula"] = requirement["formula"].removesuffix(f"{PLACEHOLDER})") + "0)"
+    return Problem.from_parts(join(parse_spec(content, file=str(path)), _STARTED, path=path))
 
 
 def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
@@ -127,7 +143,7 @@ def with_requirement(
         _relocate(document, subject.folder, out)
     requirements: Any = document["requirements"]
     if subject.is_new:
-        del requirements[_PLACEHOLDER]
+        del requirements[_STARTED]
     if name is None:
         name = next(f"R{k}" for k in range(1, len(requirements) + 2) if f"R{k}" not in requirements)
     if name in requirements:

@@ -49,11 +49,19 @@ def test_info_takes_a_bundled_requirement_for_its_fmu(tmp_path: Path) -> None:
     assert "did you mean 'AT1'?" in falsifier("info", "at1", cwd=tmp_path).err
 
 
-def test_init_writes_a_spec_that_runs(tmp_path: Path) -> None:
+def test_init_writes_a_spec_that_runs_once_its_requirement_is_filled_in(tmp_path: Path) -> None:
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
     assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0
     again = falsifier("init", "car.fmu", cwd=tmp_path)
     assert (again.code, "--force" in again.err) == (2, True)
+    for command in (("check", "car.toml"), ("run", "car.toml", "--budget", "2"), ("run", "car.toml:R1")):
+        asked = falsifier(*command, cwd=tmp_path)
+        assert asked.code == 2
+        assert "requirements.R1.formula: LIMIT is a placeholder: write the number" in asked.err
+    given = falsifier("run", "car.toml", "--stl", "G (speed <= 500)", "--budget", "1", cwd=tmp_path)
+    assert given.code == 0, given.err
+    path = tmp_path / "car.toml"
+    path.write_text(path.read_text().replace("LIMIT", "500"))
     assert falsifier("check", "car.toml", cwd=tmp_path).code == 0
     assert falsifier("run", "car.toml", "--engine", "uniform", "--budget", "2", cwd=tmp_path).code == 0
 

@@ -7,14 +7,25 @@ import pytest
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.problem.starter import starter_spec
 from tests.fmu.fixtures import path as fmu_path
 from tests.problem.support import spec
 
 
-def test_the_starter_spec_loads_as_it_is(folder: Path) -> None:
+def loaded(path: Path) -> Problem:
+    """The problem of a starter spec whose placeholder is replaced."""
+    text = path.read_text("utf-8")
+    assert text.count("<= LIMIT)'") == 1
+    path.write_text(text.replace("LIMIT", "1"), "utf-8")
+    return load_problem(str(path))
+
+
+def test_the_starter_spec_loads_once_its_placeholder_is_replaced(folder: Path) -> None:
     text = starter_spec(Path("AT.fmu"), read_info(folder / "AT.fmu"))
-    problem = load_problem(spec(folder, text))
+    with pytest.raises(SpecError, match="LIMIT is a placeholder"):
+        load_problem(spec(folder, text))
+    problem = loaded(Path(spec(folder, text)))
     assert problem.name == "R1"
     assert {r.name for r in problem.space.inputs} == {"throttle", "brake"}
 
@@ -23,7 +34,7 @@ def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) 
     text = starter_spec(fmu_path("Echo_3"), read_info(fmu_path("Echo_3")))
     path = tmp_path / "echo.toml"
     path.write_text(text)
-    ranges = {r.name: (r.low, r.high, r.kind) for r in load_problem(str(path)).space.inputs}
+    ranges = {r.name: (r.low, r.high, r.kind) for r in loaded(path).space.inputs}
     assert ranges["in_Enumeration"] == (1, 3, "enumeration")
     assert ranges["in_Boolean"] == (0, 1, "boolean")
     assert ranges["in_Int8"] == (0, 1, "integer")
@@ -38,7 +49,7 @@ def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> 
     text = starter_spec(fmu_path("Ball_2"), bare)
     assert "# the FMU specifies none" in text
     (tmp_path / "ball.toml").write_text(text)
-    problem = load_problem(str(tmp_path / "ball.toml"))
+    problem = loaded(tmp_path / "ball.toml")
     assert problem.space.inputs == ()
     assert len(problem.space.parameters) == 1, "without inputs a parameter is searched"
 
@@ -64,7 +75,7 @@ def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> 
     spec = written("OddNames_2", tmp_path)
     data = tomllib.loads(spec.read_text(encoding="utf-8"))
     assert list(data["inputs"]) == ['Öffnung "Ventil" 1']
-    problem = load_problem(str(spec))
+    problem = loaded(spec)
     assert problem.space.names == ('Öffnung "Ventil" 1',)
     assert problem.requirement.formula.signals == ("größe.y",)
     # Parameters are offered in comments; what these say is valid, too.
@@ -76,7 +87,7 @@ def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> 
 def test_without_outputs_states_are_offered(tmp_path: Path) -> None:
     spec = written("NoOutputs_2dymola", tmp_path)
     assert "# The FMU declares no outputs. Requirements may name any variable: x\n" in spec.read_text("utf-8")
-    assert load_problem(str(spec)).requirement.formula.signals == ("x",)
+    assert loaded(spec).requirement.formula.signals == ("x",)
 
 
 def test_unbounded_inputs_are_said_to_be_so(tmp_path: Path) -> None:
@@ -88,4 +99,4 @@ def test_unbounded_inputs_are_said_to_be_so(tmp_path: Path) -> None:
 def test_every_starter_can_be_loaded(tmp_path: Path, name: str) -> None:
     if not fmu_path(name).is_file():
         pytest.skip("no such fixture")
-    assert load_problem(str(written(name, tmp_path))).name == "R1"
+    assert loaded(written(name, tmp_path)).name == "R1"

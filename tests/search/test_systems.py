@@ -160,11 +160,12 @@ def test_a_starter_names_what_could_be_connected(spec: Path, tmp_path: Path) -> 
     text = (tmp_path / "system.toml").read_text()
     assert '# "Plant_2.u" = "Gain_2.y"\n' in text and '# "Gain_2.measured" = "Plant_2.y"\n' in text
     connected = text.replace('# "Gain_2.measured"', '"Gain_2.measured"')
-    (tmp_path / "system.toml").write_text(connected)
+    (tmp_path / "system.toml").write_text(connected.replace("LIMIT", "1"))
     with pytest.raises(SpecError, match=r"inputs\.Gain_2\.measured: this input is connected to Plant_2\.y"):
         load_problem("system.toml")
     write(tmp_path / "loop.ssp", structure(system(PLANT + PI, FEEDBACK)), "Plant_2", "Gain_2")
     assert falsifier("init", "loop.ssp", "--out", "ssp.toml", cwd=tmp_path).code == 0
+    (tmp_path / "ssp.toml").write_text((tmp_path / "ssp.toml").read_text().replace("LIMIT", "1"))
     assert load_problem("ssp.toml").space.names == ("pi.r",)
 
 
