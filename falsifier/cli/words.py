@@ -97,7 +97,7 @@ def formalize(
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
     checked, said back in words, told apart from the others by an example and judged on one simulation.
-    Without --llm, templates that may fit are shown, and nothing is written.
+    Without --llm, templates that fit an English sentence are shown, and nothing is written.
     """
     from falsifier.views.readings_text import advice_json, advice_text, formalized_json, formalized_text
 
@@ -105,10 +105,20 @@ def formalize(
     if settings is None:
         if choose is not None:
             raise click.UsageError("--choose: there are readings only with --llm NAME")
-        from falsifier.problem.template_advice import advised_templates
+        from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
+        from falsifier.problem.unit_check import defined_units
 
-        advice = advised_templates(sentence, subject_of(target).problem.info)
-        say(json.dumps(advice_json(sentence, advice), indent=2) if as_json else advice_text(sentence, advice))
+        problem = subject_of(target).problem
+        advice = advised_templates(sentence, problem.info, defined_units(problem.model))
+        if as_json:
+            say(json.dumps(advice_json(sentence, advice), indent=2))
+        elif advice:
+            say(advice_text(sentence, advice))
+        if not advice:
+            raise SpecError(
+                f"no template has a place for all words and numbers of this sentence; {ENGLISH_ONLY}"
+                + (f"\nnote: {note}" if (note := hint(sentence)) else "")
+            )
         return
     if choose is not None or name is not None or out is not None:  # before anything is paid for
         subject = subject_of(target)

@@ -21,15 +21,15 @@ from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.subject import Subject, subject_of
-from falsifier.problem.unit_check import defined_units, unit_conflicts
+from falsifier.problem.unit_check import defined_units, factor_and_offset
 from falsifier.search.budget import Spent
 from falsifier.search.leaders import open_chat
-from falsifier.search.lint import ranges_of
+from falsifier.search.lint import ranges_of, static_findings
 from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, in_words
 from falsifier.stl.formula import And
 from falsifier.stl.implication import implies
-from falsifier.stl.intervals import decided, margins
+from falsifier.stl.intervals import margins
 from falsifier.stl.margins import is_on_limit, shown
 from falsifier.stl.tell_apart import tell_apart
 
@@ -194,12 +194,11 @@ def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
     except SpecError as error:
         raise RejectedReplyError(str(error)) from None
     _check_units(reply, formula, problem)
-    for part, holds in decided(formula, ranges_of(problem)):
-        raise RejectedReplyError(
-            f"{part} {'always' if holds else 'never'} holds within the ranges of its signals; "
-            "check threshold, unit and direction"
-        )
-    if is_on_limit(margins(formula, ranges_of(problem)).low):
+    problem = replace(problem, requirement=Requirement(problem.name, formula))
+    for found in static_findings(problem):
+        if found.kind in ("always", "never", "units"):
+            raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
+    if _compares_reals(formula, problem) and is_on_limit(margins(formula, ranges_of(problem)).low):
         raise RejectedReplyError(
             "it can be violated only exactly on its limit, so that no margin leads a search: "
             "for x == 3 write abs(x - 3) <= 0.5"
@@ -207,7 +206,6 @@ def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
     _check_examples(reply, formula, problem)
     stated = replace(
         problem,
-        requirement=Requirement(problem.name, formula),
         experiment=replace(
             problem.experiment,
             outputs=tuple(dict.fromkeys((*problem.experiment.outputs, *_recorded(formula, problem)))),
@@ -216,18 +214,32 @@ def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
     return Reading(formula, reply.meaning, in_words(formula), stated)
 
 
+def _compares_reals(formula: Formula, problem: Problem) -> bool:
+    """Whether two reals are compared for equality; whole numbers can be equal."""
+    return any(
+        problem.info[name].kind == "real"
+        for predicate in formula.predicates
+        if predicate.operator in ("==", "!=")
+        for name in predicate.signals
+    )
+
+
 def _recorded(formula: Formula, problem: Problem) -> list[str]:
     return [name for name in formula.signals if problem.info[name].causality != "input"]
 
 
 def _check_units(reply: ReadingReply, formula: Formula, problem: Problem) -> None:
+    units = defined_units(problem.model)
     for name in formula.signals:
         real = problem.info[name].unit
         assumed = next((u.unit for u in reply.units if u.signal == name), real)
-        if real and assumed and assumed != real:
-            raise RejectedReplyError(f"{name} is in {real}, not in {assumed}: convert the numbers to {real}")
-    for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
-        raise RejectedReplyError(f"{predicate}: {text}")
+        found = factor_and_offset(assumed, real, units) if assumed and real else (1.0, 0.0)
+        if found != (1.0, 0.0):
+            shift = f" {found[1]:+.6g}" if found and found[1] else ""
+            how = f" (1 {assumed} is {found[0]:.6g} {real}{shift})" if found else ""
+            raise RejectedReplyError(
+                f"{name} is in {real}, not in {assumed}: convert the numbers to {real}{how}"
+            )
 
 
 def _check_examples(reply: ReadingReply, formula: Formula, problem: Problem) -> None:

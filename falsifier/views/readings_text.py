@@ -56,19 +56,11 @@ def formalized_json(found: Formalized) -> dict[str, Any]:
 
 
 def advice_text(sentence: str, advice: list[Advice]) -> str:
-    """Return which templates may fit a sentence, how to write them, and what formulas cannot say."""
+    """Return which templates fit a sentence, how to write them, and what formulas cannot say."""
     hints = [f"note: {said}"] if (said := hint(sentence)) else []
-    if not advice:
-        none = (
-            "no template has words of this sentence; docs/requirements.md lists all of them, and with "
-            "--llm NAME a language model proposes formulas"
-        )
-        return "\n".join([none, *hints])
     lines = []
     for one in advice:
         lines += [f"{one.template}: {one.summary}", *(f"  {line}" for line in one.section.splitlines())]
-        if one.numbers:
-            lines.append(f"  # numbers of the sentence: {', '.join(one.numbers)}")
     lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
     return "\n".join([*lines, *hints])
 

@@ -3,7 +3,7 @@ import pytest
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import FmuModel
 from falsifier.fmu.description.units import Unit
-from falsifier.problem.unit_check import defined_units, unit_conflicts
+from falsifier.problem.unit_check import defined_units, factor_and_offset, unit_conflicts
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.problem.support import AT
@@ -20,6 +20,9 @@ INFO = ModelInfo(
             ("n", "1"),
             ("q", "zork"),
             ("z", "span"),
+            ("u", "1/min"),
+            ("r", "rpm"),
+            ("n1", "rad/s"),
         ]
     ),
 )
@@ -36,6 +39,7 @@ UNITS = {"span": Unit((0, 1, 0, 0, 0, 0, 0, 0), 10.0)}
         ("G (abs(v - s) <= 3)", "v is in km/h, s in m"),
         ("G (min(v, s) <= 3)", "v is in km/h, s in m"),
         ("G (v <= -s)", "-s in m"),
+        ("G (u <= n1)", "convert one of them: n1 in 1/min is 9.5493 times it"),
         ("G (z <= s)", "convert one of them: s in span is 0.1 times it"),
     ],
 )
@@ -57,10 +61,28 @@ def test_units_that_do_not_fit_are_named(text: str, message: str) -> None:
         "v == v",
         "unknown <= v",
         "q <= s",
+        "u <= r",
     ],
 )
 def test_what_may_fit_is_no_conflict(text: str) -> None:
     assert not list(unit_conflicts(parse(text), INFO, UNITS))
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "factor"),
+    [
+        ("percent", "%", 1.0),
+        ("MPH", "mph", 1.0),
+        ("U/min", "rev/min", 1.0),
+        ("1/min", "rpm", 1.0),
+        ("km/h", "MPH", 0.621371),
+        ("Nm", "N.m", 1.0),
+        ("span", "m", 10.0),
+    ],
+)
+def test_units_are_known_by_what_people_write(one: str, other: str, factor: float) -> None:
+    assert factor_and_offset(one, other, UNITS) == pytest.approx((factor, 0.0), rel=1e-6)
+    assert factor_and_offset("T", "t", UNITS) is None, "the case of short units counts"
 
 
 def test_fmus_define_units_and_other_models_do_not() -> None:

@@ -196,21 +196,21 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"formula": "F[0,20] (speed <= 120)", "violated": RISING},
         "example that you call violated is satisfied",
     ),
-    "another unit": ({"units": [{"signal": "speed", "unit": "km/h"}]}, "speed is in mph, not in km/h"),
+    "another unit": ({"units": [{"signal": "speed", "unit": "km/h"}]}, "(1 km/h is 0.621371 mph)"),
     "units that do not fit": ({"formula": "G[0,20] (speed <= rpm)"}, "speed is in mph, rpm in"),
     "no formula": ({"formula": "speed"}, "example that you call satisfied is violated"),
     "syntax": ({"formula": "G[0,20] (speed <= )"}, "position"),
     "window the wrong way round": ({"formula": "G[20,0] (speed <= 120)"}, "ends before it starts"),
     "open window": ({"formula": "G(0,20) (speed <= 120)"}, "open windows"),
     "between samples": ({"formula": "G[0,0.25] (speed <= 120)"}, "not a multiple"),
-    "always true": ({"formula": "G[0,20] (throttle <= 100)"}, "always holds within the ranges"),
-    "a part never true": ({"formula": "G[0,20] (throttle > 120 or speed <= 1)"}, "120 never holds"),
+    "always true": ({"formula": "G[0,20] (throttle <= 100)"}, "no trajectory in range violates it"),
+    "a part never true": ({"formula": "G[0,20] (throttle > 120 or speed <= 1)"}, "this part never holds"),
     "an example without a signal": ({"violated": []}, "an example lacks the signal 'speed'"),
     "an example out of order": (
         {"violated": [{"name": "speed", "times": [5, 0], "values": [0, 200]}]},
         "in order",
     ),
-    "no margin by ==": ({"formula": "G[0,20] (gear == 2 -> speed <= 120)"}, "only exactly on its limit"),
+    "no margin by ==": ({"formula": "G[0,20] (rpm == 2 -> speed <= 120)"}, "only exactly on its limit"),
 }  # fmt: skip
 
 
@@ -224,6 +224,23 @@ def test_a_wrong_reading_goes_back_with_the_reason(server: Server, target: str, 
     assert reason in found.rejected[0]
     assert reason in server.received[1].texts[-1]
     assert found.spent.calls == 2
+
+
+@pytest.mark.parametrize("unit", ["MPH", "mi/h", "miles per hour"])
+def test_a_unit_is_known_however_it_is_written(server: Server, target: str, unit: str) -> None:
+    good = {"formula": GOOD, "meaning": "", "satisfied": LOW, "violated": HIGH}
+    found = ask(server, target, replying(good | {"units": [{"signal": "speed", "unit": unit}]}))
+    assert found.rejected == () and [str(r.formula) for r in found.readings] == [GOOD]
+
+
+@pytest.mark.parametrize(
+    "formula", ["G[0,20] (gear == 3 -> rpm <= 4000)", "G[0,20] (gear != 3)", "F (gear == 3)"]
+)
+def test_whole_numbers_may_be_equal(server: Server, target: str, formula: str) -> None:
+    reading = answer(target, formula, units=[{"signal": "rpm", "unit": "U/min"}])
+    found = ask(server, target, replying(reading), sentence="Im dritten Gang höchstens 4000 U/min.")
+    assert found.rejected == ()
+    assert [r.formula for r in found.readings] == [parse(formula)]
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,15 @@ def test_what_says_nothing_is_found_with_its_place(
     assert all(words in f"{f.text} {f.advice}" for f in found)
 
 
+@pytest.mark.parametrize(
+    "formula", ["G[0,20] (gear == 3)", "G[0,20] (gear != 3)", "F (gear == 3 and speed > 9)"]
+)
+def test_whole_numbers_that_can_be_equal_are_no_finding(tmp_path: Path, formula: str) -> None:
+    path = tmp_path / "my.toml"
+    path.write_text(f"{SPEC}[requirements.R]\nformula = '{formula}'\n")
+    assert lint(str(path), simulations=0) == []
+
+
 def test_a_searched_parameter_does_not_change_over_time() -> None:
     from dataclasses import replace
 

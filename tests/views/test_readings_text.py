@@ -34,10 +34,6 @@ def test_readings_are_told_with_words_examples_and_cost() -> None:
 
 
 def test_advice_is_told_as_a_section() -> None:
-    text = advice_text(
-        "80 in 2 s", [Advice("rise", "it rises", '[requirements.NAME]\ntemplate = "rise"', ("80",))]
-    )
-    assert text.startswith("rise: it rises\n  [requirements.NAME]\n")
-    assert "# numbers of the sentence: 80" in text
-    assert "no template" in advice_text("hello", [])
-    assert "note: Formulas compare values" in advice_text("after each step", [])
+    advice = [Advice("rise", "it rises", '[requirements.NAME]\ntemplate = "rise"')]
+    assert advice_text("80 in 2 s", advice).startswith("rise: it rises\n  [requirements.NAME]\n")
+    assert "note: Formulas compare values" in advice_text("after each step", advice)

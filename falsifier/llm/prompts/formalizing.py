@@ -19,7 +19,8 @@ _LANGUAGE = """Formulas are Signal Temporal Logic over the signals below, judged
 - Arithmetic: + - * / ^ abs sqrt exp log sin cos min max. There are no derivatives and no earlier values.
 - "Becomes true" is: (not (c) and X (c)) -> X (...).
 - Windows are closed, in seconds, look forward, and nested ones add up. The sum must not exceed the stop time.
-- Do not use == or != on numbers that are not whole; write abs(x - 3) <= 0.5 for a whole number.
+- Use == and != on whole numbers, Booleans and enumerations only; for a whole number abs(x - 3) <= 0.5 says
+  the same as x == 3, with a margin that leads a search.
 - Names are written exactly as listed; names with unusual characters stand in double quotes."""
 
 _ANSWER = """Answer with one JSON object: {"readings": [...], "cannot": ""}. Give one reading if the sentence
@@ -46,8 +47,8 @@ def formalizing_messages(sentence: str, info: ModelInfo, experiment: Experiment)
         experiment: stop time and output interval.
     """
     system = (
-        "You translate requirements on simulated systems from plain words into formulas. Be exact about "
-        "what the sentence says and do not add conditions that it does not contain."
+        "You translate requirements on simulated systems from plain words, in any language, into formulas. "
+        "Be exact about what the sentence says and do not add conditions that it does not contain."
     )
     parts = [
         _LANGUAGE,
