@@ -26,7 +26,6 @@ from tests.patience import HANG
 
 # Imported by commands when they need them.
 _SLOW = (
-    "fmpy",
     "matplotlib.backends.backend_agg",
     "matplotlib.figure",
     "matplotlib.font_manager",

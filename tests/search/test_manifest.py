@@ -26,7 +26,7 @@ def test_it_says_what_was_asked_for_and_with_what(tmp_path: Path) -> None:
     assert (DESCRIBED.model, DESCRIBED.parameterization, DESCRIBED.stop_time) == ("ArchComp.AT", "free", 50.0)
     assert {Path(p).name for p in DESCRIBED.hashes} == {"AT.fmu", "AT.toml"}
     assert DESCRIBED.fmu_sha256 == PROBLEMS[0].model.sha256  # type: ignore[attr-defined]
-    assert {"numpy", "fmpy", "rtamt"} <= DESCRIBED.packages.keys()
+    assert {"numpy", "rtamt"} <= DESCRIBED.packages.keys()
     write_manifest(tmp_path, DESCRIBED.model_dump(mode="json"))
     assert manifest.read(tmp_path) == DESCRIBED
 
