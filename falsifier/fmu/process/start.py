@@ -15,12 +15,12 @@ from pathlib import Path
 from falsifier.core import operating_system
 from falsifier.core.memory import check_memory_limits
 from falsifier.errors import ModelError
-from falsifier.fmu import folders
 from falsifier.fmu.description.archive import extract, file_hash, this_platform
 from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
-from falsifier.fmu.output import Output
+from falsifier.fmu.process import folders
 from falsifier.fmu.process.encoding import text
 from falsifier.fmu.process.environment import protect_secrets, worker_environment
+from falsifier.fmu.process.output import Output
 from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
 from falsifier.fmu.process.room import Memory
 

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu.description import archive
-from falsifier.fmu.folders import WorkFolder
+from falsifier.fmu.process.folders import WorkFolder
 
 T = TypeVar("T")
 DESCRIPTION = "SystemStructure.ssd"

@@ -2,7 +2,7 @@ import os
 
 import pytest
 
-from falsifier.fmu.output import _DROPPED, _MOST_BYTES, Output
+from falsifier.fmu.process.output import _DROPPED, _MOST_BYTES, Output
 
 
 def prints(output: Output, text: bytes) -> int:

@@ -4,7 +4,6 @@ import contextlib
 import os
 import re
 import tempfile
-import threading
 import time
 from pathlib import Path
 from uuid import uuid4
@@ -17,9 +16,6 @@ _LOCK_SUFFIX = ".lock"
 _MADE = re.compile(rf"{_PREFIX}[0-9a-f]{{32}}({re.escape(_LOCK_SUFFIX)})?")
 # A lock without a folder belongs to a process that is about to make the folder, unless it is older than this.
 _MAKING_SECONDS = 3600.0
-
-# Held by a thread that removes the folder before it ends this process: no other thread may end it meanwhile.
-REMOVING = threading.Lock()
 
 
 class WorkFolder:

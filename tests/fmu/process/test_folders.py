@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu.folders import WorkFolder, remove_work_folder, sweep
+from falsifier.fmu.process.folders import WorkFolder, remove_work_folder, sweep
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +32,7 @@ def test_a_folder_whose_owner_lives_is_not_swept() -> None:
 KILLED = """
 import os, sys, tempfile
 tempfile.tempdir = sys.argv[1]
-from falsifier.fmu.folders import WorkFolder
+from falsifier.fmu.process.folders import WorkFolder
 folder = WorkFolder()
 (folder.path / "left").write_text("behind")
 os.kill(os.getpid(), 9)
