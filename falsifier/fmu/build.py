@@ -1,29 +1,19 @@
 """Compiling an FMU that contains its C sources for this platform."""
 
 import importlib.util
-import re
-import shutil
-import subprocess
 import sys
 import sysconfig
 import tempfile
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 
 from falsifier.core import operating_system
-from falsifier.core.words import counted
 from falsifier.errors import ModelError
+from falsifier.fmu.compiler import compile_c
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.simulator import FmuModel
 from falsifier.fmu.sources import Sources, find_sources
-
-_COMPILERS = ("cc", "gcc", "clang")
-# Generated code of large models can take many minutes to compile.
-_TIME_LIMIT_SECONDS = 1800
-_SHOWN_ERRORS = 5
-_ERROR = re.compile(r"\berror:|undefined (reference|symbol)", re.IGNORECASE)
 
 
 def build(path: Path, out: Path) -> Path:
@@ -55,50 +45,20 @@ def build(path: Path, out: Path) -> Path:
     return out
 
 
-def compiler() -> list[str]:
-    """Return the command of a C compiler.
-
-    Raises:
-        ModelError: if there is none.
-    """
-    for name in _COMPILERS:
-        if shutil.which(name):
-            return [name]
-    if importlib.util.find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise ModelError(
-        "no C compiler found (looked for cc, gcc, clang and the ziglang package); install one, for example "
-        "with `pip install ziglang`"
-    )
-
-
 def _compile(path: Path, folder: Path, sources: Sources, target: Path, major: int) -> None:
     defines = [f"-D{name}={value}" if value else f"-D{name}" for name, value in sources.defines.items()]
     # FMI 2 and 3 sources may put a prefix before all function names, which libraries must not have. It has no
     # effect if the header is read before the sources define it.
     header = ("-include", f"fmi{major}Functions.h") if major > 1 else ()
-    command: Sequence[str] = [
-        *compiler(), "-O2", "-w", "-shared", "-fPIC", *(f"-I{name}" for name in sources.includes),
-        f"-I{_headers()}", *defines, *header, *sources.files,
-        *(() if sys.platform == "win32" else ("-lm",)), "-o", str(target),
-    ]  # fmt: skip
-    try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=_TIME_LIMIT_SECONDS, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise ModelError(f"{path}: the compiler did not finish ({error})") from error
-    if done.returncode:
-        raise ModelError(f"{path}: the sources do not compile with {command[0]}: {_summary(done.stderr)}")
-
-
-def _summary(said: str) -> str:
-    """Return the compiler's errors in short: generated code repeats the same one hundreds of times."""
-    lines = said.strip().splitlines()
-    errors = [line.strip() for line in lines if _ERROR.search(line)]
-    shown = list(dict.fromkeys(errors))[:_SHOWN_ERRORS] or lines[-_SHOWN_ERRORS:]
-    count = f"{counted(len(errors), 'error')}, the first:" if len(errors) > len(shown) else ""
-    return "\n  ".join([count, *shown])
+    compile_c(
+        path,
+        folder,
+        [
+            *("-O2", "-w", "-shared", "-fPIC"), *(f"-I{name}" for name in sources.includes),
+            f"-I{_headers()}", *defines, *header, *sources.files,
+            *(() if sys.platform == "win32" else ("-lm",)), "-o", str(target),
+        ],
+    )  # fmt: skip
 
 
 def _headers() -> Path:

@@ -8,7 +8,8 @@ import pytest
 
 from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, read_info
-from falsifier.fmu.build import build, compiler
+from falsifier.fmu.build import build
+from falsifier.fmu.compiler import compiler
 from falsifier.fmu.description.archive import this_platform
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ramp, run

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import stat
 import sys
 import tempfile
 import threading
@@ -15,16 +14,16 @@ from pathlib import Path
 from falsifier.core import operating_system
 from falsifier.core.memory import check_memory_limits
 from falsifier.errors import ModelError
-from falsifier.fmu.description.archive import extract, file_hash, this_platform
+from falsifier.fmu.description.archive import extract, file_hash
 from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.process import folders
 from falsifier.fmu.process.encoding import text
 from falsifier.fmu.process.environment import protect_secrets, worker_environment
 from falsifier.fmu.process.output import Output
 from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
+from falsifier.fmu.process.program import worker_program
 from falsifier.fmu.process.room import Memory
 
-WORKER = Path(__file__).parents[1] / "worker"
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
 # A worker has told what is enforced after at most the first; it is looked for after the second.
@@ -196,30 +195,6 @@ def crash_code(exception: int) -> int:
 @lru_cache(maxsize=1)
 def _hidden() -> tuple[str, ...]:
     return hidden_places(os.environ, Path.home(), is_root=operating_system.is_root())
-
-
-def worker_program(root: Path, *, windows: bool = False) -> Path:
-    """Return the path of the program that runs FMUs.
-
-    Args:
-        root: folder for a copy, if the installed one may not be executed.
-        windows: whether it is the program for Windows, which is executed by Wine.
-
-    Raises:
-        ModelError: if there is none for this machine.
-    """
-    platform = "x86_64-windows" if windows else this_platform()
-    suffix = ".exe" if platform.endswith("-windows") else ""
-    path = WORKER / "bin" / platform / f"worker{suffix}"
-    if not path.is_file():
-        raise ModelError(f"there is no program to run FMUs on {platform}: {path} is missing")
-    if windows or os.access(path, os.X_OK):
-        return path
-    copy = root / path.name
-    if not copy.exists():
-        copy.write_bytes(path.read_bytes())
-        copy.chmod(stat.S_IRWXU)
-    return copy
 
 
 def _extract(path: Path, sha: str, folder: Path) -> None:

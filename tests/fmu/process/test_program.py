@@ -1,10 +1,22 @@
 """The program that runs FMUs."""
 
 import hashlib
+import shutil
+import subprocess
+from pathlib import Path
 
+import numpy as np
+import pytest
+
+from falsifier.errors import ModelError
+from falsifier.fmu.description.archive import this_platform
+from falsifier.fmu.process import REGISTRY, program
 from falsifier.fmu.process.connection import Request, Where
+from falsifier.fmu.process.program import WORKER
 from falsifier.fmu.process.reuse import REUSES
-from falsifier.fmu.process.start import WORKER
+from tests.fmu import fixtures
+
+EXPORT_PYTHON = Path(__file__).parents[3] / ".venv-export" / "bin" / "python"
 
 
 def test_the_worker_is_built_from_its_sources() -> None:
@@ -34,3 +46,44 @@ def test_places_and_requests_are_numbered_as_in_the_worker() -> None:
     assert numbered("main.c", "kind") == {kind.name: int(kind) for kind in Request}
     ways = numbered("session.h", "reuse")
     assert [f"BY_{reuse.upper()}" for reuse in REUSES] == list(ways)[:-1]
+
+
+@pytest.mark.skipif(not EXPORT_PYTHON.exists(), reason="the compiler that builds the worker is not installed")
+def test_the_sources_give_the_same_bytes_again(tmp_path: Path) -> None:
+    platform = this_platform()
+    target = f"bin/{platform}/worker"
+    shutil.copytree(WORKER, tmp_path / "worker", ignore=shutil.ignore_patterns("bin"))
+    subprocess.run(
+        ["make", "--silent", f"ZIG={EXPORT_PYTHON} -m ziglang", target], cwd=tmp_path / "worker", check=True
+    )
+    assert (tmp_path / "worker" / target).read_bytes() == (WORKER / target).read_bytes()
+
+
+@pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
+class TestElsewhere:
+    """On a platform for which nothing was built."""
+
+    @pytest.fixture(autouse=True)
+    def unknown_platform(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(program, "this_platform", lambda: "riscv64-linux")
+
+    def test_the_machines_compiler_builds_it_and_it_simulates(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        model = fixtures.isolated("Lag_2")
+        REGISTRY.close()
+        compiled = fixtures.run(model, ("y",))["y"]
+        REGISTRY.close()
+        monkeypatch.undo()
+        np.testing.assert_array_equal(compiled, fixtures.run(model, ("y",))["y"])
+
+    def test_it_is_compiled_once(self, tmp_path: Path) -> None:
+        found = program.worker_program(tmp_path)
+        first = found.stat().st_ino
+        assert program.worker_program(tmp_path).stat().st_ino == first
+
+    def test_without_a_compiler_one_line_says_so(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("PATH", str(tmp_path))
+        monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+        with pytest.raises(ModelError, match=r"no program to run FMUs on riscv64-linux.*no C compiler found"):
+            program.worker_program(tmp_path)

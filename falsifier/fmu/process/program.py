@@ -1,0 +1,70 @@
+"""The program that runs FMUs: built for the usual platforms, compiled on this machine for others."""
+
+import os
+import platform
+import stat
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+from falsifier.errors import ModelError
+from falsifier.fmu.compiler import compile_c
+from falsifier.fmu.description.archive import WINDOWS, this_platform
+
+WORKER = Path(__file__).parents[1] / "worker"
+# Platforms whose system calls sandbox_linux.c knows.
+_CONFINED = ("x86_64-linux", "aarch64-linux")
+_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
+_NOT_HERE = ("platform_windows.c", "sandbox_linux.c", "calls_linux.c", "sandbox_none.c")
+
+
+def worker_program(root: Path, *, windows: bool = False) -> Path:
+    """Return the path of the program that runs FMUs.
+
+    Args:
+        root: folder for a copy, if the installed one may not be executed or there is none.
+        windows: whether it is the program for Windows, which is executed by Wine.
+
+    Raises:
+        ModelError: if there is none for this machine, and it cannot be compiled either.
+    """
+    found = WINDOWS if windows else this_platform()
+    path = WORKER / "bin" / found / ("worker.exe" if found.endswith("-windows") else "worker")
+    if windows:
+        return path
+    if not path.is_file() or not _has_its_library():
+        return _compiled(root, found)
+    if os.access(path, os.X_OK):
+        return path
+    copy = root / path.name
+    if not copy.exists():
+        copy.write_bytes(path.read_bytes())
+        copy.chmod(stat.S_IRWXU)
+    return copy
+
+
+@lru_cache(maxsize=1)
+def _has_its_library() -> bool:
+    """Whether this system has the C library that the built program needs; others are used with musl."""
+    return sys.platform != "linux" or platform.libc_ver()[0] == "glibc"
+
+
+def _compiled(root: Path, found: str) -> Path:
+    """Return the program, compiled by this machine's C compiler."""
+    path = root / "worker"
+    if path.exists():
+        return path
+    if found.endswith("-windows"):
+        raise ModelError(f"there is no program to run FMUs on {found}; use a 64-bit Python for x86-64")
+    kept = ("sandbox_linux.c", "calls_linux.c") if found in _CONFINED else ("sandbox_none.c",)
+    sources = [p.name for p in sorted(WORKER.glob("*.c")) if p.name in kept or p.name not in _NOT_HERE]
+    libraries = ("-lm", "-ldl") if found.endswith("-linux") else ("-lm",)
+    partial = path.with_suffix(".partial")
+    try:
+        compile_c(WORKER, WORKER, [*_FLAGS, *sources, *libraries, "-o", str(partial)])
+    except ModelError as error:
+        raise ModelError(
+            f"there is no program to run FMUs on {found}, and it cannot be compiled: {error}"
+        ) from None
+    partial.rename(path)
+    return path
