@@ -24,7 +24,7 @@ from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.build import compiler
+from falsifier.fmu.compiler import compiler
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.model_description import read_description
 from tests.fmu.fixtures import runner

@@ -7,7 +7,7 @@ import pytest
 
 from falsifier.core import posix, posix_files
 from falsifier.fmu.process.policy import Policy, encoded
-from falsifier.fmu.process.start import worker_program
+from falsifier.fmu.process.program import worker_program
 from tests.patience import HANG
 
 
