@@ -186,6 +186,17 @@ def test_keys_cannot_be_read_unless_that_is_allowed(place: Place) -> None:
     assert place.run(READ_KEY, 0, f"read:{place.home / '.ssh'}").split()[0] == "1"
 
 
+def test_a_link_beside_hidden_keys_does_not_lead_to_them(place: Place) -> None:
+    (place.home / "links").mkdir()
+    (place.home / "links" / ".ssh").symlink_to("../.ssh")
+    (place.home / "visible").write_text("content")
+    assert place.run(READ_KEY, at=place.home / "links").split()[0] == "0"
+    (place.home / "links" / ".ssh").unlink()
+    (place.home / "links" / ".ssh").mkdir()
+    (place.home / "links" / ".ssh" / "id").symlink_to("../../visible")
+    assert place.run(READ_KEY, at=place.home / "links").split()[0] == "1", "the rest of the home is readable"
+
+
 def test_programs_cannot_be_executed_unless_that_is_allowed(place: Place) -> None:
     assert place.run(EXECUTE).split()[0] == "0"
     assert place.run(EXECUTE, 0, "programs").split()[0] == "1"

@@ -272,7 +272,7 @@ static int read_path(const struct seccomp_notif *asked, int folder, int argument
 static int is_beneath(const char *path, const char **places)
 {
     for (const char **place = places; *place; place++) {
-        const size_t length = strlen(*place);
+        const size_t length = strcmp(*place, "/") ? strlen(*place) : 0;
         if (!strncmp(path, *place, length) && (path[length] == '/' || !path[length]))
             return 1;
     }

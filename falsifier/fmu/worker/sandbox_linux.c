@@ -63,7 +63,7 @@ static const char *const devices[] = {"/dev/null", "/dev/zero", "/dev/full", "/d
 static void allow(int rules, const char *path, uint64_t what, uint64_t handled)
 {
     struct stat found;
-    struct rule rule = {what & handled, open(path, O_PATH | O_CLOEXEC)};
+    struct rule rule = {what & handled, open(path, O_PATH | O_CLOEXEC | O_NOFOLLOW)};
     if (rule.parent < 0)
         return;
     if (fstat(rule.parent, &found) || !S_ISDIR(found.st_mode))
