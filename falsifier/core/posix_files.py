@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import os
+import pwd
 import shutil
 import sys
 import tempfile
@@ -85,6 +86,16 @@ def replace(source: Path, target: Path) -> None:
 def user() -> str:
     """Return what tells this user's temporary folders from those of others."""
     return str(os.getuid())
+
+
+def homes() -> tuple[Path, ...]:
+    """Return the user's home folder: what the environment says, and what the system says; none if unknown."""
+    found = []
+    with contextlib.suppress(RuntimeError):
+        found.append(Path.home())
+    with contextlib.suppress(KeyError):
+        found.append(Path(pwd.getpwuid(os.getuid()).pw_dir))
+    return tuple(dict.fromkeys(found))
 
 
 def is_root() -> bool:

@@ -87,6 +87,11 @@ def user() -> str:
     return "user"
 
 
+def homes() -> tuple[Path, ...]:
+    """Return the user's home folder."""
+    return (Path.home(),)
+
+
 def is_root() -> bool:
     """Return False: no user reads all files here."""
     return False

@@ -116,23 +116,23 @@ def _wrong(word: str, known: Sequence[str]) -> str:
     return f"unknown {word!r}; {did_you_mean(word, known)}"
 
 
-def hidden_places(environment: Mapping[str, str], home: Path, *, is_root: bool) -> tuple[str, ...]:
+def hidden_places(environment: Mapping[str, str], homes: Sequence[Path], *, is_root: bool) -> tuple[str, ...]:
     """Return the files and folders that no FMU may read, whether they exist or not.
 
     Args:
         environment: variables that name such files.
-        home: the user's home.
+        homes: the user's home, by all that is known of it.
         is_root: whether FMUs could read what is root's.
     """
     places = [Path(place) for place in (_OF_MACHINE + (_OF_ROOT if is_root else "")).split()]
-    places += [home / name for name in _IN_HOME.split()]
+    places += [home / name for home in homes for name in _IN_HOME.split()]
     places += [
         Path(part) for name in _NAMED.split() for part in environment.get(name, "").split(os.pathsep) if part
     ]
     # Both by the path that is known and by the one that it stands for.
     found = {os.path.normpath(place) for place in places if place.is_absolute()}
     found |= {os.path.realpath(place) for place in places if place.is_absolute()}
-    return tuple(sorted(found - {"/", os.path.realpath(home)}))
+    return tuple(sorted(found - {"/", *map(os.path.realpath, homes)}))
 
 
 def encoded(

@@ -194,7 +194,7 @@ def crash_code(exception: int) -> int:
 
 @lru_cache(maxsize=1)
 def _hidden() -> tuple[str, ...]:
-    return hidden_places(os.environ, Path.home(), is_root=operating_system.is_root())
+    return hidden_places(os.environ, operating_system.homes(), is_root=operating_system.is_root())
 
 
 def _extract(path: Path, sha: str, folder: Path) -> None:

@@ -13,11 +13,11 @@ def test_keys_are_hidden_by_every_path_that_leads_to_them(tmp_path: Path) -> Non
     home.mkdir()
     (home / ".ssh").symlink_to(elsewhere)
     named = {"GOOGLE_APPLICATION_CREDENTIALS": str(tmp_path / "key.json"), "XDG_CONFIG_HOME": str(home)}
-    hidden = hidden_places(named, home, is_root=False)
+    hidden = hidden_places(named, [home], is_root=False)
     assert {str(home / ".ssh"), str(elsewhere), str(home / ".netrc"), str(tmp_path / "key.json")} <= {*hidden}
     assert str(home) not in hidden, "an FMU may need the rest of the home"
     assert "/etc/shadow" not in hidden
-    assert "/etc/shadow" in hidden_places({}, home, is_root=True)
+    assert "/etc/shadow" in hidden_places({}, [home], is_root=True)
 
 
 def test_the_guard_is_told_paths_without_links(tmp_path: Path) -> None:
