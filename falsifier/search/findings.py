@@ -68,6 +68,11 @@ class Failure:
         return f"{self.count} simulations failed: {self.reason} (for example {which})"
 
 
+def cause_of(reason: str) -> str:
+    """Return a reason without its numbers: the same for failures of one cause."""
+    return _NUMBER.sub("#", reason)
+
+
 def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
     """Group failed simulations by their cause; the most frequent first.
 
@@ -79,7 +84,7 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
     """
     found: dict[str, Failure] = {}
     for index, reason in reasons:
-        cause = _NUMBER.sub("#", reason)
+        cause = cause_of(reason)
         known = found.get(cause, Failure(0, reason, index))
         found[cause] = Failure(known.count + 1, known.reason, known.simulation)
     return tuple(sorted(found.values(), key=lambda failure: -failure.count))

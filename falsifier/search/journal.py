@@ -15,6 +15,7 @@ is noticed. Only search/repair.py, which drops what is damaged, touches these fi
 
 import errno
 import json
+import logging
 import os
 import re
 import shlex
@@ -22,6 +23,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from time import monotonic
@@ -50,6 +52,8 @@ from falsifier.search.records import (
     line_of,
     parse_line,
 )
+
+_LOG = logging.getLogger(__name__)
 
 MANIFEST = "manifest.json"
 JOURNAL = "journal.jsonl"
@@ -417,13 +421,25 @@ def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
 
 
 def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
-    """Load the trajectory of a record; None if it was not kept, or is damaged."""
-    path = directory / (name or "-")
+    """Load the trajectory of a record; None if it was not kept, or is damaged, of which a warning tells."""
+    if name is None:
+        return None
+    path = directory / name
     try:
         content = path.read_bytes()
-    except OSError:
+    except OSError as error:
+        _tell_lost(path, error.strerror or "it cannot be read")
         return None
-    return Trajectory.load(BytesIO(content)) if is_intact(path, content) else None
+    if is_intact(path, content):
+        return Trajectory.load(BytesIO(content))
+    _tell_lost(path, "its checksum does not match")
+    return None
+
+
+@cache
+def _tell_lost(path: Path, why: str) -> None:
+    """Tell it once, however often a command reads the file."""
+    _LOG.warning("%s is damaged: %s. It is left out, or simulated again where it is needed.", path, why)
 
 
 def is_intact(path: Path, content: bytes) -> bool:

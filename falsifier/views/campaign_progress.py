@@ -67,7 +67,7 @@ class PlainScoreboard:
         self._ended: dict[str, str] = {}
         self._begun = False
         self._rate = Rate()
-        self._written = 0.0
+        self._written, self._overall = 0.0, ""
 
     def __call__(self, progress: Progress) -> None:
         """Write a line per run that ended since the last call."""
@@ -80,9 +80,10 @@ class PlainScoreboard:
                 self._ended[run.name] = run.status
                 self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run_line(run)}")
         rate = self._rate(progress)
-        if monotonic() - self._written > _LINE_PERIOD:
-            self._written = monotonic()
-            self._write(overall_line(progress, rate))
+        line = overall_line(progress, rate)
+        if monotonic() - self._written > _LINE_PERIOD and line != self._overall:
+            self._written, self._overall = monotonic(), line
+            self._write(line)
 
 
 def run_line(run: RunProgress) -> str:

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
+from falsifier.search.budget import Budget, Spent
 from falsifier.search.events import (
     Asked,
     Confirmed,
@@ -18,6 +20,7 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
+from falsifier.search.findings import cause_of
 from falsifier.search.levels import Level, level_name
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 
 # Number of failed simulations from which on a warning is due.
 _WARNED_FAILURES = 3
+# Time in s without a line after which one tells how fast the search is; later, a tenth of the run's time.
+_QUIET, _QUIET_SHARE = 10.0, 0.1
 
 
 @contextmanager
@@ -44,7 +49,14 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     if not console.is_terminal:
         yield unbroken(PlainDisplay(console))
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -52,17 +64,19 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
         MofNCompleteColumn(),
         TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
     )
     progress = Progress(*columns, console=console, transient=True)
     with moving(progress):
         task = progress.add_task("starting", total=None, note="")
-        warn, aims, levels = FailureWarning(), AimNote(), LevelNote()
+        warn, aims, levels, best = FailureWarning(), AimNote(), LevelNote(), BestNote()
 
         def show(event: Event) -> None:
             match event:
                 case RunStarted():
                     total = event.budget.simulations
                     levels.begin(event)
+                    best.begin(event)
                     for line in _notes(event):
                         progress.console.print(line, highlight=False, markup=False)
                     progress.update(task, description=_title(event), total=total)
@@ -72,7 +86,9 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
                 case Evaluated():
                     if warning := warn(event):
                         progress.console.print(warning, highlight=False, markup=False)
-                    progress.update(task, completed=event.spent.simulations, note=note(event))
+                    if text := best(event):
+                        progress.update(task, note=text)
+                    progress.update(task, completed=event.spent.simulations)
                 case Exchanged():
                     progress.update(task, note=f"LLM replied, {event.spent.tokens} tokens so far")
                 case Confirmed():
@@ -97,12 +113,14 @@ def progress() -> Listener:
 
 
 class PlainDisplay:
-    """Prints one line at the start, and per improvement, failure and confirmation."""
+    """Prints a line at the start, per improvement, cause of failures and confirmation, or after a while."""
 
     def __init__(self, console: "Console") -> None:
         self._console = console
         self._warn = FailureWarning()
-        self._aims, self._levels = AimNote(), LevelNote()
+        self._aims, self._levels, self._best = AimNote(), LevelNote(), BestNote()
+        self._pace = PaceNote()
+        self._causes: set[str] = set()
 
     def __call__(self, event: Event) -> None:
         """Print a line if the event deserves one."""
@@ -114,24 +132,34 @@ class PlainDisplay:
                     self._line(f"{problem.name}: {problem.requirement.formula}")
                 self._line(f"engine {event.engines[0]}{replayed}")
                 self._levels.begin(event)
+                self._best.begin(event)
+                self._pace.begin(event)
                 for line in _notes(event):
                     self._line(line)
             case Asked():
                 for line in (*self._levels(event), *self._aims(event)):
                     self._line(line)
-            case Evaluated(evaluation=evaluation) if evaluation.status != "ok":
-                how = "timed out" if evaluation.status == "timeout" else evaluation.status
-                self._line(f"simulation {event.index + 1} {how}: {evaluation.reason}")
-                if warning := self._warn(event):
-                    self._line(warning)
-            case Evaluated(evaluation=evaluation, best=best) if (
-                best is not None and best.candidate is evaluation.candidate
-            ):
-                self._line(f"simulation {event.index + 1}: {note(event)}")
+            case Evaluated():
+                lines = list(self._told(event))
+                pace = self._pace(event.spent, told=bool(lines))
+                for line in (*lines, *([pace] if pace else [])):
+                    self._line(line)
             case Confirmed():
                 self._line(_confirmed(event))
             case _:
                 pass
+
+    def _told(self, event: Evaluated) -> Iterator[str]:
+        """What is new with a simulation; a cause of failures is told once."""
+        evaluation = event.evaluation
+        if evaluation.status != "ok" and (cause := cause_of(evaluation.reason)) not in self._causes:
+            self._causes.add(cause)
+            how = "timed out" if evaluation.status == "timeout" else evaluation.status
+            yield f"simulation {event.index + 1} {how}: {evaluation.reason}"
+        if warning := self._warn(event):
+            yield warning
+        if best := self._best(event):
+            yield f"simulation {event.index + 1}: {best}"
 
     def _line(self, text: str) -> None:
         self._console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
@@ -153,6 +181,70 @@ class FailureWarning:
             f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run counts as "
             "failed if more than half do"
         )
+
+
+class BestNote:
+    """Tells the smallest robustness when it has changed; of several requirements by name."""
+
+    def __init__(self) -> None:
+        self._least: dict[str, float] = {}
+        self._said: dict[str, str] = {}
+        self._several = False
+
+    def begin(self, event: RunStarted) -> None:
+        """Learn whether several requirements share the search."""
+        self._several = len(event.problems) > 1
+
+    def __call__(self, event: Evaluated) -> str:
+        """Return what is new in a few words; empty if nothing is."""
+        told = []
+        for name, seen in event.judged.items():
+            verdict = seen.verdict
+            if verdict is None or verdict.robustness >= self._least.get(name, inf):
+                continue
+            self._least[name] = verdict.robustness
+            text = f"best robustness {signed(verdict.robustness, 5)} at t = {verdict.critical_time:.5g} s"
+            if self._said.get(name) != text:
+                self._said[name] = text
+                told.append(f"{name}: {text}" if self._several else text)
+        return "; ".join(told)
+
+
+class PaceNote:
+    """Tells how fast a search is and what is left of it, if nothing else was told for a while."""
+
+    def __init__(self) -> None:
+        self._budget = Budget()
+        self._since = Spent()
+
+    def begin(self, event: RunStarted) -> None:
+        """Learn the limits of a run that starts."""
+        self._budget, self._since = event.budget, Spent()
+
+    def __call__(self, spent: Spent, *, told: bool) -> str:
+        """Return a line if it is time for one.
+
+        Args:
+            spent: what the run has spent so far.
+            told: whether another line is printed now.
+        """
+        quiet = spent.seconds - self._since.seconds
+        if told or quiet < max(_QUIET, _QUIET_SHARE * spent.seconds):
+            self._since = spent if told else self._since
+            return ""
+        rate = (spent.simulations - self._since.simulations) / quiet
+        self._since = spent
+        most = self._budget.simulations
+        left = [] if most is None else [(most - spent.simulations) / rate]
+        left += [] if self._budget.seconds is None else [self._budget.seconds - spent.seconds]
+        of = "" if most is None else f" of {most}"
+        pace = f"{rate:.3g} per s" if rate >= 1 else f"{1 / rate:.3g} s each"
+        rest = f", at most {_duration(max(0.0, min(left)))} left" if left else ""
+        return f"simulation {spent.simulations}{of}: nothing better; {pace}{rest}"
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
 class LevelNote:

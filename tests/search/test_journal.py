@@ -5,9 +5,17 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import JournalError
-from falsifier.search.journal import Journal, JournalReader, open_journal, read_journal, recorded_candidates
+from falsifier.search.journal import (
+    Journal,
+    JournalReader,
+    open_journal,
+    read_journal,
+    recorded_candidates,
+    recorded_evaluations,
+)
 from falsifier.search.records import Record, line_of
 from falsifier.search.run import falsify
+from falsifier.views.report.page import html_report
 from tests.problems import impossible
 from tests.search.test_questions import asked
 from tests.search.test_tally import evaluated
@@ -72,3 +80,20 @@ def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(t
         pass
     assert not any(path.exists() for path in left)
     assert all(path.exists() for path in others)
+
+
+@pytest.mark.parametrize("damage", ["changed", "missing"])
+def test_a_trajectory_that_is_damaged_is_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, damage: str
+) -> None:
+    falsify(impossible(), "uniform", budget=1, directory=tmp_path)
+    (first,) = sorted((tmp_path / "trajectories").iterdir())
+    if damage == "missing":
+        first.unlink()
+    else:
+        first.write_bytes(first.read_bytes()[:-1] + b"?")
+    for _ in range(2):
+        found = recorded_evaluations(tmp_path, read_journal(tmp_path))
+    assert found[0].trajectory is None
+    assert caplog.text.count(f"{first.name} is damaged") == 1
+    assert "not shown: its file is damaged or missing" in html_report(tmp_path)

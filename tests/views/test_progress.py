@@ -4,6 +4,9 @@ from typing import Any
 import pytest
 
 from falsifier import falsify
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.search.budget import Budget, Spent
+from falsifier.search.events import Evaluated, RunStarted
 from falsifier.testing import lag_problem
 from falsifier.views.progress import make_display, progress
 from falsifier.views.text import result_json, result_text
@@ -68,3 +71,56 @@ def test_a_few_failures_bring_no_warning(capsys: pytest.CaptureFixture[str]) -> 
             lag_problem("G[0,10] (x <= 2)", response=broken), "uniform", budget=2, seed=1, listeners=[display]
         )
     assert "warning" not in capsys.readouterr().err
+
+
+def test_a_cause_of_failures_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", response=mostly_broken)
+    with make_display() as display:
+        falsify(problem, "uniform", budget=20, seed=1, listeners=[display])
+    told = [line for line in capsys.readouterr().err.splitlines() if " failed: " in line]
+    assert told == ["simulation 1 failed: lag: output 'x' is nan at t = 0.5 s"]
+
+
+def test_of_several_requirements_progress_names_the_one_that_improved(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with make_display() as display:
+        falsify([impossible(), hard()], "sobol", budget=6, listeners=[display])
+    improved = [line for line in capsys.readouterr().err.splitlines() if "best robustness" in line]
+    assert improved[0].startswith("simulation 1: NEVER: best robustness +")
+    assert "; HARD: best robustness " in improved[0]
+    assert len(improved) == len(set(improved))
+
+
+def test_if_nothing_gets_better_rate_and_time_left_are_told(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    evaluation = evaluate(problem, problem.space.decode([0.0] * 4))
+    display = progress()
+    display(
+        RunStarted(
+            problems=(problem,),
+            engines=("uniform",),
+            budget=Budget(1000, seconds=50.0),
+            searched=problem.space,
+        )
+    )
+    for count in range(1, 301):  # 0.1 s each
+        display(
+            Evaluated(
+                index=count - 1,
+                problem=problem,
+                evaluation=evaluation,
+                judged={"LAG": evaluation},
+                improved=count == 1,
+                best=evaluation,
+                spent=Spent(simulations=count, seconds=count / 10),
+            )
+        )
+    told = [line for line in capsys.readouterr().err.splitlines() if "simulation" in line]
+    assert told[0] == "simulation 1: best robustness +2 at t = 0 s"
+    assert told[1:] == [
+        "simulation 101 of 1000: nothing better; 10 per s, at most 40 s left",
+        "simulation 201 of 1000: nothing better; 10 per s, at most 30 s left",
+    ]

@@ -28,11 +28,13 @@ class Shown:
         run: the run.
         candidate: what was simulated.
         panels: what to draw; empty if the trajectory was not kept.
+        is_lost: whether it was kept, but its file is damaged or missing.
     """
 
     run: Run
     candidate: Candidate
     panels: list[Panel]
+    is_lost: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -247,7 +249,7 @@ def _shown(run: Run) -> Shown:
     candidate = recorded_candidates(read_journal(run.directory))[index]
     trajectory = recorded_trajectory(run.directory, run.trajectories.get(index))
     if trajectory is None:
-        return Shown(run, candidate, [])
+        return Shown(run, candidate, [], is_lost=index in run.trajectories)
     drawn = panels(
         parse(run.manifest.requirement.formula),
         trajectory,

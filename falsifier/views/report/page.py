@@ -221,6 +221,8 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
     if run.simulations:
         facts.append(("time per iteration", _time(run)))
+    if shown.is_lost:
+        facts.append(("trajectory", "not shown: its file is damaged or missing"))
     facts += level_facts(run)
     facts += [("not searched", held_text(run.manifest.held))] if run.manifest.held else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
