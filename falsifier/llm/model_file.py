@@ -14,6 +14,7 @@ from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
+from falsifier.core import operating_system
 from falsifier.core.printable import printable
 from falsifier.core.secrets import scrubbed
 from falsifier.errors import ChatSetupError
@@ -72,11 +73,11 @@ def check_model_file(llm: str) -> Path:
         raise ChatSetupError(
             f"--llm {llm}: serving a model file needs llama.cpp's server: pip install 'falsifier[llama]'"
         )
-    available = _available_memory()
-    if available is not None and size + _MORE_BYTES > available and _address_of(path) is None:
+    memory = operating_system.machine_memory()
+    if memory and size + _MORE_BYTES > memory:
         raise ChatSetupError(
-            f"--llm {llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and "
-            f"{available / 2**30:.1f} GiB are free; use a smaller model or a stronger quantization"
+            f"--llm {llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and this "
+            f"machine has {memory / 2**30:.1f} GiB; use a smaller model or a stronger quantization"
         )
     return path
 
@@ -165,16 +166,6 @@ def _cause(log: Path) -> str:
     if any("alloc" in line for line in said):
         return "not enough memory for this model; use a smaller one or a stronger quantization"
     return f"llama.cpp's server cannot load the model ({'; '.join((said or lines)[-_SHOWN_LINES:])})"
-
-
-def _available_memory() -> int | None:
-    """Bytes of memory that programs can get without swapping; None if unknown (only Linux tells it)."""
-    try:
-        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-    except OSError:
-        return None
-    found = next((line for line in lines if line.startswith("MemAvailable:")), None)
-    return None if found is None else int(found.split()[1]) << 10
 
 
 def _serve(model: str, context: int) -> None:
