@@ -103,13 +103,13 @@ class SpecFile(pytest.File):
         except SpecError as error:
             raise self.CollectError(one_line(str(error))) from None
         for name in spec.requirements:
-            item = RequirementItem.from_parent(self, name=one_line(name), requirement=name)
+            item = RequirementItem.from_parent(self, name=name, requirement=name)
             item.add_marker(pytest.mark.falsifier)
             yield item
 
 
 class RequirementItem(pytest.Item):
-    """One requirement; its name is shown without what a terminal would act on."""
+    """One requirement."""
 
     def __init__(self, *, requirement: str, **given: Any) -> None:
         super().__init__(**given)

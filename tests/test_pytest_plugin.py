@@ -153,7 +153,7 @@ stop_time = 1.0
 output_interval = 0.1
 [parameters.misdeed]
 range = [1, 3]
-[requirements."../../\\u001b[31mred\\nline"]
+[requirements."../../[31mred::line"]
 formula = "y >= -1"
 """
 
