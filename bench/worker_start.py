@@ -1,4 +1,6 @@
-"""How long a worker takes to start, until its first simulation has ended; how soon its crash is noticed.
+"""How long a worker takes to start, until its first simulation has ended; how soon its crash is told.
+
+The crash is that of a process that has simulated before; so it is repeated in a new one, which crashes too.
 
 ``python -m bench.worker_start [--rounds N]``
 """
@@ -45,11 +47,13 @@ def main() -> None:
     for _ in range(rounds + 1):
         starts.append(timed(lambda: lag.simulate({}, {}, EXPERIMENT)))
         lag.close()
-        misdeeds.load()
         misdeeds.simulate({}, {}, EXPERIMENT)
         crashes.append(timed(lambda: crash(misdeeds)))
         misdeeds.close()
-    for name, values in {"start and first simulation": starts[1:], "crash, noticed": crashes[1:]}.items():
+    for name, values in {
+        "start and first simulation": starts[1:],
+        "crash, repeated, told": crashes[1:],
+    }.items():
         print(f"{name:30} {min(values):.1f} ({median(values):.1f})")
 
 
