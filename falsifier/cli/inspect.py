@@ -210,12 +210,16 @@ def check(*, target: str, profile: str | None, template: str | None) -> None:
 
     With --template, only the requirement that the template makes of TARGET, a spec or FMU.
     """
+    from falsifier.search.lint import hidden_margin
+
     if template is None:
         problems = load_problems(target, profile=profile)
     else:
         problems = [load_source(with_template(ProblemSource(target=target, profile=profile), template))]
     for problem in problems:
         say(_problem_line(problem))
+        if hidden := hidden_margin(problem):
+            say(f"note: {problem.name}: {'; '.join(hidden)}")
     for note in dict.fromkeys(note for problem in problems for note in problem.notes):
         say(f"note: {note}")
     for held in dict.fromkeys(held_text(problem.held_inputs) for problem in problems):

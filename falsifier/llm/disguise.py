@@ -249,17 +249,16 @@ class Disguise:
     def _predicates(self) -> dict[Predicate, Predicate]:
         """Hidden predicates by real ones."""
         return {
-            p: _not_truth(
-                Predicate(p.operator, Name(self.names[self.derived[p]]), Number(_MIDDLE))
-                if p in self.derived
-                else self._rescaled(p)
-            )
+            p: Predicate(p.operator, Name(self.names[self.derived[p]]), Number(_MIDDLE))
+            if p in self.derived
+            else self._rescaled(p)
             for p in self.real.requirement.formula.predicates
         }
 
     def _rescaled(self, predicate: Predicate) -> Predicate:
         (name,) = predicate.left.signals or predicate.right.signals
-        return scaled_predicate(predicate, partial(self._scaled, name), self.names[name])
+        compared = Predicate(predicate.operator, predicate.left, predicate.right)  # scaled, it is no flag
+        return scaled_predicate(compared, partial(self._scaled, name), self.names[name])
 
     def _hidden_input(self, r: InputRange) -> InputRange:
         low, high = hidden_value(r, r.low), hidden_value(r, r.high)
@@ -325,13 +324,6 @@ class Disguise:
                 for n, column in self._scaled_columns(trajectory).items()
             },
         }
-
-
-def _not_truth(predicate: Predicate) -> Predicate:
-    """The predicate, in a form that is not read as the truth of a Boolean."""
-    if predicate.operator == ">=" and predicate.right == Number(_MIDDLE):
-        return Predicate("<=", predicate.right, predicate.left)
-    return predicate
 
 
 def _declared(view: View, name: str) -> tuple[float, float] | None:

@@ -10,8 +10,11 @@ _NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)",
 
 # parameterization: only fixed control points were searched; condition: that of an implication never held;
 # disjunct: one side of an ``or`` always held; threshold: a predicate was never near its threshold;
-# constant: the robustness was the same in all simulations; effect: an input or parameter had none.
-FindingKind = Literal["parameterization", "condition", "disjunct", "threshold", "constant", "effect"]
+# constant: the robustness was the same in all simulations; effect: an input or parameter had none;
+# margin: the robustness cannot say how near a violation is.
+FindingKind = Literal[
+    "parameterization", "condition", "disjunct", "threshold", "constant", "effect", "margin"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +40,7 @@ class Finding:
     @property
     def vacuous(self) -> bool:
         """Whether a part of the requirement was not tested, so that the answer says less than it seems to."""
-        return self.kind not in ("parameterization", "effect")
+        return self.kind not in ("parameterization", "effect", "margin")
 
     @property
     def untested(self) -> bool:

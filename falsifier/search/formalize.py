@@ -30,7 +30,7 @@ from falsifier.stl import Formula, Monitor, in_words
 from falsifier.stl.formula import And
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import margins
-from falsifier.stl.margins import is_on_limit, shown
+from falsifier.stl.margins import ON_LIMIT, shown
 from falsifier.stl.tell_apart import tell_apart
 
 _LONGEST_SENTENCE = 4000
@@ -198,7 +198,7 @@ def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
     for found in static_findings(problem):
         if found.kind in ("always", "never", "units"):
             raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
-    if _compares_reals(formula, problem) and is_on_limit(margins(formula, ranges_of(problem)).low):
+    if _compares_reals(formula, problem) and margins(formula, ranges_of(problem)).low == -ON_LIMIT:
         raise RejectedReplyError(
             "it can be violated only exactly on its limit, so that no margin leads a search: "
             "for x == 3 write abs(x - 3) <= 0.5"

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import permutations
+from itertools import permutations, product
 from typing import Literal
 
 import numpy as np
 
+from falsifier.core.model import ModelInfo
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
@@ -19,13 +20,18 @@ from falsifier.problem.problem import Problem, alike
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.stl import Formula
-from falsifier.stl.formula import Always, And, Eventually, Or, Until, Window
+from falsifier.stl.formula import Always, And, Eventually, Iff, Implies, Not, Or, Predicate, Until, Window
 from falsifier.stl.implication import implies
-from falsifier.stl.intervals import Interval, decided
+from falsifier.stl.intervals import Interval, decided, margins
+from falsifier.stl.margins import shown
 
-FindingKind = Literal["invalid", "unmoved", "always", "never", "window", "units", "duplicate", "implied"]
+FindingKind = Literal[
+    "invalid", "unmoved", "always", "never", "margin", "window", "units", "duplicate", "implied"
+]
 # Simulations of the measured check of whether an input moves a requirement's signals.
 SIMULATIONS = 6
+# Maximum number of signals that are named or combined.
+_MOST_NAMED = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +41,9 @@ class LintFinding:
     Attributes:
         requirement: its name.
         kind: ``invalid`` (it cannot be loaded), ``unmoved`` (no input moves it), ``always`` or ``never``
-            (it holds or fails for every trajectory in range), ``window`` (a window that does not matter),
-            ``units``, ``duplicate`` or ``implied`` (by another requirement or another part).
+            (it holds or fails for every trajectory in range), ``margin`` (its robustness cannot say how near
+            a violation is), ``window`` (a window that does not matter), ``units``, ``duplicate`` or
+            ``implied`` (by another requirement or another part).
         place: the part of the formula; empty if it is about the whole requirement.
         text: what is wrong.
         advice: what to do.
@@ -96,12 +103,49 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
     name, formula = problem.name, problem.requirement.formula
     for part, holds in decided(formula, ranges_of(problem)):
         yield _decided(problem, part, holds=holds)
+    if hidden := hidden_margin(problem):
+        yield LintFinding(name, "margin", "", *hidden)
     yield from _windows(problem)
     for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
         yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
     for part in formula.walk():
         if isinstance(part, And | Or):
             yield from _implied_side(name, part)
+
+
+def hidden_margin(problem: Problem) -> tuple[str, str] | None:
+    """Return why Booleans leave a requirement's robustness without a margin, and what to do; None if not."""
+    formula, info = problem.requirement.formula, problem.info
+    if found := _truth_margins(formula, info):
+        names = listed(formula.signals)
+        values = " or ".join(f"{value:g}" for value in sorted({shown(value) for value in found}))
+        are = "is" if len(formula.signals) == 1 else "are"
+        numbers = [v.name for v in info.observables if v.kind == "real"][:_MOST_NAMED]
+        known = f"the model has {listed(numbers)}" if numbers else "make them outputs of the model"
+        return (
+            f"the robustness can only be {values}, because {names} {are} Boolean: no value says how near a "
+            "violation is",
+            f"compare the numbers of which {names} {are} made instead ({known})",
+        )
+    return None
+
+
+def _truth_margins(formula: Formula, info: ModelInfo) -> set[float]:
+    """Return all values of the robustness of a formula about Booleans alone; empty for any other."""
+    if isinstance(formula, Predicate):
+        names = formula.signals
+        if not 0 < len(names) <= _MOST_NAMED or any(info.kind(n) != "boolean" for n in names):
+            return set()
+        points = product((Interval(0.0, 0.0), Interval(1.0, 1.0)), repeat=len(names))
+        return {margins(formula, dict(zip(names, point, strict=True))).low for point in points}
+    found = [_truth_margins(child, info) for child in formula.children]
+    if not all(found):
+        return set()
+    if isinstance(formula, Not | Implies):
+        found[0] = {-value for value in found[0]}
+    if isinstance(formula, Iff):
+        found += [{-value for value in values} for values in found]
+    return set().union(*found)
 
 
 def ranges_of(problem: Problem) -> dict[str, Interval]:

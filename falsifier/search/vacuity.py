@@ -12,9 +12,10 @@ from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.search.effects import Effects
 from falsifier.search.findings import Finding, FindingKind
+from falsifier.search.lint import hidden_margin
 from falsifier.stl.expression import Number
 from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Not, Or, Predicate, Until
-from falsifier.stl.margins import signed
+from falsifier.stl.margins import is_on_limit, shown, signed
 
 # A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
 _FAR = 3.0
@@ -95,7 +96,7 @@ class Vacuity:
         unique = {(finding.kind, finding.part): finding for finding in (*conditions, *disjuncts, *far)}
         # If nothing moves the requirement's signals, that has been said of everything that was searched.
         idle = self._effects.findings() if self._moved else ()
-        return (*constant, *unique.values(), *idle)
+        return (*constant, *self._hidden(), *unique.values(), *idle)
 
     def _of(self, kind: type[Formula]) -> list[int]:
         """Return the watched parts that belong to formulas of this kind."""
@@ -119,7 +120,8 @@ class Vacuity:
     def _is_far(self, i: int, said: set[Predicate]) -> bool:
         alike, formula = self._alike(i), self._parts[i].formula
         low, high = min(self._lows[alike]), max(self._highs[alike])
-        return formula not in said and bool(max(low, -high) > _FAR * (high - low))
+        margin = max(low, -high)
+        return formula not in said and not is_on_limit(margin) and bool(margin > _FAR * (high - low))
 
     def _in_all(self) -> str:
         return f"in {counted(self._count, 'simulation')}" if self._count > 1 else "in the only simulation"
@@ -145,6 +147,11 @@ class Vacuity:
         else:
             return
         yield Finding(kind="constant", text=text, part=str(self._problem.requirement.formula), margin=value)
+
+    def _hidden(self) -> Iterator[Finding]:
+        if hidden := hidden_margin(self._problem):
+            what, advice = hidden
+            yield Finding(kind="margin", text=f"{what[0].upper()}{what[1:]}; {advice}.")
 
     def _condition(self, i: int) -> Finding:
         watched = self._parts[i]
@@ -205,7 +212,7 @@ class Vacuity:
         moment = (self._lowest if held else self._highest)[i]
         assert moment is not None, "a part is judged after it has been seen"
         margin = float(self._lows[i] if held else -self._highs[i])
-        near = _reached(formula, moment.values) or f"{off} by {margin:.6g}"
+        near = _reached(formula, moment.values) or f"{off} by {shown(margin):.6g}"
         aimed = self._aimed[str(aim)]
         return Finding(
             kind=kind,

@@ -21,6 +21,7 @@ from falsifier.stl.formula import (
     Always,
     And,
     Eventually,
+    Flag,
     Formula,
     Iff,
     Implies,
@@ -29,7 +30,6 @@ from falsifier.stl.formula import (
     Or,
     Predicate,
     Until,
-    is_flag,
     negated,
 )
 from falsifier.stl.names import name_text
@@ -142,7 +142,7 @@ class _Demand(NamedTuple):
     @property
     def text(self) -> str:
         formula = self.formula
-        if isinstance(formula, Predicate) and is_flag(formula):
+        if isinstance(formula, Flag):
             return f"{'' if self.wanted else 'not '}{formula.left}"
         return self.part.text if self.wanted else str(negated(formula))
 
@@ -341,7 +341,7 @@ class _Search:
         quantity, other = compared_sides(predicate)
         value, limit = (float(side.evaluate(values)) for side in (quantity, other))
         unit = unit_of(quantity, units) or unit_of(other, units)
-        if is_flag(predicate) and value in (0.0, 1.0):
+        if isinstance(predicate, Flag) and value in (0.0, 1.0):
             reading = f"{quantity} was {'true' if value else 'false'}"
         else:
             reading = valued(quantity, values, value - limit, unit)

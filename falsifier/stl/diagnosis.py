@@ -13,6 +13,7 @@ from falsifier.stl.formula import (
     Always,
     And,
     Eventually,
+    Flag,
     Formula,
     Iff,
     Implies,
@@ -28,6 +29,8 @@ from falsifier.stl.witness import path_to_decider
 
 # Digits of numbers; of values that are compared more if their difference is small.
 _DIGITS, _MOST_DIGITS = 6, 12
+# Margin of a Boolean signal that is true.
+_OF_TRUTH = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,6 +232,8 @@ def _plain(
 
 def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:
     """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
+    if isinstance(predicate, Flag) and abs(value) == _OF_TRUTH:
+        return f"{predicate} is {'true' if value > 0 else 'false'}"
     left, right = (valued(side, values, value) for side in (predicate.left, predicate.right))
     if is_on_limit(value):
         return f"{left} equals {right}"

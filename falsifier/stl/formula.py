@@ -95,6 +95,19 @@ class Predicate(Formula):
 
 
 @dataclass(frozen=True, slots=True)
+class Flag(Predicate):
+    """A Boolean signal as a formula: ``b`` alone means ``b >= 0.5``."""
+
+    @classmethod
+    def of(cls, signal: Name) -> "Flag":
+        """Return the formula that a signal is true."""
+        return cls(">=", signal, Number(0.5))
+
+    def __str__(self) -> str:
+        return str(self.left)
+
+
+@dataclass(frozen=True, slots=True)
 class Not(Formula):
     """Negation."""
 
@@ -258,11 +271,6 @@ class Next(Formula):
         return f"X {_prefixed(self.operand)}"
 
 
-def is_flag(predicate: Predicate) -> bool:
-    """Whether a predicate is a Boolean signal: ``b`` alone in a formula means ``b >= 0.5``."""
-    return predicate.operator == ">=" and isinstance(predicate.left, Name) and predicate.right == Number(0.5)
-
-
 OPPOSITE: dict[Comparison, Comparison] = {
     "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
 }  # fmt: skip
@@ -272,7 +280,7 @@ def negated(formula: Formula) -> Formula:
     """Return what holds if a formula does not: the opposite comparison where there is one."""
     if isinstance(formula, Not):
         return formula.operand
-    if isinstance(formula, Predicate) and not is_flag(formula):
+    if isinstance(formula, Predicate) and not isinstance(formula, Flag):
         return Predicate(OPPOSITE[formula.operator], formula.left, formula.right)
     return Not(formula)
 
@@ -283,4 +291,6 @@ def _end(window: Window | None) -> float:
 
 def _prefixed(operand: Formula) -> str:
     # The grammar needs no parentheses around a predicate; they are for the reader.
-    return embraced(operand, PREFIX) if not isinstance(operand, Predicate) else f"({operand})"
+    if isinstance(operand, Predicate) and not isinstance(operand, Flag):
+        return f"({operand})"
+    return embraced(operand, PREFIX)

@@ -53,6 +53,7 @@ from falsifier.stl.formula import (
     And,
     Comparison,
     Eventually,
+    Flag,
     Formula,
     Iff,
     Implies,
@@ -341,7 +342,7 @@ class _Parser:
         if isinstance(node, Formula):
             return node
         if isinstance(node, Name):
-            return Predicate(">=", node, Number(0.5))
+            return Flag.of(node)
         what = "a number" if isinstance(node, Number) else "an expression"
         hint = f"compare it, for example {node} >= 0"
         if "=>" in self.text:

@@ -7,6 +7,7 @@ from falsifier.stl.formula import (
     And,
     Comparison,
     Eventually,
+    Flag,
     Formula,
     Iff,
     Implies,
@@ -16,7 +17,6 @@ from falsifier.stl.formula import (
     Predicate,
     Until,
     Window,
-    is_flag,
 )
 
 _IS: dict[Comparison, str] = {
@@ -99,7 +99,7 @@ def _is_range(formula: Formula) -> bool:
 
 def _predicate(predicate: Predicate) -> str:
     left, operator, right = predicate.left, predicate.operator, predicate.right
-    if is_flag(predicate):
+    if isinstance(predicate, Flag):
         return f"{left} is true"
     if isinstance(left, Number) and not isinstance(right, Number):
         left, operator, right = right, _MIRRORED[operator], left
@@ -113,7 +113,7 @@ def _predicate(predicate: Predicate) -> str:
 
 
 def _negated(predicate: Predicate) -> str:
-    if is_flag(predicate):
+    if isinstance(predicate, Flag):
         return f"{predicate.left} is false"
     return _predicate(Predicate(OPPOSITE[predicate.operator], predicate.left, predicate.right))
 

@@ -6,7 +6,9 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from falsifier.cli.inspect import check
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
@@ -30,6 +32,7 @@ value = 0
 CHEAP = ("AT", "CC", "ChargerHandshake", "HeaterLimpHome", "NN", "PulseMeter")
 # By bundled spec: what is found, all of it true.
 BUNDLED = {spec: [(f"{spec}6{part}", "implied") for part in "abc"] for spec in ("AT", "ATsplit")}
+BUNDLED["ChargerHandshake"] = [("ChargerHandshake", "margin")]
 
 
 @pytest.mark.parametrize(
@@ -38,7 +41,7 @@ BUNDLED = {spec: [(f"{spec}6{part}", "implied") for part in "abc"] for spec in (
 def test_bundled_specs_raise_no_false_alarm(name: str) -> None:
     found = lint(name, simulations=2 if name in CHEAP else 0)
     assert [(f.requirement, f.kind) for f in found] == BUNDLED.get(name, [])
-    assert all("6abc implies it" in f.text for f in found)
+    assert all("6abc implies it" in f.text for f in found if f.kind == "implied")
 
 
 FOUND = [
@@ -74,6 +77,33 @@ def test_whole_numbers_that_can_be_equal_are_no_finding(tmp_path: Path, formula:
     path = tmp_path / "my.toml"
     path.write_text(f"{SPEC}[requirements.R]\nformula = '{formula}'\n")
     assert lint(str(path), simulations=0) == []
+
+
+HEATER = f"""
+[model]
+fmu = "{bundled("fmus/HeaterLimpHome.fmu").as_posix()}"
+interface = "co-simulation"
+[inputs.disagreement]
+range = [0, 10]
+control_points = 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        ("F[0,1] limp", "can only be -0.5 or 0.5, because limp is Boolean"),
+        ("G[0,9] (limp == 1 or not limp)", "can only be -1 or -0.5 or 0 or 0.5, because limp is Boolean"),
+        ("G[0,9] (limp -> power <= 30)", ""),
+    ],
+)
+def test_a_requirement_about_booleans_alone_has_no_margin(tmp_path: Path, formula: str, told: str) -> None:
+    path = spec(tmp_path, f"{HEATER}[requirements.R]\nformula = '{formula}'\n")
+    found = [f for f in lint(path, simulations=0) if f.kind == "margin"]
+    assert len(found) == bool(told)
+    assert all(told in f.text and "temperature and power" in f.advice for f in found)
+    said = CliRunner().invoke(check, [path]).output
+    assert ("Boolean" in said) == bool(told)
 
 
 def test_a_searched_parameter_does_not_change_over_time() -> None:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from falsifier.campaigns.analysis import load_run
+from falsifier.core.files import bundled
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.events import Evaluated, Event
@@ -82,6 +83,15 @@ def test_a_robustness_that_does_not_change_is_told_although_signals_do() -> None
     found = findings(lag_problem("G[0,10] (x <= 5 or x >= 9) and G[0,0] (x <= 0.5)"))
     assert "constant" in [f.kind for f in found]
     assert "although x changed" in found[0].text
+
+
+def test_a_boolean_that_hides_the_margin_is_told() -> None:
+    problem = Problem.from_fmu(
+        bundled("fmus/HeaterLimpHome.fmu"), "G[0,9] not limp", inputs={"disagreement": (0, 5)}
+    )
+    told = {f.kind: f.text for f in falsify(problem, "sobol", budget=3).findings}["margin"]
+    assert told.startswith("The robustness can only be -0.5 or 0.5, because limp is Boolean")
+    assert "compare the numbers of which limp is made instead (the model has temperature and" in told
 
 
 def test_one_simulation_is_too_few_to_call_the_robustness_constant() -> None:

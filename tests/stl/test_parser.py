@@ -12,6 +12,7 @@ from falsifier.stl.formula import (
     Always,
     And,
     Eventually,
+    Flag,
     Iff,
     Implies,
     Next,
@@ -20,11 +21,10 @@ from falsifier.stl.formula import (
     Predicate,
     Until,
     Window,
-    is_flag,
 )
 from tests.stl.randoms import random_formula
 
-A, B, C = (Predicate(">=", Name(n), Number(0.5)) for n in "abc")
+A, B, C = (Flag.of(Name(n)) for n in "abc")
 X3 = Predicate("<=", Name("x"), Number(3.0))
 
 
@@ -137,10 +137,18 @@ def test_names_as_models_have_them(text: str, name: str) -> None:
 
 def test_a_signal_alone_is_a_boolean_one() -> None:
     formula = parse("b")
-    assert isinstance(formula, Predicate)
-    assert formula == B
-    assert is_flag(formula)
-    assert not is_flag(X3)
+    assert isinstance(formula, Flag)
+    assert formula == B and str(formula) == "b"
+    compared = parse("b >= 0.5")
+    assert not isinstance(compared, Flag) and str(compared) == "b >= 0.5"
+
+
+@pytest.mark.parametrize(
+    "text", ["G[0,5] not b", "b and not c or X b", "G b -> F[0,1] (b <-> c)", "b U[0,2] c"]
+)
+def test_a_boolean_signal_is_written_as_the_user_wrote_it(text: str) -> None:
+    assert str(parse(text)) == text
+    assert parse(str(parse(text))) == parse(text)
 
 
 @pytest.mark.parametrize("block", range(4))
