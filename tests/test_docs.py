@@ -20,7 +20,8 @@ import falsifier
 from falsifier import errors
 from falsifier.cli import cli
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS
+from falsifier.llm import DEFAULT_VARIANT
+from falsifier.llm.prompts import VARIANTS
 from falsifier.problem.spec import Spec, parse_spec
 from falsifier.problem.templates import TEMPLATES
 from falsifier.search.manifest import Manifest

@@ -11,7 +11,8 @@ from typing import Any, get_args
 from mkdocs.exceptions import PluginError
 
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS
+from falsifier.llm import DEFAULT_VARIANT
+from falsifier.llm.prompts import VARIANTS
 from falsifier.llm.prompts.variants import Part
 from falsifier.problem.sections import ModelChanges, ModelSection
 from falsifier.problem.spec import Spec

@@ -33,7 +33,7 @@ _LOCK_PATIENCE = 0.5
 class CampaignRecord(BaseModel):
     """Content of campaign.json."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     falsifier: str = Field(description="Version of this package.")
     python: str

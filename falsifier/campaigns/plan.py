@@ -80,7 +80,7 @@ class CampaignRequest(BaseModel):
         suite: name of the suite that the runs come from, or None.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     runs: tuple[RunRequest, ...] = Field(min_length=1)
     limits: Budget | None = None

@@ -61,12 +61,13 @@ from falsifier.cli.options import (
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
+from falsifier.llm.messages import Effort
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
 from falsifier.search.leaders import price_of
 from falsifier.search.moves import Objective
-from falsifier.search.request import Effort, LLMSettings
+from falsifier.search.request import LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
 from falsifier.views.terminal import warn
 

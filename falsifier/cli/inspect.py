@@ -20,7 +20,7 @@ from falsifier.cli.options import (
     with_template,
 )
 from falsifier.cli.output import say
-from falsifier.context.simulink import SUFFIXES as SIMULINK
+from falsifier.context.values import SIMULINK
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -10,9 +10,11 @@ from falsifier.cli.options import Decorator, Function, add, repeatable
 from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.llm.messages import ReplyKind
-from falsifier.llm.prompts.variants import CONTEXT_VARIANT, DEFAULT_VARIANT
-from falsifier.search.request import Effort, LLMSettings
+from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
+from falsifier.llm.messages import Effort, ReplyKind
+
+if TYPE_CHECKING:
+    from falsifier.search.request import LLMSettings
 
 # What a price is, in errors; as providers state prices.
 _PRICE = "expected SENT:RECEIVED in US dollars per million tokens sent and received, for example 0.25:2"
@@ -120,14 +122,14 @@ def llm_options(command: Function) -> Function:
     return add(command, llm_option(), effort_option, variant_option(), asking_options)
 
 
-def connection_settings(options: dict[str, Any]) -> LLMSettings | None:
+def connection_settings(options: dict[str, Any]) -> "LLMSettings | None":
     """Take the values of llm, effort and connection_options out of a command's keyword arguments."""
     unused = {"variant": None, "fallback": None, "anonymous": False, "reply": None}
     options.update(unused)
     return llm_settings(options)
 
 
-def llm_settings(options: dict[str, Any]) -> LLMSettings | None:
+def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
     """Take the values of llm_options out of a command's keyword arguments; None if no LLM is named."""
     name = options.pop("llm")
     asked = {key: options.pop(key) for key in ("effort", "variant")}
@@ -135,6 +137,8 @@ def llm_settings(options: dict[str, Any]) -> LLMSettings | None:
     if name is None:
         _refuse_without_llm(asked)
         return None
+    from falsifier.search.request import LLMSettings
+
     return LLMSettings(name=name, **asked)
 
 

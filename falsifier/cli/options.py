@@ -8,15 +8,16 @@ import logging
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.problem.sections import ModelChanges
-from falsifier.problem.shorthand import changes_from_options
-from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS
+
+if TYPE_CHECKING:
+    from falsifier.problem.sections import ModelChanges
+    from falsifier.problem.source import Parameterization, ProblemSource
 
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
@@ -36,10 +37,10 @@ def profile_option(command: Function) -> Function:
 
 
 # What a search does unless it is told otherwise: the same for one run and for each run of a campaign.
-DEFAULT_PARAMETERIZATION: Parameterization = "free"
+DEFAULT_PARAMETERIZATION: "Parameterization" = "free"
 
 
-def parameterization_option(*, multiple: bool = False, suite: Parameterization = "fixed") -> Decorator:
+def parameterization_option(*, multiple: bool = False, suite: "Parameterization" = "fixed") -> Decorator:
     default = DEFAULT_PARAMETERIZATION
     return click.option(
         "--parameterization",
@@ -84,8 +85,10 @@ def policy_options(command: Function) -> Function:
     )
 
 
-def policy_changes(options: dict[str, Any]) -> ModelChanges:
+def policy_changes(options: dict[str, Any]) -> "ModelChanges":
     """Take the values of policy_options out of a command's keyword arguments."""
+    from falsifier.problem.shorthand import changes_from_options
+
     return changes_from_options(allow=options.pop("allow"), deny=options.pop("deny"))
 
 
@@ -158,8 +161,11 @@ def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[
     return formulas[0] if formulas else None
 
 
-def problem_source(options: dict[str, Any]) -> ProblemSource:
+def problem_source(options: dict[str, Any]) -> "ProblemSource":
     """Take the values of problem_options out of a command's keyword arguments."""
+    from falsifier.problem.shorthand import changes_from_options
+    from falsifier.problem.source import ProblemSource
+
     varied = (
         *("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface"),
         *("allow", "deny"),
@@ -176,7 +182,7 @@ def problem_source(options: dict[str, Any]) -> ProblemSource:
     return with_template(source, template)
 
 
-def with_template(source: ProblemSource, template: str | None) -> ProblemSource:
+def with_template(source: "ProblemSource", template: str | None) -> "ProblemSource":
     """Return a source with the formula of ``--template``, if that is given."""
     if template is None:
         return source

@@ -4,13 +4,10 @@ import json
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from falsifier.campaigns.directory import is_campaign, run_directories
-from falsifier.cli.campaign import resume_campaign
-from falsifier.cli.files import write_counterexample
 from falsifier.cli.llm_options import (
     check_context,
     context_option,
@@ -36,23 +33,17 @@ from falsifier.cli.options import (
     total_options,
 )
 from falsifier.cli.output import conclude
-from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled, file_name
-from falsifier.counterexamples.known_inputs import known_inputs
 from falsifier.errors import FalsifierError, JournalError, SpecError
-from falsifier.problem.loading import find_spec, load_source, sources_of
-from falsifier.problem.problem import Problem
-from falsifier.problem.refinement import widened
-from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
-from falsifier.search.moves import Objective
-from falsifier.search.result import Result
-from falsifier.search.run import falsify
-from falsifier.search.run import resume as resume_run
-from falsifier.views.fmu_log import FmuLog
-from falsifier.views.progress import make_display
 from falsifier.views.terminal import warn
-from falsifier.views.text import counterexample_name, result_json, result_text, results_text
+
+if TYPE_CHECKING:  # imported where used, so that --help prints at once
+    from falsifier.core.candidate import Candidate
+    from falsifier.problem.problem import Problem
+    from falsifier.problem.source import ProblemSource
+    from falsifier.search.moves import Objective
+    from falsifier.search.result import Result
 
 # If several requirements end differently, the first of these that occurs decides.
 _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}
@@ -105,7 +96,7 @@ def run(
     *,
     engine: str | None,
     budget: int | None,
-    objective: Objective | None,
+    objective: "Objective | None",
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
@@ -127,6 +118,12 @@ def run(
     The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
+    from falsifier.problem.loading import load_source
+    from falsifier.problem.refinement import widened
+    from falsifier.search.run import falsify
+    from falsifier.views.fmu_log import FmuLog
+    from falsifier.views.progress import make_display
+
     source, llm = problem_source(options), llm_settings(options)
     check_context(source.context, [engine] if llm is None else [])
     logs = [FmuLog(fmu_log)] if fmu_log else []
@@ -185,6 +182,11 @@ def resume(
     --jobs, --executor and the limits apply to campaigns only; a run keeps its own. The limits on simulations,
     tokens and cost include what was spent before.
     """
+    from falsifier.campaigns.directory import is_campaign, run_directories
+    from falsifier.cli.campaign import resume_campaign
+    from falsifier.search.run import resume as resume_run
+    from falsifier.views.progress import make_display
+
     given = (total_budget, total_seconds, total_tokens, total_cost)
     has_limits = any(x is not None for x in given)
     if is_campaign(directory):
@@ -211,16 +213,20 @@ def resume(
     _finish(results, as_json=as_json)
 
 
-def _known(place: Path, problem: Problem) -> Candidate:
+def _known(place: Path, problem: "Problem") -> "Candidate":
     """Read known inputs, and say on stderr what was changed to fit them to the search space."""
+    from falsifier.counterexamples.known_inputs import known_inputs
+
     fitted = known_inputs(place, problem)
     for note in fitted.notes:
         warn(f"{place}: {note}")
     return fitted.candidate
 
 
-def _finish(results: list[Result], *, as_json: bool) -> NoReturn:
+def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:
     """Write the counterexamples, print the results, and end with the code of what the search found."""
+    from falsifier.views.text import result_json, result_text, results_text
+
     for result in results:
         if result.directory is not None:
             _write_counterexamples(result, result.directory)
@@ -235,8 +241,11 @@ def _finish(results: list[Result], *, as_json: bool) -> NoReturn:
     conclude(text, next(code for status, code in _EXIT_CODES.items() if status in statuses))
 
 
-def _write_counterexamples(result: Result, directory: Path) -> None:
+def _write_counterexamples(result: "Result", directory: Path) -> None:
     """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
+    from falsifier.cli.files import write_counterexample
+    from falsifier.views.text import counterexample_name
+
     try:
         name = counterexample_name(result)
     except FalsifierError as error:
@@ -254,12 +263,14 @@ def _write_counterexamples(result: Result, directory: Path) -> None:
             warn(f"falsifier: {directory / file} cannot be written: {error}")
 
 
-def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
+def _all_of(source: "ProblemSource") -> "tuple[ProblemSource, ...]":
     """Sources of all requirements of a spec.
 
     Raises:
         SpecError: if the target is not a spec, or names one requirement.
     """
+    from falsifier.problem.loading import find_spec, sources_of
+
     if source.parts.kind in ("fmu", "python") or source.stl is not None:
         raise SpecError(f"{source.target}: --all needs a spec with several requirements; drop --all")
     if find_spec(source.target)[1] is not None:
@@ -269,8 +280,10 @@ def _all_of(source: ProblemSource) -> tuple[ProblemSource, ...]:
     return tuple(sources_of(source))
 
 
-def _spec_of(source: ProblemSource) -> str:
+def _spec_of(source: "ProblemSource") -> str:
     """The spec's name if it is bundled, else its path."""
+    from falsifier.problem.loading import find_spec
+
     path = find_spec(source.target)[0]
     return path.stem if path.parent == bundled("specs") else str(path)
 

@@ -12,12 +12,11 @@ from falsifier.context.fmu_files import NAME_THEM, inside
 from falsifier.context.forms import Form, Readable, of_diagram, of_source, parsed
 from falsifier.context.levels import levels_of
 from falsifier.context.sentry import Sentry
-from falsifier.context.simulink import SUFFIXES as SIMULINK
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.parts import read_parts
 from falsifier.context.sources import Source
 from falsifier.context.thresholds import Threshold
-from falsifier.context.values import Compared, Context, Excerpt, Level
+from falsifier.context.values import SIMULINK, Compared, Context, Excerpt, Level
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 

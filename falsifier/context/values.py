@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
+# Endings of Simulink files.
+SIMULINK = (".slx", ".mdl")
 # What --context takes beside files, and what it begins with if a file is allowed.
 INSIDE, NOTHING, CHECKED = "fmu", "none", "checked:"
 

@@ -55,7 +55,7 @@ _WORDS: dict[ReplayStatus, str] = {
 class StoredCounterexample(BaseModel):
     """Content of a counterexample file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     format: Literal[1] = 1
     requirement: str

@@ -1,13 +1,14 @@
 """The protocol of all search engines: ask for candidates, tell evaluations."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from falsifier.core.candidate import Candidate
-from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.conversation import OnExchange
-from falsifier.llm.messages import Chat
+if TYPE_CHECKING:  # --help of commands lists engines, and needs nothing of these
+    from falsifier.core.candidate import Candidate
+    from falsifier.evaluation.confirm import Confirmation
+    from falsifier.evaluation.evaluate import Evaluation
+    from falsifier.llm.conversation import OnExchange
+    from falsifier.llm.messages import Chat
 
 
 class Engine(Protocol):
@@ -23,14 +24,14 @@ class Engine(Protocol):
         """Origin of its candidates."""
         ...
 
-    def ask(self, n: int = 1) -> list[Candidate]:
+    def ask(self, n: int = 1) -> "list[Candidate]":
         """Return n candidates (at least one) to simulate next.
 
         May be called again before the evaluations of earlier candidates have been told.
         """
         ...
 
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+    def tell(self, evaluations: "Sequence[Evaluation]") -> None:
         """Learn from evaluations, including failed ones and those of candidates that it did not propose."""
         ...
 
@@ -43,7 +44,7 @@ class FollowsRun(Protocol):
         """Be told the maximum number of simulations, before the first ``ask``; None: no limit."""
         ...
 
-    def doubt(self, confirmation: Confirmation) -> None:
+    def doubt(self, confirmation: "Confirmation") -> None:
         """Be told that a violation does not count, before its evaluation is told."""
         ...
 
@@ -59,7 +60,7 @@ class FollowsRun(Protocol):
 class HasRemarks(Protocol):
     """An engine that has something to say at the end of a run."""
 
-    def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
+    def remarks(self, evaluations: "Sequence[Evaluation]") -> tuple[str, ...]:
         """Return what a user should know of how it worked, one sentence each, given all evaluations."""
         ...
 
@@ -68,7 +69,7 @@ class HasRemarks(Protocol):
 class AsksLLM(Protocol):
     """An engine that asks a language model; a run counts, records and replays its exchanges."""
 
-    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
+    def attach(self, on_exchange: "OnExchange", wrap: "Callable[[Chat], Chat]") -> None:
         """Connect the engine to a run, before its first ``ask``: report every exchange, use the wrapped chat.
 
         Args:

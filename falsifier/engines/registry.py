@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.problem.problem import Problem
+
+if TYPE_CHECKING:
+    from falsifier.problem.problem import Problem
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ def check_engine(name: str) -> None:
         raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
 
 
-def make_engine(name: str, problem: Problem, *, seed: int, **options: Any) -> Engine:
+def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> Engine:
     """Create the engine with this name for a problem.
 
     Args:

@@ -6,9 +6,10 @@ from dataclasses import replace
 from falsifier.context.values import NOTHING
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
+from falsifier.llm import CONTEXT_VARIANT
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import ReplyKind
-from falsifier.llm.prompts import CONTEXT_VARIANT, Variant, View, variant_named
+from falsifier.llm.prompts import Variant, View, variant_named
 from falsifier.llm.prompts.circumstances import in_doubt
 from falsifier.llm.replies import ReplyForm
 from falsifier.problem.context import with_context

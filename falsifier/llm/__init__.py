@@ -13,3 +13,7 @@ small wrappers, each with a single concern::
 ``prompts`` builds what an LLM is sent, ``replies`` reads what it returns. Nothing in this package depends on
 the engines or the search.
 """
+
+# Names of the prompt variants that are used if none is named, without and with context files. They stand here
+# because options of the command line need nothing else of the prompts.
+DEFAULT_VARIANT, CONTEXT_VARIANT = "MP5", "MP6"

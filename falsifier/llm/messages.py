@@ -15,10 +15,11 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 UNREADABLE = "unreadable"
 # What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
 ReplyKind = Literal["json", "points"]
+Effort = Literal["none", "minimal", "low", "medium", "high"]
 
 
 class _Value(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 def below(mode: Mode) -> Mode | None:

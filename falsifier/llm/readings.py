@@ -19,7 +19,7 @@ _LONGEST_MEANING = 500
 
 
 class _Reply(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class AssumedUnit(_Reply):

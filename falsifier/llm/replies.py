@@ -242,7 +242,7 @@ def _interpolations(r: InputRange) -> tuple[str, ...]:
 
 
 class _Reply(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class SignalReply(_Reply):
@@ -299,7 +299,7 @@ def _text_or_none(found: Any) -> Any:
 class CandidateReply(BaseModel):
     """One candidate, as an LLM writes it; unknown keys are ignored, not worth paying for another reply."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
 
     rationale: Annotated[str, BeforeValidator(_text_or_none), AfterValidator(_storable)] = ""
     signals: Annotated[list[SignalReply], FailFast(), BeforeValidator(_signals_by_name)] = Field(

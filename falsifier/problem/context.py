@@ -6,7 +6,6 @@ from functools import lru_cache
 from os.path import relpath
 from pathlib import Path
 
-from falsifier.context.gather import gather
 from falsifier.context.values import NOTHING, Context, Named
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.fmu import fmu_files
@@ -53,6 +52,8 @@ def with_context(problem: Problem) -> Problem:
 
 
 def _gathered(problem: Problem, *, is_told: bool) -> Context:
+    from falsifier.context.gather import gather
+
     searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
     seeds = problem.requirement.formula.signals
     signals = dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))

@@ -38,7 +38,7 @@ MAX_CONTROL_POINTS = 10_000
 class Strict(BaseModel):
     """A section that takes no other keys than its own."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class FreeSection(Strict):
@@ -153,7 +153,7 @@ class ComponentSection(Strict):
 class ConnectionSection(Strict):
     """Where the values of one input of a component come from."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
 
     source: str = Field(alias="from", description="Output, as COMPONENT.VARIABLE.")
     factor: Number | None = Field(None, description="Factor of factor * value + offset, in place of units.")

@@ -68,7 +68,7 @@ class ProblemSource(BaseModel):
             looks like a key and is none.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     target: str
     stl: str | None = None

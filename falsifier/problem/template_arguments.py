@@ -111,7 +111,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 class Template(BaseModel):
     """Arguments of one template."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     # One line on what it requires, for lists.
     summary: ClassVar[str] = ""
     # Arguments that name signals.

@@ -32,7 +32,7 @@ _RECORDED_PACKAGES = ("litellm", "numba", "numpy", "rtamt", "scipy")
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class InputRecord(_Strict):

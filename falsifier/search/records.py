@@ -19,7 +19,7 @@ _ELAPSED = Field(description="Wall-clock time of the run in s when the line was 
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     line: int = Field(0, description="Number of the line, from 1; 0 before it is written.")
     sum: str = Field("", description="Checksum of the line up to here.")
@@ -125,7 +125,7 @@ class ConfirmedRecord(_Record):
 class FindingRecord(BaseModel):
     """One thing that the search could not show about a requirement."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     kind: FindingKind
     text: str

@@ -1,12 +1,12 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from falsifier.core.secrets import holds_credentials, is_secret_option
-from falsifier.llm.messages import ReplyKind
+from falsifier.llm.messages import Effort, ReplyKind
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource
@@ -14,20 +14,19 @@ from falsifier.search.budget import Budget
 from falsifier.search.journal import Keep
 from falsifier.search.moves import Objective
 
-Effort = Literal["none", "minimal", "low", "medium", "high"]
 # A negative price, or one that is not a number, would switch off the limit on the cost.
 _Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class LLMSettings(_Strict):
     """Which language model to ask, and how."""
 
     # An option that contains a key is rejected, and the error must not show it either.
-    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, defer_build=True)
 
     name: str
     effort: Effort | None = None

@@ -12,7 +12,6 @@ from falsifier.context.simulink.stateflow import read_charts
 from falsifier.context.simulink.tree import Node
 from falsifier.errors import SpecError
 
-SUFFIXES = (".slx", ".mdl")
 _MAX_TEXT_BYTES = 128 << 20
 _SETTINGS = ("StartTime", "StopTime", "Solver", "SolverName", "FixedStep", "MaxStep", "SampleTime")
 

@@ -4,13 +4,11 @@ from falsifier.llm.prompts.blocks import Prompt
 from falsifier.llm.prompts.build import build_prompt
 from falsifier.llm.prompts.render import render
 from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS, trimmed
-from falsifier.llm.prompts.variants import CONTEXT_VARIANT, DEFAULT_VARIANT, VARIANTS, Variant, variant_named
+from falsifier.llm.prompts.variants import VARIANTS, Variant, variant_named
 from falsifier.llm.prompts.view import View
 
 __all__ = [
-    "CONTEXT_VARIANT",
     "DEFAULT_PROMPT_TOKENS",
-    "DEFAULT_VARIANT",
     "VARIANTS",
     "Prompt",
     "Variant",

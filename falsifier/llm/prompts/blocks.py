@@ -6,7 +6,7 @@ from falsifier.core.signals import Interpolation
 
 
 class _Block(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class TaskBlock(_Block):

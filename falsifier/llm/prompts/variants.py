@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from falsifier.errors import SpecError, did_you_mean
+from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 
 Part = Literal[
     "names",  # inputs and parameters by name and meaning; otherwise numbered dimensions
@@ -65,9 +66,6 @@ def _variants() -> Mapping[str, Variant]:
 
 
 VARIANTS = _variants()
-DEFAULT_VARIANT = "MP5"
-# The default if files are named for the language model to read.
-CONTEXT_VARIANT = "MP6"
 
 
 def variant_named(name: str | None, *, has_context: bool = False) -> Variant:

@@ -14,7 +14,8 @@ from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpac
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.prompts import DEFAULT_VARIANT, VARIANTS, View, build_prompt, render, variant_named
+from falsifier.llm import DEFAULT_VARIANT
+from falsifier.llm.prompts import VARIANTS, View, build_prompt, render, variant_named
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
 from falsifier.testing import lag_problem
