@@ -22,7 +22,7 @@ from falsifier import load_problem, make_engine
 from falsifier.core.candidate import Candidate
 from falsifier.engines.box import UnitBox
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.fmu.simulator import FmuModel
+from falsifier.fmu.model import FmuModel
 from falsifier.problem.problem import Problem
 
 Point = NDArray[np.float64]

@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.compiler import compiler
 from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.compiler import compiler
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.model_description import read_description
 from tests.fmu.fixtures import runner

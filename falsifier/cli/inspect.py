@@ -155,7 +155,7 @@ def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
 @out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
     """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
-    from falsifier.fmu.build import build as compile_sources
+    from falsifier.fmu import compile_sources
 
     written = compile_sources(_one_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
     say(f"{written} written")
@@ -255,8 +255,8 @@ def _print_convergence(
     source: "Path | System", found: ModelInfo, allow: tuple[str, ...], deny: tuple[str, ...]
 ) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
+    from falsifier.evaluation.step_effect import step_convergence
     from falsifier.fmu import FmuModel, System
-    from falsifier.fmu.step_effect import step_convergence
 
     interface = default_interface(found)
     if interface is None:
@@ -300,7 +300,7 @@ def _print_convergence(
 
 def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Signal]) -> str:
     """Say which step keeps the error of the coupling small."""
-    from falsifier.fmu.step_effect import sufficient_step
+    from falsifier.evaluation.step_effect import sufficient_step
 
     share = f"{100 * _COUPLING_SHARE:g} % of its range"
     step = sufficient_step(system, experiment, signals, share=_COUPLING_SHARE, halvings=_HALVINGS)

@@ -198,7 +198,7 @@ class Experiment:
             output interval.
         tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
         time_limit: maximum wall-clock time of one simulation in s; None: as long as it makes progress, see
-            ``falsifier.fmu.plan``.
+            ``falsifier.fmu.process.plan``.
         strings: names and values of string parameters.
 
     Raises:

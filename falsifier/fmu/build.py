@@ -1,22 +1,43 @@
 """Compiling an FMU that contains its C sources for this platform."""
 
 import importlib.util
+import re
 import sys
 import sysconfig
 import tempfile
 import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from falsifier.core import operating_system
+from falsifier.core.compiler import compile_c
 from falsifier.errors import ModelError
-from falsifier.fmu.compiler import compile_c
-from falsifier.fmu.description import archive
-from falsifier.fmu.description.model_description import read_description
-from falsifier.fmu.simulator import FmuModel
-from falsifier.fmu.sources import Sources, find_sources
+from falsifier.fmu.description import extract, library_file, read_description, read_xml
+from falsifier.fmu.model import FmuModel
+
+# The standard's name, and that of drafts of FMI 3, which some exporters still write.
+_BUILD_DESCRIPTIONS = ("buildDescription.xml", "build_description.xml")
+_INCLUDED = re.compile(r'^\s*#\s*include\s*"([^"]+\.c)"', re.MULTILINE)
 
 
-def build(path: Path, out: Path) -> Path:
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """What one library is compiled from.
+
+    Attributes:
+        files: paths of the C files below ``sources``.
+        defines: preprocessor macros and their values.
+        includes: folders below ``sources`` in which headers are looked up.
+    """
+
+    files: tuple[str, ...]
+    defines: Mapping[str, str] = field(default_factory=dict)
+    includes: tuple[str, ...] = (".",)
+
+
+def compile_sources(path: Path, out: Path) -> Path:
     """Compile the sources of an FMU and write a copy of it with a library for this platform.
 
     The copy is loaded before it is written.
@@ -35,10 +56,10 @@ def build(path: Path, out: Path) -> Path:
     description = read_description(path)
     with tempfile.TemporaryDirectory(prefix="falsifier-build-") as name:
         folder = Path(name)
-        archive.extract(path, folder)
+        extract(path, folder)
         for identifier in sorted(set(description.identifiers.values())):
             sources = find_sources(path, folder, description.major, identifier)
-            target = folder / archive.library_file(description.info.fmi_version, identifier)
+            target = folder / library_file(description.info.fmi_version, identifier)
             target.parent.mkdir(parents=True, exist_ok=True)
             _compile(path, folder / "sources", sources, target, description.major)
         _write(path, folder, out)
@@ -83,3 +104,76 @@ def _write(path: Path, folder: Path, out: Path) -> None:
         raise ModelError(f"{path}: the sources compile, but the result cannot be used: {error}") from error
     finally:
         partial.unlink(missing_ok=True)
+
+
+def find_sources(path: Path, folder: Path, major: int, identifier: str) -> Sources:
+    """Return what one library of an extracted FMU is compiled from.
+
+    Files that the FMU lists, else all C files that no other C file includes.
+
+    Args:
+        path: path of the FMU, for messages.
+        folder: folder to which it was extracted.
+        major: major FMI version.
+        identifier: model identifier of the library.
+
+    Raises:
+        ModelError: if there are no sources, or listed ones are missing.
+    """
+    root = folder / "sources"
+    listed = _listed_2(path, folder, identifier) if major < 3 else _listed_3(path, root, identifier)
+    files = listed.files or tuple(_unlisted(root))
+    if not files:
+        raise ModelError(f"{path}: contains no C sources; export it with sources or for this platform")
+    missing = [f for f in files if not (root / f).is_file()]
+    if missing:
+        raise ModelError(f"{path}: the source files {', '.join(missing)} are missing; export it again")
+    headers = (p.parent.relative_to(root).as_posix() for p in sorted(root.rglob("*.h")))
+    return Sources(files, listed.defines, tuple(dict.fromkeys((".", *listed.includes, *headers))))
+
+
+def _unlisted(root: Path) -> Iterator[str]:
+    files = sorted(root.rglob("*.c"))
+    included = {
+        (file.parent / name).resolve()
+        for file in files
+        for name in _INCLUDED.findall(file.read_text(encoding="utf-8", errors="replace"))
+    }
+    return (f.relative_to(root).as_posix() for f in files if f.resolve() not in included)
+
+
+def _listed_2(path: Path, folder: Path, identifier: str) -> Sources:
+    root = _xml(path, folder / "modelDescription.xml")
+    for interface in (*root.findall("CoSimulation"), *root.findall("ModelExchange")):
+        files = tuple(f.attrib["name"] for f in interface.findall("SourceFiles/File"))
+        if files and interface.get("modelIdentifier") == identifier:
+            return Sources(files)
+    return Sources(())
+
+
+def _listed_3(path: Path, root: Path, identifier: str) -> Sources:
+    described = next((root / name for name in _BUILD_DESCRIPTIONS if (root / name).is_file()), None)
+    if described is None:
+        return Sources(())
+    configurations = _xml(path, described).findall("BuildConfiguration")
+    own = [c for c in configurations if c.get("modelIdentifier", identifier) == identifier]
+    # A configuration for another platform lists that platform's own files.
+    general = [c for c in own if "platform" not in c.attrib] or own
+    sets = general[0].findall("SourceFileSet") if general else []
+    return Sources(
+        tuple(_attributes(sets, "SourceFile")),
+        {
+            macro.attrib["name"]: macro.get("value", "")
+            for each in sets
+            for macro in each.findall("PreprocessorDefinition")
+        },
+        tuple(_attributes(sets, "IncludeDirectory")),
+    )
+
+
+def _xml(path: Path, described: Path) -> Element:
+    return read_xml(described.read_bytes(), f"{path}: {described.name}", ModelError)
+
+
+def _attributes(sets: list[Element], tag: str) -> Iterator[str]:
+    return (element.attrib["name"] for each in sets for element in each.findall(tag))

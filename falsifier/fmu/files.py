@@ -6,8 +6,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from falsifier.core.model import Model
-from falsifier.fmu.simulator import FmuModel
-from falsifier.fmu.systems.system import System
+from falsifier.fmu.model import FmuModel
+from falsifier.fmu.systems import System
 
 
 def fmu_files(model: Model) -> dict[Path, str]:

@@ -13,11 +13,19 @@ from falsifier.core.model import Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu.description import Description, archive, describe, needed_tool_text
-from falsifier.fmu.plan import make_plan
-from falsifier.fmu.process import REGISTRY, FmuOrder, Runner
-from falsifier.fmu.process.policy import Policy, resolved
-from falsifier.fmu.tasks import Task, make_task, room_for, run_task
+from falsifier.fmu.description import WINDOWS, Description, describe, file_hash, needed_tool_text
+from falsifier.fmu.process import (
+    REGISTRY,
+    FmuOrder,
+    Policy,
+    Runner,
+    Task,
+    make_plan,
+    make_task,
+    resolved,
+    room_for,
+    run_task,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +62,7 @@ class FmuModel:
             object.__setattr__(self, name, resolved(getattr(self, name), Path()))
         Policy.of(self.allow, self.deny)
         object.__setattr__(self, "path", Path(self.path).absolute())
-        object.__setattr__(self, "sha256", archive.file_hash(self.path))
+        object.__setattr__(self, "sha256", file_hash(self.path))
         _check_interface(self)
 
     @property
@@ -194,6 +202,6 @@ def _check_interface(model: FmuModel) -> None:
 def _check_windows(model: FmuModel, description: Description) -> None:
     if model.interface not in description.windows_libraries:
         raise ModelError(
-            f"{model.path}: the FMU has no library for {archive.WINDOWS}, only "
+            f"{model.path}: the FMU has no library for {WINDOWS}, only "
             f"{', '.join(description.info.platforms) or 'no binaries at all'}"
         )

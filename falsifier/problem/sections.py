@@ -15,7 +15,7 @@ from pydantic import (
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
-from falsifier.fmu.systems.network import Extrapolation, Isolation, Loops, Method
+from falsifier.fmu.systems import Extrapolation, Isolation, Loops, Method
 from falsifier.problem.templates import (
     TEMPLATES,
     Dwell,

@@ -14,7 +14,7 @@ from falsifier.core.words import counted, listed
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description import inputs_of_outputs
+from falsifier.fmu.description import read_structure
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.source import ProblemSource
@@ -279,7 +279,7 @@ def _is_declared_independent(problem: Problem) -> bool:
         return False
     if not problem.info.fmi_version.startswith(("2", "3")):
         return False
-    known = inputs_of_outputs(model.path, model.sha256)
+    known = read_structure(model.path, model.sha256).reaching
     searched = set(problem.space.names)
     signals = problem.requirement.formula.signals
     return all(name in known and not known[name] & searched for name in signals)

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from falsifier.core.model import Variable
 from falsifier.fmu import System
-from falsifier.fmu.systems.network import SYSTEM, Link, Network, Place
-from falsifier.fmu.systems.step_order import late_links
+from falsifier.fmu.systems import SYSTEM, Link, Network, Place, late_links
 
 # Maximum number of inputs, and of outputs, that are shown of a component.
 MOST_PORTS = 40

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
+from falsifier.evaluation.step_effect import Movement, step_convergence, sufficient_step
 from falsifier.fmu import Frame
-from falsifier.fmu.step_effect import Movement, step_convergence, sufficient_step
 from tests.fmu.fixtures import isolated, ramp
 from tests.fmu.small_systems import loop
 

@@ -8,9 +8,9 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
+from falsifier.fmu.model import _order
 from falsifier.fmu.process import REGISTRY, Runner
 from falsifier.fmu.process.worker import Worker
-from falsifier.fmu.simulator import _order
 from tests.patience import HANG
 
 # How a model-exchange FMU is simulated, for type checkers.

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.compiler import compiler
 from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, read_info
-from falsifier.fmu.build import build
-from falsifier.fmu.compiler import compiler
+from falsifier.fmu.build import compile_sources, find_sources
 from falsifier.fmu.description.archive import this_platform
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ramp, run
@@ -23,7 +23,7 @@ needs_compiler = pytest.mark.skipif(
 @needs_compiler
 @pytest.mark.parametrize("name", ["Lag_2sources", "Lag_3sources"])
 def test_sources_become_an_fmu_for_this_platform(tmp_path: Path, name: str) -> None:
-    target = build(fixtures.path(name), tmp_path / "Lag.fmu")
+    target = compile_sources(fixtures.path(name), tmp_path / "Lag.fmu")
     assert this_platform() in read_info(target).platforms
     built, known = FmuModel(target), fixtures.isolated(name.removesuffix("sources"))
     signals = {"u": ramp(1.0)}
@@ -35,7 +35,7 @@ def test_sources_become_an_fmu_for_this_platform(tmp_path: Path, name: str) -> N
 
 def test_an_fmu_without_sources_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"Lag_2\.fmu: contains no C sources"):
-        build(fixtures.path("Lag_2"), tmp_path / "out.fmu")
+        compile_sources(fixtures.path("Lag_2"), tmp_path / "out.fmu")
     assert not list(tmp_path.iterdir())
 
 
@@ -88,7 +88,7 @@ def test_function_prefixes_of_the_sources_have_no_effect(
     )
     extra = {"buildDescription_xml": build_description} if major == "3" else {}
     source = rearranged(tmp_path, name, **{file: text}, **extra)
-    built = build(source, tmp_path / "out.fmu")
+    built = compile_sources(source, tmp_path / "out.fmu")
     assert simulates_like_the_fixture(built, name.removesuffix("sources"))
 
 
@@ -97,7 +97,7 @@ def test_sources_in_subfolders_are_found_and_included_ones_are_not_compiled_twic
     text = '#define MODEL "lag.h"\n#include "../shell2.c"\n'
     source = rearranged(tmp_path, "Lag_2sources", all_c=None, **{"model/all_c": text})
     without_listing(source)
-    assert simulates_like_the_fixture(build(source, tmp_path / "out.fmu"), "Lag_2")
+    assert simulates_like_the_fixture(compile_sources(source, tmp_path / "out.fmu"), "Lag_2")
 
 
 @needs_compiler
@@ -105,7 +105,7 @@ def test_the_drafts_name_of_the_build_description_counts_too(tmp_path: Path) -> 
     with zipfile.ZipFile(fixtures.path("Lag_3sources")) as source:
         description = source.read("sources/buildDescription.xml").decode()
     other = rearranged(tmp_path, "Lag_3sources", buildDescription_xml=None, build_description_xml=description)
-    assert simulates_like_the_fixture(build(other, tmp_path / "out.fmu"), "Lag_3")
+    assert simulates_like_the_fixture(compile_sources(other, tmp_path / "out.fmu"), "Lag_3")
 
 
 @needs_compiler
@@ -113,7 +113,7 @@ def test_a_result_that_cannot_be_loaded_is_not_written(tmp_path: Path) -> None:
     text = '#define MODEL "lag.h"\nvoid gone(void);\n__attribute__((constructor)) static void at_load(void) '
     source = rearranged(tmp_path, "Lag_2sources", all_c=text + '{ gone(); }\n#include "shell2.c"\n')
     with pytest.raises(ModelError, match=r"the sources compile, but the result cannot be used: (?s:.*)gone"):
-        build(source, tmp_path / "out.fmu")
+        compile_sources(source, tmp_path / "out.fmu")
     assert [p.name for p in tmp_path.iterdir()] == ["Lag_2sources.fmu"]
 
 
@@ -122,7 +122,7 @@ def test_many_errors_are_summed_up(tmp_path: Path) -> None:
     text = "\n".join(f"int f{k}(void) {{ return missing{k}; }}" for k in range(50))
     source = rearranged(tmp_path, "Lag_2sources", all_c=text)
     with pytest.raises(ModelError, match="50 errors, the first:") as caught:
-        build(source, tmp_path / "out.fmu")
+        compile_sources(source, tmp_path / "out.fmu")
     assert len(str(caught.value).splitlines()) == 6
 
 
@@ -133,7 +133,7 @@ def test_sources_that_do_not_compile_show_what_the_compiler_says(tmp_path: Path)
         for name in source.namelist():
             target.writestr(name, b"int broken = ;" if name == "sources/lag.h" else source.read(name))
     with pytest.raises(ModelError, match=r"do not compile with (?s:.*)error"):
-        build(broken, tmp_path / "out.fmu")
+        compile_sources(broken, tmp_path / "out.fmu")
 
 
 def test_missing_source_files_are_named(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_missing_source_files_are_named(tmp_path: Path) -> None:
             if name != "sources/all.c":
                 target.writestr(name, source.read(name))
     with pytest.raises(ModelError, match=r"source files all\.c are missing"):
-        build(partial, tmp_path / "out.fmu")
+        compile_sources(partial, tmp_path / "out.fmu")
 
 
 def test_no_compiler_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -151,3 +151,41 @@ def test_no_compiler_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(ModelError, match="pip install ziglang"):
         compiler()
+
+
+def unpacked(folder: Path, **files: str) -> Path:
+    (folder / "modelDescription.xml").write_text("<fmiModelDescription/>")
+    for name, text in files.items():
+        path = folder / "sources" / name.replace("__", "/").replace("_c", ".c").replace("_h", ".h")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return folder
+
+
+def test_without_a_list_included_files_are_not_compiled_by_themselves(tmp_path: Path) -> None:
+    folder = unpacked(tmp_path, all_c='#include "model/part.c"\n', model__part_c="", lib__x_c="", lib__x_h="")
+    sources = find_sources(Path("my.fmu"), folder, 2, "my")
+    assert sources.files == ("all.c", "lib/x.c")
+    assert sources.includes == (".", "lib")
+
+
+def test_a_configuration_for_another_library_or_platform_is_not_taken(tmp_path: Path) -> None:
+    folder = unpacked(tmp_path, own_c="", other_c="", windows_c="")
+    (folder / "sources" / "buildDescription.xml").write_text(
+        """<fmiBuildDescription>
+        <BuildConfiguration modelIdentifier="other"><SourceFileSet>
+        <SourceFile name="other.c"/></SourceFileSet>
+        </BuildConfiguration>
+        <BuildConfiguration modelIdentifier="my" platform="x86_64-windows"><SourceFileSet>
+        <SourceFile name="windows.c"/></SourceFileSet></BuildConfiguration>
+        <BuildConfiguration modelIdentifier="my"><SourceFileSet><SourceFile name="own.c"/>
+        <PreprocessorDefinition name="A" value="1"/><IncludeDirectory name="inc"/></SourceFileSet>
+        </BuildConfiguration></fmiBuildDescription>"""
+    )
+    sources = find_sources(Path("my.fmu"), folder, 3, "my")
+    assert (sources.files, sources.defines, sources.includes) == (("own.c",), {"A": "1"}, (".", "inc"))
+
+
+def test_no_sources_are_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"my\.fmu: contains no C sources"):
+        find_sources(Path("my.fmu"), unpacked(tmp_path), 2, "my")

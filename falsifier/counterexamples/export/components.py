@@ -26,7 +26,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.export.inputs import InputTable, start_values
 from falsifier.counterexamples.export.tables import write_csv, write_json
 from falsifier.fmu import FmuModel, System
-from falsifier.fmu.systems.network import SYSTEM, Link, Member, Network, Place
+from falsifier.fmu.systems import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.problem import Problem
 from falsifier.stl.names import name_text

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 from falsifier.core.model import Variable
 from falsifier.counterexamples.export.tables import parameter_set
 from falsifier.fmu import System
-from falsifier.fmu.systems.network import SYSTEM, Link, Member, Network
+from falsifier.fmu.systems import SYSTEM, Link, Member, Network
 
 _NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
 _SSD, _SSC = f"{{{_NAMESPACE}Description}}", f"{{{_NAMESPACE}Common}}"

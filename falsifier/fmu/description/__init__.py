@@ -1,18 +1,30 @@
 """What FMUs say of themselves, and what is in their files, without loading anything."""
 
-from falsifier.fmu.description.archive import UNREADABLE, file_hash, open_archive
-from falsifier.fmu.description.dependencies import inputs_of_outputs
+from falsifier.fmu.description.archive import (
+    UNREADABLE,
+    WINDOWS,
+    entry_names,
+    extract,
+    file_hash,
+    library_file,
+    open_archive,
+    read_entry,
+    this_platform,
+)
 from falsifier.fmu.description.libraries import misnamed_text, missing_binary_text
 from falsifier.fmu.description.model_description import Description, describe, read_description, read_info
-from falsifier.fmu.description.needs import binary_remarks
-from falsifier.fmu.description.remarks import needed_tool_text
-from falsifier.fmu.description.slot import Slot
+from falsifier.fmu.description.needed_libraries import binary_remarks
+from falsifier.fmu.description.notes import needed_tool_text
 from falsifier.fmu.description.structure import Structure, read_structure
 from falsifier.fmu.description.units import Unit, Units, conversion, is_known, read_units
+from falsifier.fmu.description.variables import Slot
+from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.description.xml import read_xml
 
 __all__ = [
+    "HOW_TO_INSTALL",
     "UNREADABLE",
+    "WINDOWS",
     "Description",
     "Slot",
     "Structure",
@@ -21,16 +33,22 @@ __all__ = [
     "binary_remarks",
     "conversion",
     "describe",
+    "entry_names",
+    "extract",
     "file_hash",
-    "inputs_of_outputs",
+    "find_wine",
     "is_known",
+    "library_file",
     "misnamed_text",
     "missing_binary_text",
     "needed_tool_text",
     "open_archive",
     "read_description",
+    "read_entry",
     "read_info",
     "read_structure",
     "read_units",
     "read_xml",
+    "this_platform",
+    "windows_path",
 ]

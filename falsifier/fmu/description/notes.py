@@ -1,55 +1,16 @@
 """What an FMU says of itself that the user should know: what is ignored, unusual or missing, in words."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
 from falsifier.core.model import Interface, Variable
-from falsifier.fmu.description.slot import Slot
+from falsifier.fmu.description.variables import input_clocks
 
-# Maximum number of names in one remark.
+# Maximum number of names in one note.
 _SHOWN_NAMES = 10
 
 
-def with_aliases_marked(
-    variables: Sequence[Variable], slots: Mapping[str, Slot]
-) -> tuple[tuple[Variable, ...], dict[str, Slot]]:
-    """Mark all but one of the names of each variable that can be set: setting two of them would set it twice.
-
-    Returns:
-        The variables and their slots in the same order; aliases cannot be set.
-    """
-    first: dict[tuple[str, int, int], str] = {}
-    # Inputs before parameters before start values: an input may share its reference with a local variable.
-    by_rank = sorted(variables, key=_rank)
-    marked: dict[str, Variable] = {}
-    changed = dict(slots)
-    for v in by_rank:
-        if v.causality != "input" and not v.settable:
-            continue
-        slot = slots[v.name]
-        known = first.setdefault((slot.type, slot.reference, slot.offset), v.name)
-        if known == v.name:
-            continue
-        marked[v.name] = replace(v, alias_of=known, settable=False)
-        changed[v.name] = replace(slot, refusal=f"it is another name of {known!r}; set that one")
-    return tuple(marked.get(v.name, v) for v in variables), changed
-
-
-def _rank(v: Variable) -> int:
-    return 0 if v.causality == "input" else 1 if v.causality == "parameter" else 2
-
-
-def input_clocks(root: Element) -> dict[int, str]:
-    """Return the clocks that the importing tool would have to tick, by value reference (FMI 3)."""
-    return {
-        int(clock.attrib["valueReference"]): clock.attrib["name"]
-        for clock in root.findall("ModelVariables/Clock")
-        if clock.get("causality") == "input"
-    }
-
-
-def remarks(
+def notes(
     root: Element,
     variables: Sequence[Variable],
     *,

@@ -1,6 +1,6 @@
-"""What only systems need of an FMU's description: its units, and which outputs depend on which inputs."""
+"""What an FMU declares of its structure: its units, and which outputs depend on which inputs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -14,16 +14,21 @@ from falsifier.fmu.description.xml import read_xml
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Units and dependencies of an FMU.
+    """Units and dependencies of an FMU. Arrays have the names that the FMU declares.
+
+    FMUs declare what outputs and derivatives of states depend on. What they keep in discrete variables is
+    not part of it, so that a declared independence is strong evidence and no proof.
 
     Attributes:
         units: units that it defines, by name.
         inputs_of: the inputs on which an output depends directly, by the output's name; an output that is
-            missing here may depend on all inputs. Arrays have the names that the FMU declares.
+            missing here may depend on all inputs.
+        reaching: the inputs on which an output can depend, directly or through states; likewise.
     """
 
     units: Units
     inputs_of: Mapping[str, frozenset[str]]
+    reaching: Mapping[str, frozenset[str]]
 
 
 @lru_cache(maxsize=32)
@@ -35,7 +40,7 @@ def read_structure(path: Path, sha256: str) -> Structure:
     """
     root = read_xml(read_entry(path, "modelDescription.xml"), f"{path}: modelDescription.xml", ModelError)
     try:
-        return Structure(read_units(root), dict(_dependencies(root)))
+        return Structure(read_units(root), *_dependencies(root))
     except (LookupError, ValueError) as error:
         raise ModelError(
             f"{path}: units or dependencies in modelDescription.xml do not follow the standard "
@@ -43,15 +48,61 @@ def read_structure(path: Path, sha256: str) -> Structure:
         ) from error
 
 
-def _dependencies(root: Element) -> Iterator[tuple[str, frozenset[str]]]:
+def _dependencies(root: Element) -> tuple[dict[str, frozenset[str]], dict[str, frozenset[str]]]:
+    """Return the inputs of each output: the direct ones, and those that reach it."""
     is_3 = root.get("fmiVersion", "").startswith("3")
     variables = root.findall("ModelVariables/*")
     # FMI 2 counts variables from 1, FMI 3 has value references.
     keys = [v.attrib["valueReference"] if is_3 else str(k) for k, v in enumerate(variables, start=1)]
-    names = {key: v.attrib["name"] for key, v in zip(keys, variables, strict=True)}
-    inputs = {n for n, v in zip(names.values(), variables, strict=True) if v.get("causality") == "input"}
-    path, key = ("Output", "valueReference") if is_3 else ("Outputs/Unknown", "index")
-    for output in root.findall(f"ModelStructure/{path}"):
-        stated = output.get("dependencies")
-        if stated is not None:
-            yield names[output.attrib[key]], frozenset(names[k] for k in stated.split()) & inputs
+    named = dict(zip(keys, variables, strict=True))
+    inputs = {key for key, v in named.items() if v.get("causality") == "input"}
+    outputs, derivatives = (
+        ("Output", "ContinuousStateDerivative") if is_3 else ("Outputs/Unknown", "Derivatives/Unknown")
+    )
+    derivative_of = {
+        _state_of(named[key]): known for key, known in _stated(root, derivatives, is_3=is_3).items()
+    }
+
+    def names(keys: Iterable[str]) -> frozenset[str]:
+        return frozenset(named[key].attrib["name"] for key in keys)
+
+    direct, reaching = {}, {}
+    for key, known in _stated(root, outputs, is_3=is_3).items():
+        name = named[key].attrib["name"]
+        if known is not None:
+            direct[name] = names(known) & names(inputs)
+        reached = _closure(known, derivative_of, inputs)
+        if reached is not None:
+            reaching[name] = names(reached)
+    return direct, reaching
+
+
+def _stated(root: Element, path: str, *, is_3: bool) -> dict[str, frozenset[str] | None]:
+    """Return what each unknown depends on; None if the FMU does not say so."""
+    key = "valueReference" if is_3 else "index"
+    return {
+        e.attrib[key]: None if e.get("dependencies") is None else frozenset(e.attrib["dependencies"].split())
+        for e in root.findall(f"ModelStructure/{path}")
+    }
+
+
+def _state_of(derivative: Element) -> str:
+    """Return the key of the state of which this variable is the derivative."""
+    real = derivative if derivative.get("derivative") is not None else derivative.find("Real")
+    return "" if real is None else real.get("derivative", "")
+
+
+def _closure(
+    known: frozenset[str] | None, derivative_of: Mapping[str, frozenset[str] | None], inputs: set[str]
+) -> set[str] | None:
+    """Return all inputs that are reached through states; None if one of them says nothing."""
+    reached: set[str] = set()
+    queue = [known]
+    while queue:
+        step = queue.pop()
+        if step is None:
+            return None
+        new = step - reached
+        reached |= new
+        queue += [derivative_of.get(key) for key in new - inputs]
+    return reached & inputs

@@ -1,6 +1,43 @@
-"""How to access one variable of an FMU."""
+"""The variables of an FMU, as its description declares them, and how to access each of them."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import isfinite, prod
+from xml.etree.ElementTree import Element
+
+from falsifier.core.model import Causality, Kind, Variable
+
+# Element name -> (kind, type code). The type code names the FMU's get and set functions for the value.
+_TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
+    "Real": ("real", "Real"),
+    "Integer": ("integer", "Integer"),
+    "Boolean": ("boolean", "Boolean"),
+    "Enumeration": ("enumeration", "Integer"),
+    "String": ("string", "String"),
+}
+_TYPES_3: Mapping[str, tuple[Kind, str]] = {
+    "Float64": ("real", "Float64"),
+    "Float32": ("real", "Float32"),
+    **{f"{sign}Int{bits}": ("integer", f"{sign}Int{bits}") for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    "Boolean": ("boolean", "Boolean"),
+    "Enumeration": ("enumeration", "Int64"),
+    "String": ("string", "String"),
+}
+# Simulink writes the largest double for an open limit, Dymola 1e30 or more, OpenModelica 1e60, others INF.
+_NO_LIMIT = 1e30
+# Limits of what descriptions may contain; real ones stay far below.
+_MAX_ELEMENTS = 1_000_000
+LONGEST_NAME = 10_000
+_LARGEST_REFERENCE = 2**32 - 1
+_CAUSALITIES: Mapping[str, Causality] = {
+    "input": "input",
+    "output": "output",
+    "parameter": "parameter",
+    "structuralParameter": "parameter",
+    "calculatedParameter": "calculatedParameter",
+    "independent": "independent",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,3 +62,270 @@ class Slot:
     negated: bool = False
     refusal: str = ""
     declared: str = ""
+
+
+def read_variables(
+    root: Element, major: int
+) -> tuple[tuple[Variable, ...], dict[str, Slot], dict[int, tuple[float, ...]]]:
+    """Return the scalar variables, elements of arrays among them, in the order of the description.
+
+    Args:
+        root: the ``fmiModelDescription`` element.
+        major: major FMI version.
+
+    Returns:
+        The variables, how to access each by name, and the start values of all elements by value reference,
+        for arrays only.
+
+    Raises:
+        LookupError, ValueError: if an attribute is missing or invalid, or a name occurs twice.
+    """
+    arrays: dict[int, tuple[float, ...]] = {}
+    variables: list[Variable] = []
+    slots: dict[str, Slot] = {}
+    for variable, slot in _variables_3(root, arrays) if major == 3 else _variables_1_2(root, major):
+        _check_variable(variable, slot, slots)
+        variables.append(variable)
+        slots[variable.name] = slot
+    return *with_aliases_marked(variables, slots), arrays
+
+
+def check_length(name: str) -> None:
+    """Refuse names that are too long to be shown.
+
+    Raises:
+        ValueError: if the name is.
+    """
+    if len(name) > LONGEST_NAME:
+        raise ValueError(f"the name {name[:40]!r}... has more than {LONGEST_NAME} characters")
+
+
+def _check_variable(variable: Variable, slot: Slot, known: Mapping[str, Slot]) -> None:
+    check_length(variable.name)
+    if variable.name in known:
+        raise ValueError(f"two variables are named {variable.name!r}")
+    if not 0 <= slot.reference <= _LARGEST_REFERENCE:
+        raise ValueError(f"value reference {slot.reference} of {variable.name!r} does not fit 32 bits")
+
+
+def with_aliases_marked(
+    variables: Sequence[Variable], slots: Mapping[str, Slot]
+) -> tuple[tuple[Variable, ...], dict[str, Slot]]:
+    """Mark all but one of the names of each variable that can be set: setting two of them would set it twice.
+
+    Returns:
+        The variables and their slots in the same order; aliases cannot be set.
+    """
+    first: dict[tuple[str, int, int], str] = {}
+    # Inputs before parameters before start values: an input may share its reference with a local variable.
+    by_rank = sorted(variables, key=_rank)
+    marked: dict[str, Variable] = {}
+    changed = dict(slots)
+    for v in by_rank:
+        if v.causality != "input" and not v.settable:
+            continue
+        slot = slots[v.name]
+        known = first.setdefault((slot.type, slot.reference, slot.offset), v.name)
+        if known == v.name:
+            continue
+        marked[v.name] = replace(v, alias_of=known, settable=False)
+        changed[v.name] = replace(slot, refusal=f"it is another name of {known!r}; set that one")
+    return tuple(marked.get(v.name, v) for v in variables), changed
+
+
+def _rank(v: Variable) -> int:
+    return 0 if v.causality == "input" else 1 if v.causality == "parameter" else 2
+
+
+def input_clocks(root: Element) -> dict[int, str]:
+    """Return the clocks that the importing tool would have to tick, by value reference (FMI 3)."""
+    return {
+        int(clock.attrib["valueReference"]): clock.attrib["name"]
+        for clock in root.findall("ModelVariables/Clock")
+        if clock.get("causality") == "input"
+    }
+
+
+def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]:
+    types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/*") if "name" in t.attrib}
+    elements = root.findall("ModelVariables/ScalarVariable")
+    states = _states_2(root, elements)
+    for position, element in enumerate(elements, start=1):
+        typed = next((child for child in element if child.tag in _TYPES_1_2), None)
+        if typed is None:
+            raise ValueError(f"variable {element.attrib['name']!r} has no type")
+        kind, code = _TYPES_1_2[typed.tag]
+        declared = types.get(typed.get("declaredType", ""))
+        definition = None if declared is None else next(iter(declared), None)
+        attributes = {**({} if definition is None else definition.attrib), **typed.attrib}
+        causality, variability, refusal = _role(element, major, has_start=typed.get("start") is not None)
+        yield (
+            Variable(
+                name=element.attrib["name"],
+                kind=kind,
+                causality=causality,
+                variability=variability,
+                unit=_unit(attributes.get("unit")),
+                display_unit=_unit(attributes.get("displayUnit")),
+                low=_limit(attributes.get("min")),
+                high=_limit(attributes.get("max")),
+                nominal=finite(attributes.get("nominal")),
+                start=_start(kind, typed.get("start")),
+                settable=not refusal,
+                is_state=position in states,
+                literals=_literals(definition),
+                description=element.get("description", ""),
+                type=code,
+            ),
+            Slot(
+                reference=int(element.attrib["valueReference"]),
+                type=code,
+                negated=element.get("alias") == "negatedAlias",
+                refusal=refusal,
+            ),
+        )
+
+
+def _states_2(root: Element, elements: list[Element]) -> set[int]:
+    """Return the positions, counted from 1, of the continuous states; FMI 1 does not list them."""
+    states = set()
+    for unknown in root.findall("ModelStructure/Derivatives/Unknown"):
+        derivative = elements[int(unknown.attrib["index"]) - 1].find("Real")
+        if derivative is not None and derivative.get("derivative"):
+            states.add(int(derivative.attrib["derivative"]))
+    return states
+
+
+def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterator[tuple[Variable, Slot]]:
+    types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/*")}
+    elements = {int(e.attrib["valueReference"]): e for e in root.findall("ModelVariables/*")}
+    states = {
+        int(elements[int(d.attrib["valueReference"])].attrib["derivative"])
+        for d in root.findall("ModelStructure/ContinuousStateDerivative")
+    }
+    ticked = set(input_clocks(root))
+    for reference, element in elements.items():
+        if element.tag not in _TYPES_3:
+            continue
+        kind, code = _TYPES_3[element.tag]
+        definition = types.get(element.get("declaredType", ""))
+        attributes = {**({} if definition is None else definition.attrib), **element.attrib}
+        starts = _starts_3(kind, element)
+        default = "continuous" if kind == "real" else "discrete"
+        causality, variability, refusal = _role(element, 3, default, has_start=bool(starts))
+        clocks = set(map(int, element.get("clocks", "").split()))
+        if clocks:
+            refusal = "it belongs to a clock; only the FMU itself may change it"
+        shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
+        count = prod(shape)
+        if not 0 <= count <= _MAX_ELEMENTS:
+            raise ValueError(f"array {element.get('name')!r} has {count} elements, not 0 to {_MAX_ELEMENTS}")
+        starts = starts * count if len(starts) == 1 else starts
+        if shape and kind != "string":
+            arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
+        variable = Variable(
+            name=element.attrib["name"],
+            kind=kind,
+            causality=causality,
+            variability=variability,
+            unit=_unit(attributes.get("unit")),
+            display_unit=_unit(attributes.get("displayUnit")),
+            low=_limit(attributes.get("min")),
+            high=_limit(attributes.get("max")),
+            nominal=finite(attributes.get("nominal")),
+            settable=not refusal,
+            is_state=reference in states,
+            literals=_literals(definition),
+            description=element.get("description", ""),
+            type=code,
+            is_clocked=bool(clocks) and (clocks <= ticked or causality == "input"),
+        )
+        names = [(variable.name, variable.description)]
+        names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
+        for name, description in names:
+            for offset, index in enumerate(product(*(range(1, n + 1) for n in shape))):
+                suffix = f"[{','.join(map(str, index))}]" if shape else ""
+                yield (
+                    replace(
+                        variable,
+                        name=name + suffix,
+                        description=description,
+                        start=starts[offset] if starts else None,
+                    ),
+                    Slot(reference, code, offset, count, refusal=refusal, declared=variable.name),
+                )
+
+
+def _role(
+    element: Element, major: int, default_variability: str = "continuous", *, has_start: bool
+) -> tuple[Causality, str, str]:
+    """Return causality, variability and why the variable cannot be set (empty if it can)."""
+    causality = element.get("causality", "local")
+    variability = element.get("variability", default_variability)
+    if major == 1:
+        if variability == "parameter":
+            causality, variability = "parameter", "fixed"
+        refusal = "" if has_start or causality == "input" else "it has no start value; the model computes it"
+    elif causality in ("parameter", "input"):
+        if causality == "parameter":
+            variability = element.get("variability", "fixed")
+        refusal = ""
+    elif causality == "structuralParameter":
+        refusal = "it is a structural parameter, which sets array sizes"
+    elif causality == "calculatedParameter":
+        refusal = "it is a calculated parameter; set the parameters from which the model calculates it"
+    elif causality == "independent":
+        refusal = "it is the independent variable, time"
+    else:
+        initial = element.get("initial", "exact" if has_start else "calculated")
+        refusal = "" if initial in ("exact", "approx") else "the model computes its initial value"
+    if variability == "constant":
+        refusal = "it is a constant"
+    return _CAUSALITIES.get(causality, "local"), variability, refusal
+
+
+def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:
+    if "start" in dimension.attrib:
+        return int(dimension.attrib["start"])
+    return int(elements[int(dimension.attrib["valueReference"])].attrib["start"])
+
+
+def _starts_3(kind: Kind, element: Element) -> tuple[float | str | None, ...]:
+    if kind == "string":
+        return tuple(s.get("value", "") for s in element.findall("Start"))
+    return tuple(_start(kind, word) for word in element.get("start", "").split())
+
+
+def _start(kind: Kind, text: str | None) -> float | str | None:
+    if text is None or kind == "string":
+        return text
+    return float(is_true(text)) if kind == "boolean" else float(text)
+
+
+def _literals(definition: Element | None) -> dict[str, int]:
+    if definition is None:
+        return {}
+    items = definition.findall("Item")
+    return {item.attrib["name"]: int(item.get("value", k)) for k, item in enumerate(items, start=1)}
+
+
+def finite(text: str | None) -> float | None:
+    """Return the number of an attribute; None without one, and for NaN and infinity, which limit nothing."""
+    number = None if text is None else float(text)
+    return number if number is not None and isfinite(number) else None
+
+
+def _limit(text: str | None) -> float | None:
+    """Return a min or max; None for the huge numbers with which tools write that there is none."""
+    number = finite(text)
+    return None if number is None or not abs(number) < _NO_LIMIT else number
+
+
+def is_true(text: str | None) -> bool:
+    """Whether an attribute says yes."""
+    return text is not None and text.strip() in ("true", "1")
+
+
+def _unit(text: str | None) -> str:
+    """Return a unit; empty for 1, which FMUs use for dimensionless variables."""
+    return "" if text in (None, "1") else str(text)

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.model import Interface
-from falsifier.fmu.description import Description
-from falsifier.fmu.description.wine import windows_path
+from falsifier.fmu.description import Description, windows_path
 
 # Storage types of values; their position is the number that request.c reads.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import FalsifierError, ModelError
-from falsifier.fmu.description import Description, misnamed_text, missing_binary_text
-from falsifier.fmu.description.archive import library_file
-from falsifier.fmu.plan import Plan, solver_tolerance
+from falsifier.fmu.description import Description, library_file, misnamed_text, missing_binary_text
 from falsifier.fmu.process import encoding, outcome
 from falsifier.fmu.process.connection import Reply, Request
 from falsifier.fmu.process.encoding import integers, reals, text
+from falsifier.fmu.process.plan import Plan, solver_tolerance
 from falsifier.fmu.process.policy import Policy
 from falsifier.fmu.process.room import Room
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import FailureStatus, FalsifierError, ModelError, SimulationError
-from falsifier.fmu.plan import Plan
 from falsifier.fmu.process.connection import Reply, Where
+from falsifier.fmu.process.plan import Plan
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
 _ENDS = {

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from falsifier.fmu.plan import Plan
+from falsifier.fmu.process.plan import Plan
 
 # The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
 GRACE_SECONDS = 0.1

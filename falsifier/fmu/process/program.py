@@ -7,9 +7,9 @@ import sys
 from functools import lru_cache
 from pathlib import Path
 
+from falsifier.core.compiler import compile_c
 from falsifier.errors import ModelError
-from falsifier.fmu.compiler import compile_c
-from falsifier.fmu.description.archive import WINDOWS, this_platform
+from falsifier.fmu.description import WINDOWS, this_platform
 
 WORKER = Path(__file__).parents[1] / "worker"
 # Platforms whose system calls sandbox_linux.c knows.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core import operating_system
-from falsifier.fmu.plan import Plan
+from falsifier.fmu.process.plan import Plan
 
 # Numbers at its start; their positions are those of ``enum header`` in worker.h.
 HEADER = 8

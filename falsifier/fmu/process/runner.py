@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu.plan import Plan
 from falsifier.fmu.process import outcome, patience
 from falsifier.fmu.process.connection import Closed, Reply
 from falsifier.fmu.process.order import Order
+from falsifier.fmu.process.plan import Plan
 from falsifier.fmu.process.reuse import REUSES, Experience, Reuse
 from falsifier.fmu.process.room import Room
 from falsifier.fmu.process.start import Workplace

@@ -14,8 +14,7 @@ from pathlib import Path
 from falsifier.core import operating_system
 from falsifier.core.memory import check_memory_limits
 from falsifier.errors import ModelError
-from falsifier.fmu.description.archive import extract, file_hash
-from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
+from falsifier.fmu.description import HOW_TO_INSTALL, extract, file_hash, find_wine, windows_path
 from falsifier.fmu.process import folders
 from falsifier.fmu.process.encoding import text
 from falsifier.fmu.process.environment import protect_secrets, worker_environment

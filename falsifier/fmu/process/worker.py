@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from falsifier.core.operating_system import exit_text
 from falsifier.errors import ModelError
-from falsifier.fmu.description.wine import HOW_TO_INSTALL
-from falsifier.fmu.plan import Plan
+from falsifier.fmu.description import HOW_TO_INSTALL
 from falsifier.fmu.process.connection import (
     QUICK_SECONDS,
     Closed,
@@ -22,6 +21,7 @@ from falsifier.fmu.process.connection import (
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.patience import SHARES, Patience
+from falsifier.fmu.process.plan import Plan
 from falsifier.fmu.process.policy import Told, read_told
 from falsifier.fmu.process.reuse import REUSES, Reuse
 from falsifier.fmu.process.room import Room

@@ -11,8 +11,8 @@ from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 
 from falsifier.errors import ModelError, SpecError
-from falsifier.fmu.description import archive
-from falsifier.fmu.process.folders import WorkFolder
+from falsifier.fmu.description import UNREADABLE, entry_names, file_hash, open_archive, read_entry
+from falsifier.fmu.process import WorkFolder
 
 T = TypeVar("T")
 DESCRIPTION = "SystemStructure.ssd"
@@ -45,7 +45,7 @@ class Package:
             raise SpecError(f"{shown}: no such file; give the path of an .ssp or .ssd file")
         self._names: frozenset[str] = frozenset()
         if self._is_archive:
-            self._names = frozenset(_checked(lambda: archive.entry_names(path)))
+            self._names = frozenset(_checked(lambda: entry_names(path)))
             if self.description not in self._names:
                 raise SpecError(
                     f"{shown}: the package contains no {self.description}; export the system again"
@@ -74,7 +74,7 @@ class Package:
         """
         name = self._name(source)
         if self._is_archive:
-            return _checked(lambda: archive.read_entry(self._path, name))
+            return _checked(lambda: read_entry(self._path, name))
         path = self._path.parent / name
         if path.stat().st_size > _MAX_TEXT_BYTES:
             raise SpecError(f"{self.shown}: {name} has more than {_MAX_TEXT_BYTES >> 20} MiB")
@@ -116,7 +116,7 @@ def _is_file(path: Path) -> bool:
 
 
 def _checked(read: Callable[[], T]) -> T:
-    """Call a function of archive.py; what is wrong with a package is wrong usage."""
+    """Call a function of py; what is wrong with a package is wrong usage."""
     try:
         return read()
     except ModelError as error:
@@ -126,16 +126,16 @@ def _checked(read: Callable[[], T]) -> T:
 @lru_cache(maxsize=256)
 def _extracted(path: Path, name: str) -> Path:
     """Extract one file of a package to a folder of this process, which is removed when the process ends."""
-    key = sha256(f"{_checked(lambda: archive.file_hash(path))} {name}".encode()).hexdigest()[:16]
+    key = sha256(f"{_checked(lambda: file_hash(path))} {name}".encode()).hexdigest()[:16]
     target = _folder() / key / PurePosixPath(name).name
     if target.is_file():
         return target
     target.parent.mkdir(parents=True, exist_ok=True)
     partial = target.with_name(f"{target.name}.partial")
     try:
-        with archive.open_archive(path) as package, package.open(name) as packed, partial.open("wb") as out:
+        with open_archive(path) as package, package.open(name) as packed, partial.open("wb") as out:
             shutil.copyfileobj(packed, out)
-    except (ModelError, *archive.UNREADABLE) as error:
+    except (ModelError, *UNREADABLE) as error:
         raise SpecError(f"{path}: cannot unpack {name} ({error})") from error
     partial.rename(target)
     return target

@@ -21,9 +21,7 @@ from falsifier.fmu.description import (
 from falsifier.fmu.ssp.markup import Connector, Part, Structure, Transformation, parse_structure
 from falsifier.fmu.ssp.package import SUFFIXES, Package
 from falsifier.fmu.ssp.parameters import Given, bound_values
-from falsifier.fmu.systems.network import Coupling, Frame
-from falsifier.fmu.systems.system import Component, System
-from falsifier.fmu.systems.wiring import Connection
+from falsifier.fmu.systems import Component, Connection, Coupling, Frame, System
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
 _INTERFACES: Mapping[str, Interface | None] = {

@@ -1,1 +1,36 @@
 """Several connected FMUs as one model: components, connections, order of stepping."""
+
+from falsifier.fmu.systems.network import (
+    SYSTEM,
+    Coupling,
+    Extrapolation,
+    Frame,
+    Isolation,
+    Link,
+    Loops,
+    Member,
+    Method,
+    Network,
+    Place,
+)
+from falsifier.fmu.systems.step_order import late_links
+from falsifier.fmu.systems.system import Component, System
+from falsifier.fmu.systems.wiring import Connection
+
+__all__ = [
+    "SYSTEM",
+    "Component",
+    "Connection",
+    "Coupling",
+    "Extrapolation",
+    "Frame",
+    "Isolation",
+    "Link",
+    "Loops",
+    "Member",
+    "Method",
+    "Network",
+    "Place",
+    "System",
+    "late_links",
+]

@@ -5,9 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from falsifier.errors import FalsifierError, SimulationError
-from falsifier.fmu.plan import Plan
-from falsifier.fmu.process import Reply, Request, Room, Where, outcome, value_checks
-from falsifier.fmu.process.policy import Policy
+from falsifier.fmu.process import Plan, Policy, Reply, Request, Room, Where, outcome, value_checks
 from falsifier.fmu.systems import request
 from falsifier.fmu.systems.network import Network
 

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from falsifier.fmu.plan import Plan, solver_tolerance
-from falsifier.fmu.process import encoding, is_held, library_of
-from falsifier.fmu.process.encoding import integers, reals, text
+from falsifier.fmu.process import Plan, encoding, is_held, library_of, solver_tolerance
 from falsifier.fmu.systems.network import SYSTEM, Member, Network, Place
 
 # A variable of a component, and the row of the plan's parameters, inputs or outputs that has its values.
@@ -78,7 +76,9 @@ def load(network: Network, folder: Path, *, logging: bool) -> bytes:
     """
     members = [network.members[m] for m in network.order]
     is_separate = network.coupling.isolation == "each"
-    return integers(is_separate, len(members)) + b"".join(_fmu(m, folder, logging=logging) for m in members)
+    return encoding.integers(is_separate, len(members)) + b"".join(
+        _fmu(m, folder, logging=logging) for m in members
+    )
 
 
 def _fmu(member: Member, folder: Path, *, logging: bool) -> bytes:
@@ -98,13 +98,13 @@ def prepare(network: Network, plan: Plan) -> bytes:
     outputs = [(network.places[name], row) for row, name in enumerate(plan.outputs)]
     copies = [(signals[place], row) for place, row in outputs if place in signals]
     parts = [
-        integers(plan.samples, plan.every, plan.pieces, *sizes, plan.tolerance is not None),
-        reals(plan.stop_time, plan.max_step, plan.tolerance or 0.0),
-        integers(coupling.method == "jacobi", coupling.max_rounds),
-        reals(coupling.tolerance),
-        integers(len(signals)),
+        encoding.integers(plan.samples, plan.every, plan.pieces, *sizes, plan.tolerance is not None),
+        encoding.reals(plan.stop_time, plan.max_step, plan.tolerance or 0.0),
+        encoding.integers(coupling.method == "jacobi", coupling.max_rounds),
+        encoding.reals(coupling.tolerance),
+        encoding.integers(len(signals)),
         *(_component(network, plan, position) for position in range(len(network.order))),
-        integers(len(copies), *(number for pair in copies for number in pair)),
+        encoding.integers(len(copies), *(number for pair in copies for number in pair)),
     ]
     return b"".join(parts)
 
@@ -120,16 +120,16 @@ def _component(network: Network, plan: Plan, position: int) -> bytes:
     plain = [n for n in part.inputs if n not in held]
     slots, parameters = description.slots, [name for name, _ in part.parameters]
     parts = [
-        reals(solver_tolerance(plan, description.info)),
-        integers(_steps(member, plan), loop_end, is_iterated, len(part.strings)),
-        *(integers(slots[name].reference) + text(value) for name, value in part.strings),
+        encoding.reals(solver_tolerance(plan, description.info)),
+        encoding.integers(_steps(member, plan), loop_end, is_iterated, len(part.strings)),
+        *(encoding.integers(slots[name].reference) + encoding.text(value) for name, value in part.strings),
         encoding.ports(description, parameters),
-        integers(*(row for _, row in part.parameters)),
+        encoding.integers(*(row for _, row in part.parameters)),
         *(encoding.inputs(description, names, parameters) for names in (plain, held)),
         _feeds(network, plan, [Place(number, name) for name in (*plain, *held)]),
         encoding.ports(description, part.connected),
         encoding.ports(description, [name for name, _ in part.recorded]),
-        integers(*(row for _, row in part.recorded)),
+        encoding.integers(*(row for _, row in part.recorded)),
     ]
     return b"".join(parts)
 
@@ -150,5 +150,9 @@ def _feeds(network: Network, plan: Plan, targets: Sequence[Place]) -> bytes:
         row = signals[source] if source in signals else rows[source]
         numbers = (1.0, 0.0, 0.0) if link is None else (link.factor, link.offset, link.start)
         is_linear = link is not None and link.is_linear
-        parts.append(integers(source in signals, row) + reals(*numbers) + integers(is_linear))
+        parts.append(
+            encoding.integers(source in signals, row)
+            + encoding.reals(*numbers)
+            + encoding.integers(is_linear)
+        )
     return b"".join(parts)

@@ -12,14 +12,21 @@ from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.description import archive
-from falsifier.fmu.plan import make_plan
-from falsifier.fmu.process import REGISTRY, Runner
-from falsifier.fmu.process.policy import Policy, resolved
+from falsifier.fmu.description import file_hash
+from falsifier.fmu.process import (
+    REGISTRY,
+    Policy,
+    Runner,
+    Task,
+    make_plan,
+    make_task,
+    resolved,
+    room_for,
+    run_task,
+)
 from falsifier.fmu.systems.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
 from falsifier.fmu.systems.order import SystemOrder
 from falsifier.fmu.systems.wiring import Connection, make_network
-from falsifier.fmu.tasks import Task, make_task, room_for, run_task
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +55,7 @@ class Component:
             positive("step", self.step)
         if self.interface is not None:
             one_of("interface", self.interface, get_args(Interface))
-        object.__setattr__(self, "sha256", archive.file_hash(self.fmu))
+        object.__setattr__(self, "sha256", file_hash(self.fmu))
 
 
 @dataclass(frozen=True, slots=True)

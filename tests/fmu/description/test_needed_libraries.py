@@ -7,8 +7,8 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError
-from falsifier.fmu.description import needs
-from falsifier.fmu.description.needs import binary_remarks
+from falsifier.fmu.description import needed_libraries
+from falsifier.fmu.description.needed_libraries import binary_remarks
 from falsifier.fmu.description.wine import can_run_windows
 from tests.fmu.description.test_elf import library
 from tests.fmu.description.test_pe import windows_library
@@ -43,8 +43,8 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     for name, versions in {"libc.so.6": ("GLIBC_2.2.5", "GLIBC_2.34"), "libz.so.1": ()}.items():
         (folder / name).write_bytes(library(defined=versions))
-    monkeypatch.setattr(needs, "_FOLDERS", (str(folder),))
-    monkeypatch.setattr(needs, "_listed", lambda: {})
+    monkeypatch.setattr(needed_libraries, "_FOLDERS", (str(folder),))
+    monkeypatch.setattr(needed_libraries, "_listed", lambda: {})
     monkeypatch.setattr("platform.libc_ver", lambda: ("glibc", "2.34"))
     monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)
     return folder
@@ -155,7 +155,7 @@ def test_what_a_windows_library_needs_beside_wine_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("falsifier.fmu.description.archive.this_platform", lambda: "x86_64-linux")
-    monkeypatch.setattr("falsifier.fmu.description.needs.wine_libraries", lambda: frozenset({"kernel32.dll"}))
+    monkeypatch.setattr(needed_libraries, "wine_libraries", lambda: frozenset({"kernel32.dll"}))
     packed = tmp_path / "my.fmu"
 
     def said(**files: bytes) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 from xml.etree import ElementTree
 
 from falsifier.core.model import Variable
-from falsifier.fmu.description.remarks import needed_tool_text, remarks, with_aliases_marked
-from falsifier.fmu.description.slot import Slot
+from falsifier.fmu.description.notes import needed_tool_text, notes
+from falsifier.fmu.description.variables import Slot, with_aliases_marked
 
 ROOT = ElementTree.fromstring("<fmiModelDescription><ModelVariables/></fmiModelDescription>")
 
@@ -27,7 +27,7 @@ def test_one_reference_has_one_name_that_can_be_set_and_an_input_keeps_its_own()
 
 def test_many_names_are_counted_instead_of_listed() -> None:
     clocked = tuple(Variable(f"c{k}", is_clocked=True) for k in range(12))
-    (said,) = remarks(ROOT, clocked, start_time=0.0, tool="", needs_tool=())
+    (said,) = notes(ROOT, clocked, start_time=0.0, tool="", needs_tool=())
     assert said.endswith("c8, c9 and 2 more")
 
 
@@ -40,5 +40,5 @@ def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() 
     root = ElementTree.fromstring(
         '<fmi><DefaultExperiment startTime="0" stopTime="-1" stepSize="0" tolerance="1e-6"/></fmi>'
     )
-    (said,) = remarks(root, (), start_time=0.0, tool="", needs_tool=())
+    (said,) = notes(root, (), start_time=0.0, tool="", needs_tool=())
     assert said == "ignored in the default experiment, as not greater than 0: stopTime = -1, stepSize = 0"

@@ -3,10 +3,10 @@ import pytest
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.description import read_description
-from falsifier.fmu.plan import Plan
 from falsifier.fmu.process import encoding
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.outcome import check_range, failure, last_lines, status_name
+from falsifier.fmu.process.plan import Plan
 from tests.fmu import fixtures
 
 ECHO = read_description(fixtures.path("Echo_3"))

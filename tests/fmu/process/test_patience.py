@@ -8,9 +8,9 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.errors import SimulationError
 from falsifier.fmu.description import read_description
-from falsifier.fmu.plan import make_plan
 from falsifier.fmu.process import patience
 from falsifier.fmu.process.patience import Patience, watching
+from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated
 from tests.fmu.support import HANG
@@ -75,7 +75,7 @@ def test_it_is_told_how_far_a_long_simulation_is(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_hang_is_ended_where_no_tenth_of_the_time_is_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("falsifier.fmu.plan._DEFAULT_TIME_LIMIT", 0.3)
+    monkeypatch.setattr("falsifier.fmu.process.plan._DEFAULT_TIME_LIMIT", 0.3)
     model = isolated("Misdeeds_2")
     with pytest.raises(SimulationError, match=r"at t = 0\.5 s .*without another tenth") as caught:
         model.simulate({}, {"misdeed": HANG}, Experiment(1.0, 0.1, ("y",), tolerance=1e-7))

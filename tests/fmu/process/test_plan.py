@@ -1,9 +1,10 @@
+import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import FalsifierError, ModelError, SpecError
 from falsifier.fmu.description.model_description import read_description
-from falsifier.fmu.plan import make_plan
+from falsifier.fmu.process.plan import make_plan, room_for
 from tests.fmu import fixtures
 
 LAG = read_description(fixtures.path("Lag_2"))
@@ -40,3 +41,8 @@ def test_smaller_steps_divide_the_output_interval() -> None:
     plan = make_plan(LAG, Experiment(2.0, 0.1, ("y",), step_size=0.02), ["u"], [])
     assert (plan.samples, plan.every, plan.steps) == (21, 5, 100)
     assert issubclass(SpecError, FalsifierError)
+
+
+@pytest.mark.parametrize(("pieces", "room"), [([], 1), ([1], 1), ([3, 2], 4), ([4], 4), ([5], 8)])
+def test_a_few_plans_suffice_for_any_number_of_pieces(pieces: list[int], room: int) -> None:
+    assert room_for([np.zeros((n, 5)) for n in pieces]) == room

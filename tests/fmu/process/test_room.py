@@ -3,7 +3,7 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.fmu.description import read_description
-from falsifier.fmu.plan import Plan, make_plan
+from falsifier.fmu.process.plan import Plan, make_plan
 from falsifier.fmu.process.room import HEADER, Room
 from tests.fmu import fixtures
 

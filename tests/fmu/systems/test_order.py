@@ -5,8 +5,8 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Coupling
-from falsifier.fmu.plan import make_plan
 from falsifier.fmu.process import Reply, Where
+from falsifier.fmu.process.plan import make_plan
 from falsifier.fmu.systems.order import SystemOrder
 from tests.fmu.small_systems import LOOP, system
 
