@@ -16,7 +16,6 @@ _UNWRITABLE = re.compile("[\x00\ud800-\udfff]")
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 _FORMULA_STARTS = tuple("=+-@＝＋－＠\t\n")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_TOML_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _MODELICA_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 _MODELICA_ESCAPES = {
     "\a": "\\a", "\b": "\\b", "\f": "\\f", "\n": "\\n", "\r": "\\r", "\t": "\\t", "\v": "\\v",
@@ -78,15 +77,6 @@ def toml_string(text: str) -> str:
         return f"'{text}'"
     # TOML escapes as JSON does, and DEL in addition.
     return json.dumps(_writable(text), ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def toml_key(name: str) -> str:
-    """Return a name as a TOML key, quoted if necessary.
-
-    >>> toml_key("speed"), toml_key("a.b")
-    ('speed', '"a.b"')
-    """
-    return name if _TOML_KEY.fullmatch(name) else toml_string(name)
 
 
 def csv_cell(text: str) -> str:

@@ -126,11 +126,6 @@ class LLMEngine:
         """Return how many samples are not the LLM's, and why."""
         return self._stand_ins.remarks(evaluations)
 
-    @property
-    def handed_over(self) -> bool:
-        """Whether the engine has permanently switched to the fallback."""
-        return self._handed_over
-
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n new candidates.
 

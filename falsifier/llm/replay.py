@@ -1,33 +1,12 @@
 """Playback of recorded conversations: resumed runs pay for nothing twice, notebooks need no key."""
 
-import json
 import threading
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 from falsifier.core.words import counted
 from falsifier.errors import ChatError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange
-
-
-def read_recording(path: Path) -> list[Exchange]:
-    """Read exchanges from a file with one per line, such as a run's ``journal.jsonl``; skip other lines.
-
-    Raises:
-        ChatError: if the file cannot be read or contains an invalid exchange.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-        found = [json.loads(line) for line in lines if line.strip()]
-        exchanges = [record.get("exchange", record) for record in found if _is_exchange(record)]
-        return [Exchange.model_validate(exchange) for exchange in exchanges]
-    except (OSError, ValueError) as error:
-        raise ChatError(f"{path}: not a readable recording: {error}") from None
-
-
-def _is_exchange(record: Any) -> bool:
-    return isinstance(record, dict) and ("exchange" in record or {"messages", "reply"} <= record.keys())
 
 
 class Recording:

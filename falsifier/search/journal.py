@@ -38,7 +38,6 @@ from falsifier.core.sealing import check_seal, checksum, seal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.messages import Exchange
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.records import (
     AskedRecord,
@@ -360,11 +359,6 @@ class JournalReader:
                 f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
                 f"falsifier repair {shlex.quote(str(self.path.parent))}"
             ) from None
-
-
-def recorded_exchanges(records: Iterable[Record]) -> list[Exchange]:
-    """Recorded exchanges with a language model, in order."""
-    return [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
 
 
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:

@@ -219,7 +219,6 @@ def test_hands_over_for_good_when_allowed() -> None:
         asked += engine.ask()
         engine.tell([evaluate(problem, asked[-1])])
     assert [c.origin for c in asked] == ["scripted MP4", "corners", "corners", "corners"]
-    assert engine.handed_over
     simulated = [Evaluation(c, "failed", reason="x") for c in asked]
     assert engine.remarks(simulated) == ("3 of 4 samples from the engine 'corners', because out of reach",)
     assert [e.reply is None for e in exchanges] == [False, True]

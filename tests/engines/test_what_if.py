@@ -18,7 +18,8 @@ from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Budget
-from falsifier.search.journal import holds_run, read_journal, recorded_exchanges
+from falsifier.search.journal import holds_run, read_journal
+from falsifier.search.records import ExchangeRecord
 from falsifier.search.result import Result
 from falsifier.search.run import falsify, resume
 from falsifier.testing import drive, simulated
@@ -29,6 +30,12 @@ from tests.llm.server import Received, Step, serving
 EAGER = Settings(hold=0, promising=-9.0)
 Line = str | ChatReply | Exception
 OnExchange = Callable[[Exchange], None]
+
+
+def exchanges_in(directory: Path) -> list[Exchange]:
+    """What a run has recorded of its language model."""
+    records = (record for record in read_journal(directory) if isinstance(record, ExchangeRecord))
+    return [Exchange.model_validate(record.exchange) for record in records]
 
 
 def candidates(*levels: float, name: str = "u", told: str = "a guess") -> str:
@@ -275,7 +282,7 @@ class TestResume:
             shutil.copytree(tmp_path / "whole", directory)
             (directory / "journal.jsonl").write_bytes(b"".join(lines[: cut + 1]))
             rest = ScriptedChat(self.script)
-            recorded = recorded_exchanges(read_journal(directory))
+            recorded = exchanges_in(directory)
             resumed = self.search(directory, rest, 14)
             assert [e.candidate.key for e in resumed.evaluations] == [
                 e.candidate.key for e in whole.evaluations
@@ -314,4 +321,4 @@ class TestResume:
         assert nobody.requests == []
 
     def calls(self, directory: Path) -> list[Exchange]:
-        return [e for e in recorded_exchanges(read_journal(directory)) if e.reply and e.reply.tool_calls]
+        return [e for e in exchanges_in(directory) if e.reply and e.reply.tool_calls]

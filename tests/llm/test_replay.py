@@ -1,10 +1,8 @@
-from pathlib import Path
-
 import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import RecordedChat, read_recording
+from falsifier.llm.replay import RecordedChat
 from falsifier.llm.scripted import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
@@ -39,20 +37,3 @@ def test_a_recording_alone_ends() -> None:
 def test_a_recorded_failure_happens_again() -> None:
     with pytest.raises(ChatError, match="nobody there"):
         RecordedChat([exchange(None)], ScriptedChat(["now there"])).complete(QUESTION)
-
-
-def test_recordings_are_read_from_journals_and_from_plain_lines(tmp_path: Path) -> None:
-    first, second = exchange("one"), exchange("two")
-    lines = ['{"kind": "asked", "n": 1}', f'{{"kind": "exchange", "exchange": {first.model_dump_json()}}}']
-    path = tmp_path / "journal.jsonl"
-    path.write_text("\n".join([*lines, "", second.model_dump_json()]))
-    assert read_recording(path) == [first, second]
-
-
-@pytest.mark.parametrize("content", ["{", '{"exchange": {"llm": 3}}', None])
-def test_an_unreadable_recording_names_its_file(tmp_path: Path, content: str | None) -> None:
-    path = tmp_path / "talk.jsonl"
-    if content is not None:
-        path.write_text(content)
-    with pytest.raises(ChatError, match=r"talk\.jsonl: not a readable recording"):
-        read_recording(path)

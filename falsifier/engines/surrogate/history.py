@@ -121,19 +121,16 @@ class History:
         return np.array([s.point for s in self.samples]).reshape(-1, self.layout.dimension)
 
     def direct_costs(self) -> list[float]:
-        """Return the costs of all samples for the search without dynamics, see ``direct_cost``."""
+        """Return the costs for the search without dynamics.
+
+        These are the robustness if it is negative or has a slope, else the mean of the relaxed formulas'.
+        """
         if not self.samples or self.objective is None or not self.objective.is_relaxed:
             return [s.robustness for s in self.samples]
         relaxed = scaled_costs(self.samples, self.scaled_objective()).tolist()
         return [
             s.robustness if s.robustness < 0 else cost for s, cost in zip(self.samples, relaxed, strict=True)
         ]
-
-    def direct_cost(self, sample: Sample) -> float:
-        """Return the robustness if it is negative or has a slope, else the mean of the relaxed formulas'."""
-        if sample.robustness < 0 or self.objective is None or not self.objective.is_relaxed:
-            return sample.robustness
-        return float(self.scaled_objective().cost(sample.values)[0])
 
 
 def scaled_costs(samples: Sequence[Sample], objective: Objective) -> Array:
