@@ -96,7 +96,6 @@ def forker() -> Forker:
 def serve(descriptor: int) -> None:
     """Fork for each request; the copies run it and end."""
     from falsifier.llm.tokens import count_tokens
-    from tests.compiling import load_common
 
     importlib.import_module("falsifier.llm.litellm_import").load_litellm()
     large = [importlib.import_module(name) for name in _LARGE]
@@ -104,7 +103,6 @@ def serve(descriptor: int) -> None:
     for name in (*_SLOW, *parts):
         if name not in _NEVER:
             importlib.import_module(name)
-    load_common()
     count_tokens("")
     gc.freeze()
     requests = socket.socket(fileno=descriptor)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.signals import end_slope, inner_slope
 from falsifier.engines.box import Array
-from falsifier.stl.numba_compilation import compiled
+from falsifier.engines.numba_compilation import compiled
 
 _inner_slope, _end_slope = compiled(inner_slope), compiled(end_slope)
 

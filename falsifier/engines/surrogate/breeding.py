@@ -1,13 +1,13 @@
 """Compiled draws and changes of points: a plan needs thousands.
 
-All change their first array in place. Importing this module imports numba; the monitor has done so by then.
+All change their first array in place. Importing this module imports numba.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
-from falsifier.stl.numba_compilation import compiled
+from falsifier.engines.numba_compilation import compiled
 
 # Cumulative probabilities of the changes of held cells: a bound, any level, a small step, a switch moved
 # in time; the rest shifts the whole signal.

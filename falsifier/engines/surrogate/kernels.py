@@ -1,6 +1,6 @@
 """Compiled rollouts of learnt dynamics: a plan needs thousands, one cell after the other.
 
-Importing this module imports numba, which the monitor has done by then.
+Importing this module imports numba.
 """
 
 from functools import partial
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
-from falsifier.stl.numba_compilation import compiled
+from falsifier.engines.numba_compilation import compiled
 
 # cos(2 pi x) on [-1/2, 1/2] as an even polynomial, to 1e-6; unlike the library's cosine, the compiler
 # calculates it for several numbers at a time.

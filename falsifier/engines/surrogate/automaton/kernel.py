@@ -1,10 +1,10 @@
-"""Compiled roll-out of a hybrid automaton; importing it imports numba, which the monitor has done by then."""
+"""Compiled roll-out of a hybrid automaton; importing it imports numba."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
-from falsifier.stl.numba_compilation import compiled
+from falsifier.engines.numba_compilation import compiled
 
 # Terms of a Taylor polynomial.
 _TERMS = 6

@@ -6,15 +6,15 @@ from pathlib import Path
 import numba
 import pytest
 
+from falsifier.engines.numba_compilation import compiled
 from falsifier.errors import SpecError
-from falsifier.stl.numba_compilation import compiled
 
 CODE = """
 import numba.core.caching as caching
 cache = getattr(caching, "CacheImpl", None) or caching._CacheImpl
 # As where neither the package's folder nor a home can be written.
 cache._locator_classes = [k for k in cache._locator_classes if "UserProvided" in k.__name__]
-from falsifier.stl.numba_compilation import compiled
+from falsifier.engines.numba_compilation import compiled
 
 @compiled
 def double(x: float) -> float:

@@ -14,7 +14,7 @@ from tests.command import ROOT
 from tests.hostile.damage import DAMAGES
 
 CODE = """
-from falsifier.stl.numba_compilation import compiled
+from falsifier.engines.numba_compilation import compiled
 
 @compiled
 def doubled(x):
@@ -49,7 +49,7 @@ def test_damaged_machine_code_is_compiled_again(tmp_path: Path) -> None:
 def test_a_change_in_what_a_function_calls_makes_it_be_compiled_again(tmp_path: Path) -> None:
     (tmp_path / "callee.py").write_text(CODE)
     (tmp_path / "caller.py").write_text(
-        "from callee import doubled\nfrom falsifier.stl.numba_compilation import compiled\n\n"
+        "from callee import doubled\nfrom falsifier.engines.numba_compilation import compiled\n\n"
         "@compiled\ndef called(x):\n    return doubled(x) + 1.0\n"
     )
     program = (

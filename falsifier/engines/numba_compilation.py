@@ -26,7 +26,7 @@ def compiled(function: _Function, *, forceinline: bool = False, fastmath: bool =
     """
     import numba
 
-    from falsifier.stl.checked_cache import check_cache
+    from falsifier.engines.checked_cache import check_cache
 
     if numba.config.DISABLE_JIT:
         raise SpecError("NUMBA_DISABLE_JIT is set, but falsifier must compile; unset it")
