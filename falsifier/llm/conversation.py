@@ -187,7 +187,9 @@ def _asked_again(request: ChatRequest, reply: ChatReply, problem: str) -> ChatRe
 
 
 def _more_tokens(reply: ChatReply) -> int:
-    """Twice what a reply had that was cut off."""
+    """Twice the limit at which a reply was cut off; without one of the user, twice the length that it had."""
     limit = reply.parameters.get("max_tokens")
-    had = max(reply.usage.completion_tokens, limit if isinstance(limit, int) else 0)
+    if isinstance(limit, int):
+        return 2 * limit
+    had = reply.usage.completion_tokens
     return min(max(2 * had, _LEAST_TOKENS), max(had, _MOST_TOKENS))

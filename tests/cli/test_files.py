@@ -35,4 +35,5 @@ def test_the_picture_is_named_and_titled_like_the_counterexample(
     files = write_counterexample(FOUND, tmp_path, name="fragile-1.json")
     assert [f.name for f in files] == ["fragile-1.json", "fragile-1.png"]
     assert json.loads(files[0].read_text())["outcome"] == "confirmed"
-    assert titles[0].startswith(f"LAG: violated, robustness {FOUND.evaluation.robustness:+.5g}")
+    assert titles[0].startswith("LAG: x <= 0.9 was violated from")
+    assert f"robustness {FOUND.evaluation.robustness:+.5g}" in titles[0]

@@ -298,8 +298,8 @@ def recorded_run(problem: Problem, chat: Chat, directory: Path) -> Result:
 def test_no_secret_reaches_the_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret-key")
     with serving(Step(reply([1] * 4))) as server:
-        base = server.url.replace("http://", "http://user:password1@")
-        chat = connect("openai/m", api_base=base, options={"extra_headers": {"X-Key": "header-secret"}})
+        monkeypatch.setenv("OPENAI_API_BASE", server.url.replace("http://", "http://user:password1@"))
+        chat = connect("openai/m", options={"extra_headers": {"X-Key": "header-secret"}})
         assert recorded_run(lag_problem(), chat, tmp_path).status == "falsified"
         headers = {k.lower(): v for k, v in server.received[0].headers.items()}
         assert headers["x-key"] == "header-secret"

@@ -1,6 +1,7 @@
 """All ways of asking, against llama.cpp's own server, with a language model that answers rubbish."""
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -110,9 +111,9 @@ def test_a_run_with_rubbish_for_answers_ends_properly(server: str, tmp_path: Pat
         cwd=tmp_path,
         env={"XDG_CACHE_HOME": "cache"},
     )
-    assert done.code == 0, done.err
-    assert "not falsified after 2 simulations" in done.out
-    assert "language model" in done.out
+    assert done.code == 3, done.err
+    assert "failed after 2 simulations" in done.out
+    assert "language model gave no usable answer" in done.out
 
 
 def test_a_prompt_beyond_the_servers_context_is_never_cut(model: Path, tmp_path: Path) -> None:
@@ -130,6 +131,11 @@ def test_a_prompt_beyond_the_servers_context_is_never_cut(model: Path, tmp_path:
 
 
 class TestModelFile:
+    @pytest.fixture
+    def model(self, model: Path, tmp_path: Path) -> Path:
+        """A file that no other test serves."""
+        return Path(shutil.copy(model, tmp_path))
+
     def test_a_file_is_served_for_a_run_and_recorded_by_its_path(self, model: Path, tmp_path: Path) -> None:
         done = falsifier(
             *("run", "python:tests.problems:impossible", "--llm", str(model), "--max-cost", "1"),
@@ -137,8 +143,8 @@ class TestModelFile:
             cwd=tmp_path,
             env={"XDG_CACHE_HOME": str(tmp_path / "cache")},
         )
-        assert done.code == 0, done.err
-        assert "not falsified after 2 simulations" in done.out
+        assert done.code == 3, done.err
+        assert "failed after 2 simulations" in done.out
         recorded = (tmp_path / "run" / "manifest.json").read_text()
         assert json.loads(recorded)["request"]["llm"]["name"] == str(model)
         assert "127.0.0.1" not in recorded + (tmp_path / "run" / "journal.jsonl").read_text()
