@@ -25,6 +25,7 @@ start_silent_tracker = _system.start_silent_tracker
 yield_processor = _system.yield_processor
 
 can_seal = _files.can_seal
+forbids_programs = _files.forbids_programs
 homes = _files.homes
 is_own = _files.is_own
 is_private = _files.is_private

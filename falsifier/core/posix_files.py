@@ -114,6 +114,11 @@ def is_private(folder: Path) -> bool:
     return found.st_uid == os.getuid() and found.st_mode & 0o022 == 0
 
 
+def forbids_programs(folder: Path) -> bool:
+    """Whether the file system of a folder is mounted so that nothing in it is executed or loaded."""
+    return bool(os.statvfs(folder).f_flag & getattr(os, "ST_NOEXEC", 0))
+
+
 def remove_tree(path: Path) -> None:
     """Remove a folder with all its contents, however deep and whatever its permissions; ignore errors."""
     if os.scandir not in os.supports_fd or os.rename not in os.supports_dir_fd:

@@ -107,6 +107,11 @@ def is_private(folder: Path) -> bool:
     return folder.is_dir()
 
 
+def forbids_programs(folder: Path) -> bool:
+    """Return False: no folder does."""
+    return False
+
+
 def remove_tree(path: Path) -> None:
     """Remove a folder with all its contents, files that are write-protected included; ignore errors."""
 

@@ -21,6 +21,15 @@ def test_a_sealed_file_keeps_its_size() -> None:
                 os.ftruncate(file.fileno(), size)
 
 
+@LINUX
+def test_whether_a_folder_forbids_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = os.statvfs(tmp_path)
+    for flag in (0, os.ST_NOEXEC):
+        fields = [*known[:8], flag, *known[9:]]
+        monkeypatch.setattr(os, "statvfs", lambda folder, fields=fields: os.statvfs_result(fields))
+        assert posix_files.forbids_programs(tmp_path) == bool(flag)
+
+
 def test_a_file_is_locked_once(tmp_path: Path) -> None:
     first = posix_files.lock_file(tmp_path / "lock")
     assert first is not None

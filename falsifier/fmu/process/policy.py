@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 
 from falsifier.core.printable import printable
 from falsifier.errors import SpecError, did_you_mean
@@ -51,7 +52,7 @@ class Policy:
     """What an FMU may do beyond reading files and changing those of its own folders.
 
     Attributes:
-        writable: files and folders that it may change, with all below.
+        writable: files and folders that it may change and read, with all below.
         readable: files and folders that it may read although they may hold keys.
         programs: whether it may execute programs.
         network: whether it may open connections.
@@ -194,7 +195,7 @@ def read_told(data: bytes) -> Told:
             case b"e":
                 enforced = ord(part[1:2] or b"0") - ord("0")
             case b"w":
-                advice = _ADVICE.format(f"write:{Path(path).parent}")
+                advice = _ADVICE.format(quote(f"write:{Path(path).parent}"))
                 refused.append(f"tried to change {path}, which was refused; {advice}")
             case b"x":
                 advice = _ADVICE.format(_PROGRAMS_WORD)
@@ -220,9 +221,11 @@ def policy_text(policy: Policy, enforced: int) -> str:
     places = "".join(f" and {path}" for path in policy.writable)
     connecting, executing = "open network connections", "execute programs"
     may = [f"change files in its own folders{places}"]
+    may += [f"read {' and '.join(map(str, policy.readable))}"] if policy.readable else []
     may += [connecting] * policy.network + [executing] * policy.programs
     # What it may not do, and which of these bits keep it from that.
-    may_not = [("change other files", _FILES), ("read known places of keys", _FILES)]
+    other = "other " if policy.writable or policy.readable else ""
+    may_not = [("change other files", _FILES), (f"read {other}known places of keys", _FILES)]
     may_not += [] if policy.programs else [(executing, _FILES | _SYSTEM_CALLS)]
     may_not += [] if policy.network else [(connecting, _SYSTEM_CALLS)]
     may_not.append(("reach other processes", _PROCESSES))

@@ -77,6 +77,20 @@ class Workplace:
                 partial.rename(folder)
         return folder
 
+    def program(self, *, windows: bool = False) -> Path:
+        """Return the path of the program that runs FMUs; copy or compile it first if necessary.
+
+        Raises:
+            ModelError: if there is none for this machine, or no library can be loaded from the folder.
+        """
+        if not windows and operating_system.forbids_programs(self.root):
+            raise ModelError(
+                f"FMUs are unpacked to {self.root.parent}, from which this system loads no libraries "
+                "(noexec); set TMPDIR to another folder"
+            )
+        with self._lock:
+            return worker_program(self.root, windows=windows)
+
     def scratch(self) -> Path:
         """Return a new folder for one worker."""
         return Path(tempfile.mkdtemp(prefix="work-", dir=self.root))
@@ -111,10 +125,10 @@ class Started:
 
     def __init__(self, workplace: Workplace, folder: Path, policy: Policy, *, through_wine: bool) -> None:
         self._is_wine = through_wine and sys.platform != "win32"
-        path = worker_program(workplace.root)
+        path = workplace.program()
         command: tuple[str, ...] = ()
         if self._is_wine:
-            command = (_wine(), windows_path(worker_program(workplace.root, windows=True)))
+            command = (_wine(), windows_path(workplace.program(windows=True)))
         self.scratch = workplace.scratch()
         self.output = Output()
         environment = worker_environment(os.environ, self.scratch)

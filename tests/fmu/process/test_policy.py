@@ -35,6 +35,7 @@ def test_what_was_refused_is_told_with_the_way_out() -> None:
     assert told.cause == "" and told.refusals.count("/etc/x") == 1
     for said in ("--allow write:/etc`", "/bin/sh", "--allow programs`", "signal"):
         assert said in told.refusals
+    assert "`--allow 'write:/my logs'`" in read_told(b"w/my logs/x\0").refusals, "as a shell takes it"
     assert "\x1b" not in read_told(b"w/\x1b[2J\xff\0").refusals
     assert read_told(b"r/bin/true\0").cause.endswith("/bin/true")
     assert read_told(b"") == read_told(b"?unknown\0")
@@ -47,6 +48,9 @@ def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
         "may not"
     )
     assert "/data/logs" in may and "programs" in may and "network" in may_not
+    assert "other known places of keys" in may_not, "what may be changed may be read"
+    may, may_not = policy_text(Policy(readable=(Path("/home/me/.config"),)), ALL).split("may not")
+    assert "read /home/me/.config" in may and "other known places of keys" in may_not
     _, nothing = policy_text(Policy(network=False), 0).split("not enforce")
     for lacking in ("files", "keys", "processes", "connections", "programs"):
         assert lacking in nothing

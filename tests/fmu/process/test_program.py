@@ -3,17 +3,21 @@
 import hashlib
 import shutil
 import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from falsifier.core import operating_system
 from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import this_platform
 from falsifier.fmu.process import REGISTRY, program
 from falsifier.fmu.process.connection import Request, Where
 from falsifier.fmu.process.program import WORKER
 from falsifier.fmu.process.reuse import REUSES
+from falsifier.fmu.process.start import Workplace
 from tests.fmu import fixtures
 
 EXPORT_PYTHON = Path(__file__).parents[3] / ".venv-export" / "bin" / "python"
@@ -80,6 +84,15 @@ class TestElsewhere:
         first = found.stat().st_ino
         assert program.worker_program(tmp_path).stat().st_ino == first
 
+    def test_threads_that_need_it_at_the_same_time_wait_for_each_other(self) -> None:
+        workplace = Workplace()
+        try:
+            with ThreadPoolExecutor(4) as threads:
+                found = [threads.submit(workplace.program) for _ in range(4)]
+            assert len({each.result().stat().st_ino for each in found}) == 1
+        finally:
+            workplace.remove()
+
     def test_without_a_compiler_one_line_says_so(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -87,3 +100,10 @@ class TestElsewhere:
         monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
         with pytest.raises(ModelError, match=r"no program to run FMUs on riscv64-linux.*no C compiler found"):
             program.worker_program(tmp_path)
+
+
+def test_a_folder_that_forbids_programs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operating_system, "forbids_programs", lambda folder: True)
+    REGISTRY.close()
+    with pytest.raises(ModelError, match=rf"{tempfile.gettempdir()}.*noexec.*TMPDIR"):
+        fixtures.run(fixtures.isolated("Lag_2"), ("y",))
