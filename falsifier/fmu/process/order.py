@@ -17,7 +17,7 @@ from falsifier.fmu.process.connection import Reply, Request
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.plan import Plan, solver_tolerance
 from falsifier.fmu.process.policy import Policy
-from falsifier.fmu.process.room import Room
+from falsifier.fmu.process.shared import Room
 
 
 class Order(Protocol):

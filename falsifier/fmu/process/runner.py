@@ -12,10 +12,9 @@ from falsifier.fmu.process import outcome, patience
 from falsifier.fmu.process.connection import Closed, Reply
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.plan import Plan
-from falsifier.fmu.process.reuse import REUSES, Experience, Reuse
-from falsifier.fmu.process.room import Room
+from falsifier.fmu.process.shared import Room
 from falsifier.fmu.process.start import Workplace
-from falsifier.fmu.process.worker import Worker
+from falsifier.fmu.process.worker import REUSES, Experience, Reuse, Worker
 
 
 class Runner:

@@ -17,11 +17,9 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description import HOW_TO_INSTALL, extract, file_hash, find_wine, windows_path
 from falsifier.fmu.process import folders
 from falsifier.fmu.process.encoding import text
-from falsifier.fmu.process.environment import protect_secrets, worker_environment
-from falsifier.fmu.process.output import Output
 from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
-from falsifier.fmu.process.program import worker_program
-from falsifier.fmu.process.room import Memory
+from falsifier.fmu.process.program import protect_secrets, worker_environment, worker_program
+from falsifier.fmu.process.shared import Memory, Output
 
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8

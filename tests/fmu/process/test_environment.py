@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core import operating_system
-from falsifier.fmu.process.environment import MORE, protect_secrets, worker_environment
+from falsifier.fmu.process.program import MORE, protect_secrets, worker_environment
 
 GIVEN = {
     "PATH": "/bin",

@@ -16,8 +16,8 @@ from falsifier.fmu.description.archive import this_platform
 from falsifier.fmu.process import REGISTRY, program
 from falsifier.fmu.process.connection import Request, Where
 from falsifier.fmu.process.program import WORKER
-from falsifier.fmu.process.reuse import REUSES
 from falsifier.fmu.process.start import Workplace
+from falsifier.fmu.process.worker import REUSES
 from tests.fmu import fixtures
 
 EXPORT_PYTHON = Path(__file__).parents[3] / ".venv-export" / "bin" / "python"

@@ -1,4 +1,4 @@
-from falsifier.fmu.process.reuse import Experience, Reuse
+from falsifier.fmu.process.worker import Experience, Reuse
 
 
 def known(experience: Experience) -> tuple[Reuse | None, tuple[Reuse, ...]]:
