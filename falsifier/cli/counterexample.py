@@ -54,6 +54,7 @@ from falsifier.counterexamples.store import (
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm, other_interface
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.joining import rights_notes
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import shown, signed
 from falsifier.views.terminal import warn
@@ -335,6 +336,8 @@ def _say_about(found: Subject, problem: Problem, named: Path) -> None:
 def _problem(stored: StoredCounterexample) -> Iterator[Problem]:
     """Load the problem of a counterexample, and close its model at the end."""
     problem = problem_of(stored)
+    for note in rights_notes(problem.model):
+        warn(note)
     try:
         yield problem
     finally:

@@ -25,6 +25,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.evaluate import simulate as simulate_inputs
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import is_package, read_info, read_package
+from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import InputSection
@@ -63,6 +64,8 @@ def simulate(
     """
     source, given = problem_source(options), dict(map(_value, values))
     problem = _loaded(source, input_file, given)
+    for note in rights_notes(problem.model):
+        warn(note)
     try:
         known = [v.name for v in problem.info.inputs]
         signals = {name: _constant(value) for name, value in given.items() if name in known}

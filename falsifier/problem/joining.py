@@ -289,7 +289,11 @@ def _grid(
 def _notes(grid: Grid | None, model: Model) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
-    # What a spec or an option lets the FMU do, which the user may not have written.
+    yield from rights_notes(model)
+
+
+def rights_notes(model: Model) -> Iterator[str]:
+    """Say what a spec, an option or a counterexample lets the FMU do, which the user may not have written."""
     for name, said in (("allow", "may also"), ("deny", "may not use")):
         if words := getattr(model, name, ()):
             yield f"the {model.info.noun} {said}: {', '.join(words)}"

@@ -46,6 +46,16 @@ def test_replay_of_a_run_still_violates(folder: Path) -> None:
     assert done.json["robustness"] == pytest.approx(-0.2133, abs=1e-3)
 
 
+def test_what_an_fmu_may_do_is_kept_and_said(tmp_path: Path) -> None:
+    rights = ("--allow", "programs", "--deny", "network")
+    done = run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run", *rights)
+    assert done.code == 1, done.err
+    (tmp_path / "received.json").write_bytes((tmp_path / "run" / "counterexample.json").read_bytes())
+    for command in (("replay", "received.json"), ("simulate", "AT1", *rights)):
+        done = run(tmp_path, *command)
+        assert "may also: programs" in done.err and "may not use: network" in done.err
+
+
 def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
     done = run(folder, "shrink", "run", "--store", "kept", "--json")
     assert done.code == 0, done.err
