@@ -72,7 +72,9 @@ def module_name(path: Path) -> str:
 
 
 FMU = PACKAGE / "fmu"
-DOORS = {module_name(FMU): FMU, **{module_name(p.parent): p.parent for p in FMU.glob("*/__init__.py")}}
+# What few commands need is a room of one file, which the door of fmu does not import.
+ROOMS_OF_FMU = (FMU, *(p.parent for p in FMU.glob("*/__init__.py")), FMU / "build")
+DOORS = {module_name(room): room for room in ROOMS_OF_FMU}
 
 
 def past_a_door(path: Path) -> list[str]:
@@ -94,7 +96,7 @@ def past_a_door(path: Path) -> list[str]:
 
 
 def test_nothing_imports_past_a_door_of_fmu() -> None:
-    assert len(DOORS) == 5
+    assert len(DOORS) == 6
     wrong = [said for p in sources() for said in past_a_door(p)]
     assert not wrong, "\n".join(wrong)
 

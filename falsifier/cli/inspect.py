@@ -155,7 +155,7 @@ def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
 @out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
     """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
-    from falsifier.fmu import compile_sources
+    from falsifier.fmu.build import compile_sources
 
     written = compile_sources(_one_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
     say(f"{written} written")

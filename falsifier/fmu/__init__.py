@@ -1,6 +1,5 @@
 """FMUs: reading their description, stepping them, and isolating them in processes of their own."""
 
-from falsifier.fmu.build import compile_sources
 from falsifier.fmu.description import read_info
 from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
 from falsifier.fmu.model import FmuModel
@@ -16,7 +15,6 @@ __all__ = [
     "Frame",
     "Policy",
     "System",
-    "compile_sources",
     "fmu_files",
     "fmus_sha256",
     "is_package",

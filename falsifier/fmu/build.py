@@ -17,6 +17,8 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description import extract, library_file, read_description, read_xml
 from falsifier.fmu.model import FmuModel
 
+__all__ = ["compile_sources"]
+
 # The standard's name, and that of drafts of FMI 3, which some exporters still write.
 _BUILD_DESCRIPTIONS = ("buildDescription.xml", "build_description.xml")
 _INCLUDED = re.compile(r'^\s*#\s*include\s*"([^"]+\.c)"', re.MULTILINE)
