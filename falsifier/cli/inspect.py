@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from os.path import relpath
 from pathlib import Path
@@ -25,7 +26,7 @@ from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import parameterization_text
-from falsifier.errors import SpecError
+from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
@@ -104,7 +105,7 @@ def info(
         return
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
-    found = replace(found, notes=(*found.notes, *_binary_notes(source), rights_text(*rights)))
+    found = replace(found, notes=(*found.notes, *_binary_notes(source), _rights_note(*rights)))
     if as_json:
         say(info_json(found))
         return
@@ -314,6 +315,14 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
     if step == experiment.output_interval:
         return f"this step {kept}"
     return f"step_size = {step:g} {kept}; set it in [model]"
+
+
+def _rights_note(allow: Sequence[str], deny: Sequence[str]) -> str:
+    """Return what the FMU may do; its description can be shown where no FMU can be run."""
+    try:
+        return rights_text(allow, deny)
+    except (MachineError, ModelError) as error:
+        return f"FMUs cannot be simulated now: {error}"
 
 
 def _binary_notes(source: "Path | System") -> tuple[str, ...]:

@@ -2,10 +2,14 @@ import shutil
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from falsifier.cli import cli
+from falsifier.core import operating_system
 from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.description.archive import this_platform
+from falsifier.fmu.process import REGISTRY
 from tests.command import ROOT, falsifier
 from tests.fixtures import simulink
 from tests.fmu.fixtures import path as fixture
@@ -34,6 +38,14 @@ def test_info_says_what_is_ignored_and_what_cannot_be_simulated(tmp_path: Path) 
     assert "note: input clocks are ignored, so they never tick: tick" in clocked.out
     scheduled = falsifier("info", str(fixtures / "Scheduled_3.fmu"), cwd=tmp_path)
     assert "scheduled execution is not supported" in scheduled.out
+
+
+def test_info_describes_an_fmu_where_none_can_be_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    REGISTRY.close()
+    monkeypatch.setattr(operating_system, "forbids_programs", lambda folder: True)
+    done = CliRunner().invoke(cli, ["info", str(fixture("Lag_2"))])
+    assert done.exit_code == 0, done.output
+    assert "cannot be simulated now" in done.output and "noexec" in done.output and "outputs" in done.output
 
 
 def test_info_takes_a_spec_for_its_fmu(tmp_path: Path) -> None:
