@@ -120,6 +120,8 @@ class RobustnessMap:
     @property
     def _followed(self) -> str:
         """What was measured, so that it is not taken for what resetting one input alone would do."""
+        if not any(self.influences):
+            return "None of these changes moved the robustness."
         most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
         return f"Over these changes the robustness follows {listed(most)} most (rank correlation)."
 

@@ -44,6 +44,7 @@ def test_what_moves_nothing_has_no_influence() -> None:
     flat = lag_problem("G[0,10] (x - x >= 1)", parameters=(X0,))
     found = robustness_map(flat, evaluate(flat, flat.space.decode([1.0] * 4 + [0.0])), samples=8, points=2)
     assert set(found.influences) == {0.0}
+    assert "None of these changes moved the robustness." in found.text
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:
