@@ -146,7 +146,8 @@ def problem_options(command: Function) -> Function:
             "--time-limit",
             type=float,
             metavar="SECONDS",
-            help="Maximum wall-clock time of one simulation; default: the spec's, or 60.",
+            help="Maximum wall-clock time of one simulation; default: the spec's, or 60 for each tenth of "
+            "the simulated time.",
         ),
         policy_options,
     )

@@ -39,6 +39,7 @@ _CREDENTIALS_IN_ADDRESS = r"(?<!mailto://)(?<=://)[^\s/?#'\"]+(?=@)"
 _VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS)))
 # The same for an address alone: without a scheme too, and a password may contain a slash; a port is none.
 _CREDENTIALS = re.compile(r"(?:.*?://)?(?:[^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$))[^@]*@)")
+_KEY_IN_QUERY = re.compile(r"(?i)[?&](?:\w*[_-])?(?:key|token|secret|password)=.")
 _IN_TEXT = re.compile(
     "|".join(
         (
@@ -110,12 +111,12 @@ def secrets_in(options: Mapping[str, Any]) -> list[str]:
 
 
 def holds_credentials(address: str) -> bool:
-    """Whether an address contains a user name or a password.
+    """Whether an address contains a user name, a password or a key.
 
     >>> holds_credentials("http://me:word@host/v1"), holds_credentials("http://host:80/v1/@me")
     (True, False)
     """
-    return _CREDENTIALS.match(address) is not None
+    return bool(_CREDENTIALS.match(address) or _KEY_IN_QUERY.search(address))
 
 
 def redact(text: str, secrets: Iterable[str] = ()) -> str:

@@ -6,6 +6,7 @@ from time import perf_counter
 from typing import Any
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
+from falsifier.errors import ChatError
 from falsifier.llm.failures import UnreadableReplyError, classify
 from falsifier.llm.incoming import cleaned
 from falsifier.llm.litellm_import import dropped_parameters, listed_price, load_litellm
@@ -75,6 +76,8 @@ class LiteLLMChat:
         litellm = load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left
+        if left is not None and left <= 0:  # the import above may have taken it
+            raise ChatError(f"{self.llm}: nothing was sent: the time limit ended while the client was loaded")
         timeout = min(self.timeout, _LONGEST_TIMEOUT)
         seconds = timeout if left is None else min(timeout, left)
         started = perf_counter()

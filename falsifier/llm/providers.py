@@ -95,7 +95,7 @@ def known(llm: str) -> Provider:
 
 
 def check_address(llm: str, api_base: str | None) -> None:
-    """Refuse an address that is none, or that contains a user name and a password.
+    """Refuse an address that is none, or that contains a user name, a password or a key.
 
     Addresses are recorded, printed in commands and seen by whoever lists the processes of the machine.
 
@@ -106,8 +106,8 @@ def check_address(llm: str, api_base: str | None) -> None:
         return
     if holds_credentials(api_base):
         raise ChatSetupError(
-            "--api-base: an address with a user name or a password would be recorded; drop --api-base, and "
-            f"put the whole address into the environment variable {_address_variable(llm)}"
+            "--api-base: an address with a user name, a password or a key would be recorded; drop "
+            f"--api-base, and put the whole address into the environment variable {_address_variable(llm)}"
         )
     try:
         parts = urlsplit(api_base)

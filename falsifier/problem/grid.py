@@ -149,7 +149,8 @@ def _reason(interval: Fraction, stop: Fraction, named: list[Fraction], fmu_step:
 
 
 def _listed(times: list[Fraction]) -> str:
-    shown = [_text(t) for t in times[:4]] + (["..."] if len(times) > 4 else [])
+    # With more digits than elsewhere: 1.0000001 must not read 1.
+    shown = [f"{float(t):.10g}" for t in times[:4]] + (["..."] if len(times) > 4 else [])
     return ", ".join(shown) + " s"
 
 

@@ -45,6 +45,11 @@ class Subject:
     is_new: bool
     free_grid: bool
 
+    @property
+    def is_started(self) -> bool:
+        """Whether its first requirement is a starter's, still without its number."""
+        return _has_placeholder(tomllib.loads(self.text))
+
     def parsed(self, text: str) -> tuple[Formula, Problem]:
         """Return a formula that fits, and the problem with the time grid on which it is judged.
 
@@ -77,13 +82,17 @@ def subject_of(target: str) -> Subject:
     spec = read_spec(path)
     name = requirement or next(iter(spec.requirements))
     is_bundled = path.parent == bundled("specs")
-    problem = load_source(ProblemSource(target=f"{path}:{name}"))
+    text = path.read_text(encoding="utf-8-sig")
+    if name == _STARTED and _has_placeholder(tomllib.loads(text)):
+        problem = problem_of_starter(text, path)
+    else:
+        problem = load_source(ProblemSource(target=f"{path}:{name}"))
     intervals = [spec.model.output_interval, spec.requirements[name].output_interval]
     return Subject(
         problem,
         None if is_bundled else path,
         path.parent,
-        path.read_text(encoding="utf-8-sig"),
+        text,
         is_new=False,
         free_grid=intervals == [None, None],
     )
@@ -115,6 +124,11 @@ def problem_of_starter(text: str, path: Path) -> Problem:
     return Problem.from_parts(join(parse_spec(content, file=str(path)), _STARTED, path=path))
 
 
+def _has_placeholder(content: dict[str, Any]) -> bool:
+    formula = content["requirements"].get(_STARTED, {}).get("formula")
+    return isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
+
+
 def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
     """Change relative paths of FMUs to those from another file's folder."""
     for section in (document.get("model", {}), *document.get("components", {}).values()):
@@ -142,7 +156,7 @@ def with_requirement(
     if subject.folder.resolve() != out.resolve().parent:
         _relocate(document, subject.folder, out)
     requirements: Any = document["requirements"]
-    if subject.is_new:
+    if subject.is_started:
         del requirements[_STARTED]
     if name is None:
         name = next(f"R{k}" for k in range(1, len(requirements) + 2) if f"R{k}" not in requirements)

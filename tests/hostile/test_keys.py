@@ -163,5 +163,6 @@ def test_credentials_in_an_address_are_found_and_addresses_without_them_stay(wor
     # Digits and a slash would be a port and a path.
     assert holds_credentials(f"http://me:x{word}@host/{path}")
     assert holds_credentials(f"me:x{word}@host/{path}")
+    assert holds_credentials(f"http://host/v1?a=b&api_key=x{word}")
     assert not holds_credentials(f"http://host:8000/{path}@x")
     assert not holds_credentials(f"http://[::1]:8000/{path}")

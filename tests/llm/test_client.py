@@ -223,6 +223,16 @@ def test_missing_counts_are_estimated_and_cost_is_unknown() -> None:
     assert usage.cost is None
 
 
+@pytest.mark.usefixtures("keys")
+def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
+    with serving(Step("{}")) as server:
+        with pytest.raises(ChatError, match="nothing was sent: the time limit ended"):
+            LiteLLMChat("openai/mine", api_base=server.url).complete(
+                REQUEST.model_copy(update={"deadline": 0.0})
+            )
+        assert not server.received
+
+
 def test_refusal_is_told_apart() -> None:
     with serving(Step(None, extra={"refusal": "I would rather not"})) as server:
         reply = LiteLLMChat("openai/mine", api_base=server.url).complete(REQUEST)

@@ -4,8 +4,10 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import SpecError
+from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem
 from falsifier.problem.spec import read_spec
+from falsifier.problem.starter import starter_spec
 from falsifier.problem.subject import subject_of, with_requirement
 from tests.problem.support import AT, GOOD, spec
 
@@ -47,6 +49,18 @@ def test_an_fmu_gets_a_starter_spec_with_this_requirement_only(tmp_path: Path) -
     assert name == "R1"
     assert str(load_problem(str(tmp_path / "car.toml")).requirement.formula) == "G[0,9] (speed <= 3)"
     assert subject_of(str(fmu)).is_new, "whether its spec is in the way depends on where is written"
+
+
+def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder(tmp_path: Path) -> None:
+    fmu = Path(shutil.copy(AT, tmp_path / "car.fmu"))
+    path = tmp_path / "car.toml"
+    path.write_text(starter_spec(Path(fmu.name), read_info(fmu)))
+    subject = subject_of(str(path))
+    assert not subject.is_new
+    text, name = with_requirement(subject, path, "G[0,9] (speed <= 3)")
+    path.write_text(text)
+    assert (name, list(read_spec(path).requirements)) == ("R1", ["R1"])
+    assert str(load_problem(str(path)).requirement.formula) == "G[0,9] (speed <= 3)"
 
 
 def test_the_grid_follows_the_formula_unless_it_is_stated(folder: Path) -> None:
