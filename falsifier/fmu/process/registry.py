@@ -65,11 +65,13 @@ class Registry:
             runner.stop()
 
     def close(self) -> None:
-        """End all workers and remove their folder."""
+        """End all workers, also in the middle of a simulation, and remove their folder."""
         with self._lock:
             runners, self._runners = self._runners, {}
             workplace, self._workplace = self._workplace, None
-        _close(runners.values())
+        for runner in runners.values():
+            with contextlib.suppress(ModelError):
+                runner.stop()
         if workplace is not None:
             workplace.remove()
 

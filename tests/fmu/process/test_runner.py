@@ -139,6 +139,22 @@ go(2)
     assert_nothing_is_left(tmp_path)
 
 
+def test_a_simulation_in_a_background_thread_does_not_delay_the_end(tmp_path: Path) -> None:
+    body = """
+import threading
+experiment = Experiment(1.0, 0.1, ("y",), None, None, 1e6)
+threading.Thread(target=go, args=(2,), daemon=True).start()
+time.sleep(0.3)
+print("end", flush=True)
+"""
+    with script(body, TMPDIR=str(tmp_path)) as process:
+        try:
+            assert process.communicate(timeout=patience.HANG)[0] == "end\n"
+        finally:
+            process.kill()
+    assert_nothing_is_left(tmp_path)
+
+
 def test_a_forked_copy_starts_workers_of_its_own(tmp_path: Path) -> None:
     body = """
 pid = os.fork()
