@@ -341,7 +341,7 @@ class _Search:
         quantity, other = compared_sides(predicate)
         value, limit = (float(side.evaluate(values)) for side in (quantity, other))
         unit = unit_of(quantity, units) or unit_of(other, units)
-        if isinstance(predicate, Flag) and value in (0.0, 1.0):
+        if isinstance(predicate, Flag) and not unit and value in (0.0, 1.0):
             reading = f"{quantity} was {'true' if value else 'false'}"
         else:
             reading = valued(quantity, values, value - limit, unit)

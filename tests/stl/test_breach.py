@@ -113,6 +113,7 @@ def test_a_boolean_signal_is_true_or_false() -> None:
         "not b was violated from 2 to 3 s: b was true at 2 s"
     )
     assert broken("F[0,1] b", b=[0.0, 0.0]).text == "b held at no time from 0 to 1 s"
+    assert broken("load", load=[0.0]).text == "load was violated at 0 s: load = 0 kN", "a unit: no Boolean"
 
 
 def test_of_random_formulas_what_broke_was_false_all_the_time() -> None:
