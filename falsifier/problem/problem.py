@@ -267,8 +267,11 @@ def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str
         return "its value is given"
     if variable.kind == "string":
         return "a text has no range"
-    if variable.causality == "input" and not variable.is_bounded:
-        return f"no range is given, and the {info.noun} specifies no min and max"
+    if variable.causality == "input":
+        if not variable.is_bounded:
+            return f"no range is given, and the {info.noun} specifies no min and max"
+        low, high = variable.limits
+        return f"it is not named beside what is searched; its range is {low:g} to {high:g}"
     return "no range is given"
 
 

@@ -219,9 +219,11 @@ def test_why_simulations_failed_and_what_was_not_searched_is_told() -> None:
     assert cause.count == result.spent.failures > 1 and not result.evaluations[cause.simulation].verdict
     for text in (result_text(result), results_text([result, replace(result, problem=problem)])):
         assert f"{cause.count} simulations failed: {cause.reason} (for example simulation" in text
-        assert "v = 0 (no range is given)" in text
+        assert "v = 0 (it is not named beside what is searched" in text
         assert "bias" not in text  # nobody expects a parameter without a range to be searched
     data = result_json(result)
     assert data["failures"][0]["count"] == cause.count
     held = {each["name"]: (each["value"], each["reason"]) for each in data["not_searched"]}
-    assert held["v"] == (0.0, "no range is given") and held["bias"] == (0.25, "its value is given")
+    assert held["v"] == (0.0, "it is not named beside what is searched; its range is -1 to 1") and held[
+        "bias"
+    ] == (0.25, "its value is given")
