@@ -186,6 +186,13 @@ def test_keys_cannot_be_read_unless_that_is_allowed(place: Place) -> None:
     assert place.run(READ_KEY, 0, f"read:{place.home / '.ssh'}").split()[0] == "1"
 
 
+def test_what_may_be_changed_above_keys_does_not_show_them(place: Place) -> None:
+    allowed = f"write:{place.home}"
+    assert place.run(CHANGE, HOW["create"], allowed).split()[0] == "1"
+    assert place.run(READ_KEY, 0, allowed).split()[0] == "0"
+    assert place.run(READ_KEY, 0, f"write:{place.home / '.ssh'}").split()[0] == "1", "named itself"
+
+
 def test_a_link_beside_hidden_keys_does_not_lead_to_them(place: Place) -> None:
     (place.home / "links").mkdir()
     (place.home / "links" / ".ssh").symlink_to("../.ssh")

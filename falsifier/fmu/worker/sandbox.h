@@ -9,7 +9,7 @@
 /* The lists end with NULL. All paths are absolute and, but for those of hidden, without symbolic links. */
 struct policy {
     const char **writable; /* may be changed, with all below; the first is the working folder */
-    const char **hidden;   /* may not be read, with all below, except what is readable or writable */
+    const char **hidden;   /* may not be read, with all below, except what is readable, or writable itself */
     const char **readable;
     const char **command;  /* the program that the process becomes; none: it stays this one */
     int programs;          /* may execute programs */

@@ -104,6 +104,16 @@ static void allow_reading(int rules, char *path, size_t length, const char **hid
     closedir(folder);
 }
 
+/* Whether anything hidden is below a folder: what may be changed there may not be read for that. */
+static int is_above_hidden(const char *folder, const char **hidden)
+{
+    const size_t length = strcmp(folder, "/") ? strlen(folder) : 0;
+    for (const char **h = hidden; *h; h++)
+        if (!strncmp(*h, folder, length) && (*h)[length] == '/')
+            return 1;
+    return 0;
+}
+
 static unsigned enter_landlock(const struct policy *policy)
 {
     char path[PATH_MAX] = "";
@@ -126,8 +136,10 @@ static unsigned enter_landlock(const struct policy *policy)
     allow_reading(rules, path, 0, policy->hidden, all.files);
     for (const char **p = policy->readable; *p; p++)
         allow(rules, *p, READING, all.files);
-    for (const char **p = policy->writable; *p; p++)
-        allow(rules, *p, all.files & ~(uint64_t)(RUN_FILE | DEVICE_CALLS), all.files);
+    for (const char **p = policy->writable; *p; p++) {
+        const uint64_t kept = is_above_hidden(*p, policy->hidden) ? READING : 0;
+        allow(rules, *p, all.files & ~(kept | RUN_FILE | DEVICE_CALLS), all.files);
+    }
     for (const char *const *d = devices; *d; d++)
         allow(rules, *d, READ_FILE | WRITE_FILE, all.files);
     const int failed = syscall(RESTRICT_SELF, rules, 0) != 0;
