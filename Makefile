@@ -57,7 +57,7 @@ fmus: .venv-export/installed
 
 # Rebuilds the programs that run FMUs, if their sources have changed.
 worker: .venv-export/installed
-	$(MAKE) -C falsifier/fmu/worker ZIG="$(CURDIR)/.venv-export/bin/python -m ziglang"
+	$(MAKE) -C falsifier/fmu/worker ZIG="'$(CURDIR)/.venv-export/bin/python' -m ziglang"
 
 # Either of these two is enough. pip compiles no modules: most are never imported, and the others then compile.
 .venv/installed: pyproject.toml constraints.txt | .venv/bin/pip

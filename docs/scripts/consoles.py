@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+from shlex import quote
 
 ROOT = Path(__file__).resolve().parents[2]
 _BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
@@ -109,7 +110,7 @@ def _environment(folder: Path) -> dict[str, str]:
     tools.mkdir()
     for name, module in (("python", ""), ("falsifier", "-m falsifier")):
         script = tools / name
-        script.write_text(f'#!/bin/sh\nexec {sys.executable} {module} "$@"\n')
+        script.write_text(f'#!/bin/sh\nexec {quote(sys.executable)} {module} "$@"\n')
         script.chmod(0o755)
     (folder / "falsifier").symlink_to(ROOT)
     kept = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}

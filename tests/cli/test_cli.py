@@ -1,3 +1,4 @@
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -76,7 +77,7 @@ def test_help_names_the_commands(tmp_path: Path) -> None:
 
 
 def test_a_closed_pipe_is_not_a_falsification(tmp_path: Path) -> None:
-    program = f"{sys.executable} -c 'from falsifier.cli import main; main()'"
+    program = f"{shlex.quote(sys.executable)} -c 'from falsifier.cli import main; main()'"
     command = program + " info AT.fmu | true; echo ${PIPESTATUS[0]}"
     environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"}
     done = subprocess.run(

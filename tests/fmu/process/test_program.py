@@ -58,7 +58,7 @@ def test_the_sources_give_the_same_bytes_again(tmp_path: Path) -> None:
     target = f"bin/{platform}/worker"
     shutil.copytree(WORKER, tmp_path / "worker", ignore=shutil.ignore_patterns("bin"))
     subprocess.run(
-        ["make", "--silent", f"ZIG={EXPORT_PYTHON} -m ziglang", target], cwd=tmp_path / "worker", check=True
+        ["make", "--silent", f"ZIG='{EXPORT_PYTHON}' -m ziglang", target], cwd=tmp_path / "worker", check=True
     )
     assert (tmp_path / "worker" / target).read_bytes() == (WORKER / target).read_bytes()
 
