@@ -62,7 +62,7 @@ class LLMSettings(_Strict):
 
     @field_validator("options")
     @classmethod
-    def _without_keys(cls, options: dict[str, str | int | float]) -> dict[str, str | float]:
+    def _without_keys(cls, options: dict[str, str | int | float]) -> dict[str, str | int | float]:
         for name in filter(is_secret_option, options):
             raise ValueError(
                 f"{name}: may contain a key; keys are read from the environment only, because requests are "
