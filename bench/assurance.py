@@ -44,7 +44,7 @@ from falsifier import (
     assess,
     parse,
 )
-from falsifier.search.assurance.splitting import split
+from falsifier.analyses.splitting import split
 
 Cost = Callable[[NDArray[np.float64]], float]
 

@@ -21,11 +21,9 @@ from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
-from falsifier.search.budget import Budget
-from falsifier.search.journal import open_journal, read_journal, save_trajectory, write_manifest
-from falsifier.search.loop import search
-from falsifier.search.manifest import describe, environment
-from falsifier.search.records import (
+from falsifier.record.journal import open_journal, read_journal, save_trajectory, write_manifest
+from falsifier.record.manifest import describe, environment
+from falsifier.record.records import (
     AskedRecord,
     ConfirmedRecord,
     EndedRecord,
@@ -34,8 +32,10 @@ from falsifier.search.records import (
     VerdictRecord,
     line_of,
 )
+from falsifier.record.run import falsify
+from falsifier.search.budget import Budget
+from falsifier.search.loop import search
 from falsifier.search.request import RunRequest
-from falsifier.search.run import falsify
 from falsifier.search.steps import Live
 from falsifier.views.report import html_report
 

@@ -29,7 +29,7 @@ from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.starter import starter_spec
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.views.model_text import info_text
 
 HERE = Path(__file__).parent

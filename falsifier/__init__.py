@@ -9,7 +9,7 @@
 
 Heavy dependencies (numba, litellm, matplotlib) are imported on first use.
 
-The code is divided into thirteen packages. Each imports only from itself and from those above it::
+The code is divided into fifteen packages. Each imports only from itself and from those above it::
 
     core/             signals, search spaces, candidates, trajectories, models
     stl/              formulas, robustness and critical time
@@ -19,7 +19,9 @@ The code is divided into thirteen packages. Each imports only from itself and fr
     evaluation/       simulating and judging one candidate
     llm/              asking language models
     engines/          suggesting the next candidates
-    search/           one run: the loop, its budget, its record
+    search/           the loop that asks, simulates and judges within a budget
+    record/           a run and its record: starting, resuming, journal, manifest
+    analyses/         coverage, assurance, margins, lint, formalizing
     counterexamples/  storing, shrinking, explaining, exporting
     campaigns/        runs of requirements x methods x seeds
     views/            terminal text, figures, reports
@@ -35,6 +37,12 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from falsifier.analyses.assess import Assurance, Searched, assess
+    from falsifier.analyses.coverage import Coverage, coverage
+    from falsifier.analyses.formalize import Difference, Formalized, Reading, formalize
+    from falsifier.analyses.lint import LintFinding, lint
+    from falsifier.analyses.margin import Margin, margin
+    from falsifier.analyses.splitting import Splitting
     from falsifier.campaigns import (
         CampaignRequest,
         Method,
@@ -80,17 +88,12 @@ if TYPE_CHECKING:
     from falsifier.problem.problem import Problem
     from falsifier.problem.requirement import Requirement
     from falsifier.problem.source import ProblemSource
+    from falsifier.record.run import falsify, resume
     from falsifier.search import events
-    from falsifier.search.assurance import Assurance, Searched, Splitting, assess
     from falsifier.search.budget import Budget, Spent
-    from falsifier.search.coverage import Coverage, coverage
     from falsifier.search.events import Event, Listener
-    from falsifier.search.formalize import Difference, Formalized, Reading, formalize
-    from falsifier.search.lint import LintFinding, lint
-    from falsifier.search.margin import Margin, margin
     from falsifier.search.request import LLMSettings
     from falsifier.search.result import Result
-    from falsifier.search.run import falsify, resume
     from falsifier.stl import Breach, Diagnosis, Formula, Monitor, Verdict, parse
     from falsifier.views import plotting
     from falsifier.views.plotting import Figure as Figure
@@ -99,7 +102,7 @@ if TYPE_CHECKING:
 
 _EXPORTS = {
     "AsksLLM": "falsifier.engines.protocol",
-    "Assurance": "falsifier.search.assurance",
+    "Assurance": "falsifier.analyses.assess",
     "Breach": "falsifier.stl",
     "Budget": "falsifier.search.budget",
     "CampaignRequest": "falsifier.campaigns",
@@ -110,9 +113,9 @@ _EXPORTS = {
     "Connection": "falsifier.fmu",
     "DEFAULT_ENGINE": "falsifier.engines",
     "Coupling": "falsifier.fmu",
-    "Coverage": "falsifier.search.coverage",
+    "Coverage": "falsifier.analyses.coverage",
     "Diagnosis": "falsifier.stl",
-    "Difference": "falsifier.search.formalize",
+    "Difference": "falsifier.analyses.formalize",
     "ENGINES": "falsifier.engines",
     "Engine": "falsifier.engines.protocol",
     "Evaluation": "falsifier.evaluation.evaluate",
@@ -122,16 +125,16 @@ _EXPORTS = {
     "Explanation": "falsifier.counterexamples.explain",
     "FalsifierError": "falsifier.errors",
     "FmuModel": "falsifier.fmu",
-    "Formalized": "falsifier.search.formalize",
+    "Formalized": "falsifier.analyses.formalize",
     "Formula": "falsifier.stl",
     "Frame": "falsifier.fmu",
     "Freedom": "falsifier.core.space",
     "FunctionModel": "falsifier.core.model",
     "InputRange": "falsifier.core.space",
     "LLMSettings": "falsifier.search.request",
-    "LintFinding": "falsifier.search.lint",
+    "LintFinding": "falsifier.analyses.lint",
     "Listener": "falsifier.search.events",
-    "Margin": "falsifier.search.margin",
+    "Margin": "falsifier.analyses.margin",
     "Method": "falsifier.campaigns",
     "Model": "falsifier.core.model",
     "ModelInfo": "falsifier.core.model",
@@ -139,7 +142,7 @@ _EXPORTS = {
     "ParameterRange": "falsifier.core.space",
     "Problem": "falsifier.problem.problem",
     "ProblemSource": "falsifier.problem.source",
-    "Reading": "falsifier.search.formalize",
+    "Reading": "falsifier.analyses.formalize",
     "RecordedChat": "falsifier.llm.replay",
     "Replayed": "falsifier.counterexamples.store",
     "Requirement": "falsifier.problem.requirement",
@@ -147,33 +150,33 @@ _EXPORTS = {
     "RobustnessMap": "falsifier.counterexamples.robustness_map",
     "ScriptedChat": "falsifier.llm.scripted",
     "SearchSpace": "falsifier.core.space",
-    "Searched": "falsifier.search.assurance",
+    "Searched": "falsifier.analyses.assess",
     "Shrunk": "falsifier.counterexamples.shrink",
     "Signal": "falsifier.core.signals",
     "Spent": "falsifier.search.budget",
-    "Splitting": "falsifier.search.assurance",
+    "Splitting": "falsifier.analyses.splitting",
     "StoredCounterexample": "falsifier.counterexamples.store",
     "System": "falsifier.fmu",
     "Trajectory": "falsifier.core.trajectory",
     "VARIANTS": "falsifier.llm.prompts",
     "Variable": "falsifier.core.model",
     "Verdict": "falsifier.stl",
-    "assess": "falsifier.search.assurance",
+    "assess": "falsifier.analyses.assess",
     "confirm": "falsifier.evaluation.confirm",
     "connect": "falsifier.llm.connect",
-    "coverage": "falsifier.search.coverage",
+    "coverage": "falsifier.analyses.coverage",
     "cross": "falsifier.campaigns",
     "evaluate": "falsifier.evaluation.evaluate",
     "explain": "falsifier.counterexamples.explain",
-    "falsify": "falsifier.search.run",
-    "formalize": "falsifier.search.formalize",
-    "lint": "falsifier.search.lint",
+    "falsify": "falsifier.record.run",
+    "formalize": "falsifier.analyses.formalize",
+    "lint": "falsifier.analyses.lint",
     "load_counterexample": "falsifier.counterexamples.store:load",
     "load_problem": "falsifier.problem.loading",
     "load_problems": "falsifier.problem.loading",
     "make_engine": "falsifier.engines",
     "make_llm_engine": "falsifier.engines.llm",
-    "margin": "falsifier.search.margin",
+    "margin": "falsifier.analyses.margin",
     "monitor_for": "falsifier.evaluation.evaluate",
     "parse": "falsifier.stl",
     "plot": "falsifier.views.plotting",
@@ -182,7 +185,7 @@ _EXPORTS = {
     "read_info": "falsifier.fmu",
     "read_package": "falsifier.fmu",
     "replay": "falsifier.counterexamples.store",
-    "resume": "falsifier.search.run",
+    "resume": "falsifier.record.run",
     "resume_campaign": "falsifier.campaigns",
     "robustness_map": "falsifier.counterexamples.robustness_map",
     "run_campaign": "falsifier.campaigns",

@@ -1,6 +1,6 @@
 """Compiles everything once, so that tests side by side need not each do it: ``python -m tests.compiling``."""
 
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 
 

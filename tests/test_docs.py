@@ -24,7 +24,7 @@ from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS
 from falsifier.problem.spec import Spec, parse_spec
 from falsifier.problem.templates import TEMPLATES
-from falsifier.search.manifest import Manifest
+from falsifier.record.manifest import Manifest
 from tests.command import ROOT, forked
 
 WRITTEN = [

@@ -27,7 +27,7 @@ from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.search.journal import read_journal, recorded_candidates
+from falsifier.record.journal import read_journal, recorded_candidates
 
 Matrix = NDArray[np.float64]
 Finder = Callable[[str, str, float | None], Problem]

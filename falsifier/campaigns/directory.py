@@ -20,7 +20,7 @@ from falsifier.campaigns.plan import CampaignRequest
 from falsifier.core.files import write_whole
 from falsifier.core.sealing import check_seal, seal
 from falsifier.errors import JournalError, rejected
-from falsifier.search.journal import holds_run
+from falsifier.record.journal import holds_run
 from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"

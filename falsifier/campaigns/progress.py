@@ -14,11 +14,11 @@ from falsifier.campaigns.directory import (
     run_directory,
 )
 from falsifier.campaigns.plan import Method, method_of
-from falsifier.search import manifest
+from falsifier.record import manifest
+from falsifier.record.journal import JournalReader
+from falsifier.record.tally import FINISHED, RunStatus, Tally
 from falsifier.search.budget import Spent
-from falsifier.search.journal import JournalReader
 from falsifier.search.request import RunRequest
-from falsifier.search.tally import FINISHED, RunStatus, Tally
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

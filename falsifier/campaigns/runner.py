@@ -26,13 +26,13 @@ from falsifier.evaluation.workers import Workers, open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record.journal import holds_run, open_journal, write_manifest
+from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, read
+from falsifier.record.records import EndedRecord
+from falsifier.record.tally import read_tally
 from falsifier.search.budget import Budget
-from falsifier.search.journal import holds_run, open_journal, write_manifest
 from falsifier.search.leaders import check_names, told_problems
-from falsifier.search.manifest import check_unchanged, describe, environment, file_hashes, read
-from falsifier.search.records import EndedRecord
 from falsifier.search.request import RunRequest
-from falsifier.search.tally import read_tally
 
 Listener = Callable[[Progress], None]
 

@@ -23,10 +23,10 @@ from falsifier.campaigns.directory import STOP, campaign_mark, run_directory
 from falsifier.core import operating_system
 from falsifier.fmu import fmu_files, with_local_files
 from falsifier.problem.problem import Problem
+from falsifier.record.manifest import Manifest
+from falsifier.record.run import carry_out
 from falsifier.search.events import Evaluated, Event
-from falsifier.search.manifest import Manifest
 from falsifier.search.request import RunRequest
-from falsifier.search.run import carry_out
 
 # Time in s to wait for a run's lock: the workers of a killed campaign take a moment to end.
 _PATIENCE = 10.0

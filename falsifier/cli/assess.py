@@ -27,8 +27,8 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
-from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.search.manifest import read as read_manifest
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -77,7 +77,7 @@ def assess(
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the draws so far count.
     """
-    from falsifier.search.assurance import assess as assess_problem
+    from falsifier.analyses.assess import assess as assess_problem
 
     def said(count: int) -> None:
         if not quiet and count % _SAID_EVERY == 0:
@@ -137,8 +137,8 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.search.margin import PLACE
-    from falsifier.search.margin import margin as find_margin
+    from falsifier.analyses.margin import PLACE
+    from falsifier.analyses.margin import margin as find_margin
 
     low, high = _between(between)
     if options["stl"] is not None:

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import click
 
+from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.cli.files import draw
 from falsifier.cli.options import directory_argument, json_option, out_option
 from falsifier.cli.output import say
-from falsifier.search import manifest
-from falsifier.search.coverage import coverage as coverage_of_run
+from falsifier.record import manifest
 from falsifier.views.coverage_text import coverage_json, coverage_text
 
 

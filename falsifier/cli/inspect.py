@@ -211,7 +211,7 @@ def check(*, target: str, profile: str | None, template: str | None) -> None:
 
     With --template, only the requirement that the template makes of TARGET, a spec or FMU.
     """
-    from falsifier.search.lint import hidden_margin
+    from falsifier.search.vacuity import hidden_margin
 
     if template is None:
         problems = load_problems(target, profile=profile)
@@ -245,8 +245,8 @@ def schema(*, what: str) -> None:
 def _schema(what: str) -> dict[str, Any]:
     from falsifier.campaigns.directory import CampaignRecord
     from falsifier.problem.spec import Spec
-    from falsifier.search.manifest import Manifest
-    from falsifier.search.records import RECORDS
+    from falsifier.record.manifest import Manifest
+    from falsifier.record.records import RECORDS
 
     models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
     return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()

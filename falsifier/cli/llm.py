@@ -77,8 +77,8 @@ def prompt(
     """
     from falsifier.engines.hybrid import Settings as HybridSettings
     from falsifier.engines.preview import preview, preview_tool
-    from falsifier.search.journal import read_journal, recorded_evaluations
-    from falsifier.search.questions import doubtful_confirmations
+    from falsifier.record.journal import read_journal, recorded_evaluations
+    from falsifier.record.questions import doubtful_confirmations
 
     if at is not None:
         say(_sent(Path(options["target"]), at, as_json=as_json))
@@ -115,7 +115,7 @@ def prompt(
 
 def _limit(directory: Path | None) -> int | None:
     """Maximum number of simulations of a run, or of one with the usual budget."""
-    from falsifier.search import manifest
+    from falsifier.record import manifest
     from falsifier.search.budget import DEFAULT_SIMULATIONS
 
     return manifest.read(directory).request.budget.simulations if directory else DEFAULT_SIMULATIONS
@@ -123,7 +123,7 @@ def _limit(directory: Path | None) -> int | None:
 
 def _check_same(directory: Path, problem: "Problem") -> None:
     """Check that a run's samples are those of the problem's model and requirement."""
-    from falsifier.search import manifest
+    from falsifier.record import manifest
 
     described = manifest.read(directory)
     if (described.model, True) != (problem.info.name, problem.name in described.names):
@@ -135,8 +135,8 @@ def _check_same(directory: Path, problem: "Problem") -> None:
 
 def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
     """The last question that was asked before a sample of a run was simulated, and its reply."""
-    from falsifier.search.journal import holds_run, read_journal, recorded_candidates
-    from falsifier.search.questions import exchange_before
+    from falsifier.record.journal import holds_run, read_journal, recorded_candidates
+    from falsifier.record.questions import exchange_before
 
     if not holds_run(directory):
         raise JournalError(

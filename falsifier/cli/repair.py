@@ -9,9 +9,9 @@ from falsifier.cli.options import directory_argument
 from falsifier.cli.output import say
 from falsifier.counterexamples.store import load
 from falsifier.errors import JournalError, SpecError
-from falsifier.search.journal import holds_run
-from falsifier.search.repair import repair as repair_run
-from falsifier.search.repair import set_aside
+from falsifier.record.journal import holds_run
+from falsifier.record.repair import repair as repair_run
+from falsifier.record.repair import set_aside
 
 
 @click.command()

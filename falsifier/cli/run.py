@@ -120,7 +120,7 @@ def run(
     """
     from falsifier.problem.loading import load_source
     from falsifier.problem.refinement import widened
-    from falsifier.search.run import falsify
+    from falsifier.record.run import falsify
     from falsifier.views.fmu_log import FmuLog
     from falsifier.views.progress import make_display
 
@@ -184,7 +184,7 @@ def resume(
     """
     from falsifier.campaigns.directory import is_campaign, run_directories
     from falsifier.cli.campaign import resume_campaign
-    from falsifier.search.run import resume as resume_run
+    from falsifier.record.run import resume as resume_run
     from falsifier.views.progress import make_display
 
     given = (total_budget, total_seconds, total_tokens, total_cost)

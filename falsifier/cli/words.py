@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from falsifier.analyses.lint import SIMULATIONS, LintFinding
+from falsifier.analyses.lint import lint as find
 from falsifier.cli.llm_options import (
     connection_options,
     connection_settings,
@@ -28,11 +30,9 @@ from falsifier.core.words import counted
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.subject import Subject, subject_of, with_requirement
-from falsifier.search.lint import SIMULATIONS, LintFinding
-from falsifier.search.lint import lint as find
 
 if TYPE_CHECKING:
-    from falsifier.search.formalize import Formalized
+    from falsifier.analyses.formalize import Formalized
 
 
 @click.command()
@@ -123,7 +123,7 @@ def formalize(
     if choose is not None or name is not None or out is not None:  # before anything is paid for
         subject = subject_of(target)
         with_requirement(subject, _file(subject, out), "true", name=name)
-    from falsifier.search.formalize import formalize as ask
+    from falsifier.analyses.formalize import formalize as ask
 
     found = ask(target, sentence, settings)
     written = None

@@ -10,8 +10,8 @@ from falsifier.engines.starting import KNOWN
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.problem import Problem
-from falsifier.search import manifest
-from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record import manifest
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
 
 
 def known_inputs(place: Path, problem: Problem) -> Fitted:

@@ -18,9 +18,9 @@ from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
-from falsifier.search import manifest
-from falsifier.search.journal import holds_run
-from falsifier.search.manifest import Manifest
+from falsifier.record import manifest
+from falsifier.record.journal import holds_run
+from falsifier.record.manifest import Manifest
 from falsifier.stl.margins import signed
 
 

@@ -8,9 +8,9 @@ from falsifier.counterexamples.store import Database, Replayed, replay, to_store
 from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.problem import Problem
+from falsifier.record.run import falsify
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.result import Result
-from falsifier.search.run import falsify
 
 
 @dataclass(frozen=True, slots=True)

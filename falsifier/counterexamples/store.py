@@ -29,10 +29,10 @@ from falsifier.fmu import fmu_files, fmus_sha256
 from falsifier.problem.loading import load_source, reloadable, spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource, Target
-from falsifier.search import manifest
-from falsifier.search.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.search.manifest import RequirementRecord
-from falsifier.search.records import ConfirmedRecord
+from falsifier.record import manifest
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.manifest import RequirementRecord
+from falsifier.record.records import ConfirmedRecord
 from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
 

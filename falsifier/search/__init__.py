@@ -1,1 +1,1 @@
-"""One run: the loop that asks an engine, simulates and judges within a budget, and its record on disk."""
+"""The loop that asks an engine, simulates and judges within a budget, and what it needs and returns."""

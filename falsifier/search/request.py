@@ -1,7 +1,7 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
@@ -11,11 +11,14 @@ from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.journal import Keep
 from falsifier.search.moves import Objective
 
 # A negative price, or one that is not a number, would switch off the limit on the cost.
 _Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+# Which trajectories a record keeps. history: the first ones, then each that improves on the best; best: only
+# the best one, for campaigns of very many runs.
+Keep = Literal["history", "best"]
 
 
 class _Strict(BaseModel):

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from falsifier.analyses.coverage import Coverage, ModeCoverage, PairCoverage, RangeCoverage
+from falsifier.analyses.parts import FAST, PACES, SLOW
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, listed
-from falsifier.search.coverage import Coverage, ModeCoverage, PairCoverage, RangeCoverage
-from falsifier.search.parts import FAST, PACES, SLOW
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8

@@ -12,8 +12,8 @@ from pathlib import Path
 from falsifier.core.words import counted, in_one_line
 from falsifier.llm.messages import Exchange, Message
 from falsifier.llm.tokens import count_tokens
-from falsifier.search.journal import read_journal
-from falsifier.search.questions import Iteration, Outcome, iterations
+from falsifier.record.journal import read_journal
+from falsifier.record.questions import Iteration, Outcome, iterations
 from falsifier.views.html import Html, el, join
 
 # Characters of a part's first line that name it.

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
+from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.problem.template_advice import Advice, hint
-from falsifier.search.formalize import Difference, Formalized, Reading
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.sparkline import trace_lines
 from falsifier.views.text import llm_use

@@ -6,13 +6,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from falsifier.analyses.assess import Assurance
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
-from falsifier.search import manifest
-from falsifier.search.assurance import Assurance
+from falsifier.record import manifest
 from falsifier.search.budget import Spent
 from falsifier.search.levels import Outcome, outcomes
 from falsifier.search.parameterization import parameterization_note, parameterization_of

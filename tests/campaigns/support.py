@@ -12,9 +12,9 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.evaluation.workers import Workers
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record.journal import write_manifest
+from falsifier.record.manifest import describe
 from falsifier.search.budget import Budget
-from falsifier.search.journal import write_manifest
-from falsifier.search.manifest import describe
 from falsifier.search.request import RunRequest
 from tests.fmu.fixtures import path as fixture
 

@@ -13,7 +13,7 @@ from falsifier.campaigns.directory import (
     write_campaign,
 )
 from falsifier.errors import JournalError
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from tests.problems import impossible
 
 

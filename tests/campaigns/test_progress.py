@@ -6,8 +6,8 @@ import pytest
 from falsifier.campaigns import Follower, Method, Progress, RunProgress
 from falsifier.campaigns.progress import total
 from falsifier.errors import JournalError
+from falsifier.record.tally import RunStatus
 from falsifier.search.budget import Spent
-from falsifier.search.tally import RunStatus
 
 
 def run(

@@ -15,8 +15,8 @@ from falsifier.campaigns.directory import locked, run_directory
 from falsifier.counterexamples.store import load, problem_of, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.source import ProblemSource
+from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
-from falsifier.search.run import falsify
 from tests import problems
 from tests.campaigns.support import outcomes, request, work_in_threads
 

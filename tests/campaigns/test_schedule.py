@@ -13,8 +13,8 @@ from falsifier.campaigns.schedule import Schedule
 from falsifier.campaigns.work import Done, Missing, Task
 from falsifier.evaluation.workers import Workers
 from falsifier.problem.source import ProblemSource
+from falsifier.record.manifest import describe
 from falsifier.search.budget import Budget
-from falsifier.search.manifest import describe
 from falsifier.search.request import LLMSettings, RunRequest
 from tests.patience import HANG
 from tests.problems import easy

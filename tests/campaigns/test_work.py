@@ -13,10 +13,10 @@ from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record.journal import read_journal
+from falsifier.record.manifest import describe
+from falsifier.record.records import EvaluatedRecord
 from falsifier.search.budget import Budget
-from falsifier.search.journal import read_journal
-from falsifier.search.manifest import describe
-from falsifier.search.records import EvaluatedRecord
 from falsifier.search.request import RunRequest
 from tests.problems import easy
 

@@ -1,7 +1,7 @@
 import json
 from pathlib import Path
 
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from tests.command import falsifier
 
 HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"

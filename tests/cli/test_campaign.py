@@ -8,8 +8,8 @@ from falsifier.campaigns import Follower
 from falsifier.campaigns.directory import locked
 from falsifier.context.values import Level
 from falsifier.errors import JournalError, SpecError
-from falsifier.search import manifest
-from falsifier.search.run import falsify
+from falsifier.record import manifest
+from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 from tests.cli.support import HARD, NEVER, bench
 from tests.command import falsifier

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.search.journal import read_journal, write_manifest
-from falsifier.search.records import AskedRecord, ExchangeRecord
+from falsifier.record.journal import read_journal, write_manifest
+from falsifier.record.records import AskedRecord, ExchangeRecord
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
 from tests.llm.server import Step, serving

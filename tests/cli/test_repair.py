@@ -6,7 +6,7 @@ from click.testing import CliRunner
 from falsifier.campaigns.analysis import load as load_runs
 from falsifier.cli import cli
 from falsifier.errors import JournalError
-from falsifier.search.journal import read_journal
+from falsifier.record.journal import read_journal
 from tests.hostile.test_damage import Numeric
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import JournalError
-from falsifier.search.journal import read_journal, write_manifest
-from falsifier.search.run import falsify
+from falsifier.record.journal import read_journal, write_manifest
+from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier, listen_to_interrupts
 from tests.fmu.fixtures import path as fixture

@@ -9,11 +9,11 @@ from falsifier.cli import cli
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.spec import read_spec
+from tests.analyses.test_lint import SPEC
 from tests.cli.support import ENV
 from tests.command import falsifier
 from tests.llm.server import Server, Step, serving
 from tests.problem.support import AT, spec
-from tests.search.test_lint import SPEC
 
 WIDE = SPEC + "[requirements.R]\nformula = 'G[0,20] (throttle <= 100)'\n"
 
@@ -147,7 +147,7 @@ def test_on_a_terminal_it_asks(
 ) -> None:
     monkeypatch.setattr("falsifier.cli.words._may_ask", lambda: True)
     monkeypatch.setattr(
-        "falsifier.search.formalize.open_chat", lambda _settings: ScriptedChat([REPLY.content or ""])
+        "falsifier.analyses.formalize.open_chat", lambda _settings: ScriptedChat([REPLY.content or ""])
     )
     path = spec(tmp_path, WIDE)
     done = CliRunner().invoke(cli, ["formalize", path, SENTENCE, "--llm", "openai/gpt-5-mini"], input=typed)

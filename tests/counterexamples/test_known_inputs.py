@@ -8,7 +8,7 @@ from falsifier.counterexamples.store import save, to_store
 from falsifier.errors import CandidateError, FalsifierError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import simulate
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 
 

@@ -13,7 +13,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.problems import never

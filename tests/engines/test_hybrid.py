@@ -24,9 +24,9 @@ from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
-from falsifier.search.journal import holds_run
+from falsifier.record.journal import holds_run
+from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
 from falsifier.stl import Verdict
 from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag, lag_problem, simulated
 from tests.engines.support import HASTY, wide_problem

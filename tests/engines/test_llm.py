@@ -27,12 +27,12 @@ from falsifier.llm.retry import Gate, RetryingChat
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
+from falsifier.record.journal import holds_run, read_journal
+from falsifier.record.records import ExchangeRecord
+from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Event, Exchanged
-from falsifier.search.journal import holds_run, read_journal
-from falsifier.search.records import ExchangeRecord
 from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
 from falsifier.testing import EngineContract, lag_problem
 from tests.llm.server import Step, serving
 

@@ -17,11 +17,11 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.record.journal import holds_run, read_journal
+from falsifier.record.records import ExchangeRecord
+from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.journal import holds_run, read_journal
-from falsifier.search.records import ExchangeRecord
 from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
 from falsifier.testing import drive, simulated
 from tests.engines.support import wide_problem
 from tests.engines.test_hybrid import SETTINGS

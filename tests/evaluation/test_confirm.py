@@ -9,7 +9,7 @@ from falsifier.evaluation.confirm import confirm, half_step, other_interface
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.stl import second_monitor
 from falsifier.testing import lag_problem
 from tests.stepped import euler_problem

@@ -20,9 +20,9 @@ from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.search.repair import repair
+from falsifier.record.repair import repair
+from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.hostile.damage import DAMAGES, blank, cut, double_line, flip, lose_line

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import load
 from falsifier.cli import run as command
+from falsifier.record.journal import Journal
+from falsifier.record.run import falsify
 from falsifier.search.events import Confirmed, Event, RunEnded
-from falsifier.search.journal import Journal
-from falsifier.search.run import falsify
 from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier
 from tests.problems import easy, impossible

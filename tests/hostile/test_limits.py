@@ -19,10 +19,10 @@ from falsifier.llm.failures import TransientChatError, classify
 from falsifier.llm.messages import ChatRequest, Message
 from falsifier.llm.tokens import count_tokens
 from falsifier.llm.usage import Price, usage_of
+from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings
 from falsifier.search.result import Result
-from falsifier.search.run import falsify
 from falsifier.testing import lag_problem
 from tests.command import falsifier
 from tests.hostile.servers import Behaviour, answers, misbehaving

@@ -35,9 +35,9 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import parse_spec
 from falsifier.problem.starter import starter_spec
+from falsifier.record.run import falsify
 from falsifier.search.request import RunRequest
 from falsifier.search.result import Result
-from falsifier.search.run import falsify
 from falsifier.stl import parse
 from falsifier.stl.names import name_text
 from falsifier.testing import lag_problem

@@ -16,9 +16,9 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
+from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
-from falsifier.search.run import falsify
 from falsifier.testing import lag_problem
 from tests.hostile.servers import (
     GOOD,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.analyses.assess import assess
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace, ValueKind
@@ -15,18 +16,17 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
-from falsifier.search.assurance.assess import assess
+from falsifier.record.journal import read_journal
+from falsifier.record.records import AskedRecord, EndedRecord, EvaluatedRecord
+from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
-from falsifier.search.journal import read_journal
 from falsifier.search.loop import search
-from falsifier.search.records import AskedRecord, EndedRecord, EvaluatedRecord
-from falsifier.search.run import falsify
 from falsifier.search.steps import Live
 from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
 from tests.problems import broken, mostly_broken, never
-from tests.search.support import run
+from tests.record.support import run
 
 
 def test_stops_at_the_first_confirmed_violation() -> None:
@@ -256,5 +256,5 @@ def test_a_hybrid_goes_on_without_its_language_model() -> None:
 
 def test_what_prepares_a_run_counts_such_as_the_import_of_litellm(monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = iter([0.0, 61.0])
-    monkeypatch.setattr("falsifier.search.run.perf_counter", lambda: next(ticks))
+    monkeypatch.setattr("falsifier.record.run.perf_counter", lambda: next(ticks))
     assert falsify(lag_problem(), "uniform", budget=Budget(5, seconds=60.0)).status == "failed"

@@ -7,6 +7,7 @@ from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.box import BoxEngine
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
+from falsifier.record.run import falsify
 from falsifier.search.events import Event, RunStarted
 from falsifier.search.levels import Level
 from falsifier.search.parameterization import (
@@ -17,7 +18,6 @@ from falsifier.search.parameterization import (
     searched_space,
 )
 from falsifier.search.request import LLMSettings
-from falsifier.search.run import falsify
 from falsifier.testing import FREE, lag_problem
 from tests.fmu.fixtures import path as fmu_path
 

@@ -10,7 +10,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.errors import CandidateError, JournalError, SpecError
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.search.run import falsify, resume
+from falsifier.record.run import falsify, resume
 from falsifier.testing import START, lag_problem
 
 

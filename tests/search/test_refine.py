@@ -10,13 +10,13 @@ from falsifier.counterexamples.nearest_miss import nearest_miss
 from falsifier.engines import make_engine
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_problem
-from falsifier.search import manifest
+from falsifier.record import manifest
+from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.levels import outcomes
 from falsifier.search.refine import level_starts
 from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
 from falsifier.testing import BIAS, FREE, START, lag_problem
 from tests.problems import fast_only
 

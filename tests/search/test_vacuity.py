@@ -8,9 +8,9 @@ from falsifier.campaigns.analysis import load_run
 from falsifier.core.files import bundled
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+from falsifier.record.run import falsify, resume
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.findings import Finding
-from falsifier.search.run import falsify, resume
 from falsifier.testing import Array, lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text

@@ -1,10 +1,10 @@
 import json
 
 from falsifier import Candidate, Signal
-from falsifier.search.coverage import coverage_of
-from falsifier.search.manifest import InputRecord
+from falsifier.analyses.coverage import coverage_of
+from falsifier.record.manifest import InputRecord
 from falsifier.views.coverage_text import coverage_json, coverage_text
-from tests.search.test_coverage import described
+from tests.analyses.test_coverage import described
 
 RANGES = (
     InputRecord(name="throttle", low=0.0, high=100.0, unit="%"),

@@ -8,7 +8,7 @@ import pytest
 
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.notebook import result_html
 from falsifier.views.report import html_report

@@ -1,8 +1,8 @@
 import json
 
+from falsifier.analyses.formalize import formalize
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.template_advice import Advice
-from falsifier.search.formalize import formalize
 from falsifier.views.readings_text import advice_text, formalized_json, formalized_text
 
 SOME = [{"name": "speed", "times": [0, 1, 2, 50], "values": [0, 100, 0, 0]}]

@@ -8,12 +8,12 @@ from falsifier.engines import make_engine
 from falsifier.engines.llm import make_llm_engine
 from falsifier.errors import ChatError
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.findings import Finding
 from falsifier.search.levels import Level
 from falsifier.search.result import Result
-from falsifier.search.run import falsify, resume
 from falsifier.testing import lag_problem
 from falsifier.views.text import (
     counterexample_name,

@@ -16,11 +16,11 @@ from falsifier.campaigns.plan import Method, method_of
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.problem.defaults import STL_NAME
-from falsifier.search import manifest as manifests
+from falsifier.record import manifest as manifests
+from falsifier.record.manifest import Manifest
+from falsifier.record.tally import RunStatus, read_tally
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding
-from falsifier.search.manifest import Manifest
-from falsifier.search.tally import RunStatus, read_tally
 from falsifier.stl.verdict import Verdict
 
 if TYPE_CHECKING:

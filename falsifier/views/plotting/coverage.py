@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
+from falsifier.analyses.parts import labels_of
 from falsifier.core.words import counted
-from falsifier.search.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
-from falsifier.search.parts import labels_of
 from falsifier.views.plotting.axes import caption, whole_ticks
 
 if TYPE_CHECKING:

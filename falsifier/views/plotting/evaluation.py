@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from falsifier.analyses.parts import labels_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-from falsifier.search.parts import labels_of
 from falsifier.search.result import Result
 from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict

@@ -12,7 +12,7 @@ from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
 from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
-from falsifier.search.journal import read_journal, recorded_candidates, recorded_trajectory
+from falsifier.record.journal import read_journal, recorded_candidates, recorded_trajectory
 from falsifier.search.levels import outcomes
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse

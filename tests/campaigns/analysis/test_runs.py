@@ -6,13 +6,13 @@ import pytest
 from falsifier.campaigns.analysis import columns, frame, histories, load, load_run
 from falsifier.errors import JournalError
 from falsifier.problem.source import ProblemSource
-from falsifier.search.journal import (
+from falsifier.record.journal import (
     read_journal,
     recorded_evaluations,
     write_manifest,
 )
-from falsifier.search.manifest import describe
-from falsifier.search.records import (
+from falsifier.record.manifest import describe
+from falsifier.record.records import (
     AskedRecord,
     EvaluatedRecord,
     Record,
@@ -102,6 +102,6 @@ def test_loading_reads_each_line_once_and_passes_over_the_candidates(
         parsed.append(record.kind)
         return record
 
-    monkeypatch.setattr("falsifier.search.journal.parse_line", counted)
+    monkeypatch.setattr("falsifier.record.journal.parse_line", counted)
     assert load_run(tmp_path).simulations == 1000
     assert parsed == ["evaluated"] * 1000

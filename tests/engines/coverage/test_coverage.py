@@ -5,7 +5,7 @@ import pytest
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.engines.coverage import Coverage
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.testing import drive, lag_problem
 from tests.engines.coverage.support import lock_problem, safe_problem
 from tests.engines.support import NamedEngine

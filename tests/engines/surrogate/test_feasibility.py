@@ -8,7 +8,7 @@ from falsifier.engines.grid import Grid
 from falsifier.engines.layout import planning_layout
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.surrogate import Surrogate
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.testing import Array, lag, lag_problem
 from tests.engines.support import HASTY
 

@@ -19,7 +19,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.stl import parse
 from falsifier.testing import BIAS, FREE, START, Array, EngineContract, drive, lag, lag_problem
 from tests.engines.coverage.support import lock_problem

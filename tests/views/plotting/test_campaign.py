@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from falsifier.campaigns.analysis import load
-from falsifier.search.journal import read_journal, recorded_evaluations
+from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.views.plotting import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from tests.views.plotting.support import xs, ys
 

@@ -1,11 +1,11 @@
 import numpy as np
 
 from falsifier import Candidate, Signal, Trajectory
-from falsifier.search.coverage import coverage_of
-from falsifier.search.manifest import InputRecord
+from falsifier.analyses.coverage import coverage_of
+from falsifier.record.manifest import InputRecord
 from falsifier.views.plotting import plot_coverage, png
+from tests.analyses.test_coverage import TIMES, described
 from tests.pictures import colours
-from tests.search.test_coverage import TIMES, described
 from tests.views.plotting.support import ys
 
 NEVER = "#f2b8b0"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
+from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
-from falsifier.search.run import falsify
 from falsifier.testing import lag_problem
 from falsifier.views.report import junit_report, markdown_report
 from falsifier.views.report.content import gather, run_command

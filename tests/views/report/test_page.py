@@ -16,7 +16,7 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.search.run import falsify
+from falsifier.record.run import falsify
 from falsifier.views.report import html_report
 from falsifier.views.report.plots import scripts
 from tests.problems import easy

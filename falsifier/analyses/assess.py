@@ -1,0 +1,332 @@
+"""What a search that found nothing cannot say: how probable a violation is, at most.
+
+The bounds are those of Clopper and Pearson, The use of confidence or fiducial limits illustrated in the case
+of the binomial, Biometrika 26 (1934) 404-413. They hold for every system and every number of draws. Nothing
+is extrapolated from the draws: a narrow region of violations leaves no trace in the robustness beside it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.analyses.splitting import Splitting, least_budget, split
+from falsifier.core.arguments import whole
+from falsifier.core.candidate import Candidate
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.words import counted
+from falsifier.engines.box import UnitBox
+from falsifier.engines.uniform import Uniform
+from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem, check_limits
+from falsifier.search.findings import Failure, Finding
+from falsifier.search.findings import failures as by_cause
+from falsifier.search.vacuity import Vacuity
+from falsifier.stl.margins import margin_words, signed
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """What a search of the same space found, to be stated beside the bound.
+
+    Attributes:
+        simulations: number of simulations of the search.
+        smallest: smallest robustness that it found; None if every simulation failed.
+        violation: in how many simulations it found the first violation, as simulated; None without one.
+        drawable: whether the inputs of that violation are among those that are drawn.
+    """
+
+    simulations: int
+    smallest: float | None
+    violation: int | None = None
+    drawable: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Assurance:
+    """What random simulations say about the probability of a violation.
+
+    Attributes:
+        problem: what was simulated.
+        distribution: what was drawn, in words; every probability here refers to it.
+        confidence: confidence of the bound and the intervals.
+        drawn: number of simulations drawn independently.
+        violations: how many of them violate the requirement, as simulated, without confirmation.
+        failures: why simulations among them failed; the bounds count them as violations where that is worse.
+        bound: upper confidence bound on the probability of a violation, exact.
+        interval: exact two-sided confidence interval of that probability; from 0 without violations.
+        smallest: the drawn evaluation with the smallest robustness, without its trajectory.
+        splitting: estimate of the probability by splitting; None if it was not asked for.
+        searched: what a search found; None if none was given.
+        findings: what no simulation tested; empty with violations.
+        interrupted: whether the user stopped it; everything refers to what was drawn by then.
+    """
+
+    problem: Problem
+    distribution: str
+    confidence: float
+    drawn: int
+    violations: int
+    failures: tuple[Failure, ...]
+    bound: float
+    interval: tuple[float, float]
+    smallest: Evaluation
+    splitting: Splitting | None
+    searched: Searched | None = None
+    findings: tuple[Finding, ...] = ()
+    interrupted: bool = False
+
+    @property
+    def text(self) -> str:
+        """The result in sentences."""
+        share = f"{self.confidence * 100:g} %"
+        lines = [
+            f"{self.violations} of {counted(self.drawn, 'random simulation')} violate the requirement.",
+            f"With {share} confidence, the probability of a violation is at most {self.bound:.3g}.",
+        ]
+        if self.violations:
+            low, high = self.interval
+            lines.append(f"With {share} confidence, it is between {low:.3g} and {high:.3g}.")
+        if self.failures:
+            lines += [f"{failure.text}." for failure in self.failures]
+            lines.append("The bound counts failed simulations as violations.")
+        if any(finding.untested for finding in self.findings):
+            lines.append("That is true, but says little: a part of the requirement was not tested.")
+        lines += [f"Note: {finding.text}" for finding in self.findings]
+        smallest = _robustness(self.smallest)
+        lines.append(f"The smallest robustness of these was {signed(smallest)} ({margin_words(smallest)}).")
+        if self.searched is not None:
+            lines.append(self._searched_text(self.searched))
+        if self.splitting is not None:
+            lines.append(_splitting_text(self.splitting, share))
+        lines.append(
+            "Probability of what: of inputs drawn uniformly from the search space with this "
+            f"parameterization, not of inputs in operation: {self.distribution}."
+        )
+        if self.interrupted:
+            lines.append("Stopped by the user: more simulations would give a lower bound.")
+        return "\n".join(lines)
+
+    def _searched_text(self, searched: Searched) -> str:
+        if searched.violation is None:
+            effort = f"A search of {counted(searched.simulations, 'simulation')}"
+            if searched.smallest is None:
+                return f"{effort} has no verdict: all of them failed."
+            nearer = "came nearer" if searched.smallest < _robustness(self.smallest) else "came no nearer"
+            return f"{effort} {nearer}: its smallest robustness was {searched.smallest:+.6g}."
+        found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
+        if not searched.drawable:
+            return f"{found}, with control points that are not drawn here: the bound says nothing about it."
+        if self.violations:
+            return f"{found}."
+        return (
+            f"{found}; none of {counted(self.drawn, 'draw')} did: the probability is below {self.bound:.3g}, "
+            "not zero."
+        )
+
+
+def assess(
+    problem: Problem,
+    *,
+    budget: int,
+    seed: int = 0,
+    confidence: float = 0.95,
+    splitting: int | None = None,
+    searched: Sequence[Evaluation] = (),
+    progress: Progress | None = None,
+) -> Assurance:
+    """Bound the probability of a violation by random simulations.
+
+    The bound is exact whatever the system is, as long as inputs are drawn as stated. The estimate by
+    splitting is not: it is for probabilities too small to be seen in the draws, and for violations to which
+    the robustness leads.
+
+    Args:
+        problem: what to simulate; inputs are drawn as the engine ``uniform`` does.
+        budget: maximum number of simulations.
+        seed: seed of the random numbers.
+        confidence: confidence of the bound and the intervals, between 0 and 1.
+        splitting: how many simulations of the budget are for splitting; default: half, if that is enough for
+            an estimate, otherwise none.
+        searched: evaluations of a search of the same space, in order, to be stated beside the bound, such as
+            those of a Result.
+        progress: called with the number of simulations so far.
+
+    Returns:
+        What the draws say. Ctrl-C ends them early, and what was drawn by then counts; before the first
+        simulation with a verdict, KeyboardInterrupt is raised.
+
+    Raises:
+        SpecError: if a number is out of range, there is nothing to vary, or a range exceeds the model's
+            limits.
+        SimulationError: if every simulation failed.
+        ModelError: if the model cannot be used at all.
+    """
+    budget, seed = whole("budget", budget, least=1), whole("seed", seed, least=0)
+    if not 0.0 < confidence < 1.0:
+        raise SpecError(f"confidence: expected a number between 0 and 1, got {confidence!r}")
+    if not problem.space.names:
+        raise SpecError("nothing to vary; give at least one input or parameter a range")
+    check_limits(problem)
+    rest = _for_splitting(budget, splitting)
+    count = _Counted(problem, progress or (lambda _: None))
+    engine = Uniform(problem, seed=seed)
+    drawn, interrupted = _drawn(count, engine, budget - rest)
+    judged = [e for e in drawn if e.robustness is not None]
+    if not judged:
+        if interrupted:
+            raise KeyboardInterrupt
+        raise SimulationError(f"{problem.name}: every simulation failed; the last error: {drawn[-1].reason}")
+    violations, failures = sum(e.violated for e in drawn), len(drawn) - len(judged)
+    each = (1.0 + confidence) / 2.0
+    divided: Splitting | None = None
+    if rest and not interrupted:
+        try:
+            divided = _split(problem, count, rest, seed=seed, confidence=confidence)
+        except KeyboardInterrupt:
+            interrupted = True
+    return Assurance(
+        problem=problem,
+        distribution=_distribution_text(problem.space),
+        confidence=confidence,
+        drawn=len(drawn),
+        violations=violations,
+        failures=by_cause((i, e.reason) for i, e in enumerate(drawn) if e.robustness is None),
+        bound=upper_bound(violations + failures, len(drawn), confidence),
+        interval=(
+            lower_bound(violations, len(drawn), each),
+            upper_bound(violations + failures, len(drawn), each),
+        ),
+        smallest=min(judged, key=_robustness),
+        splitting=divided,
+        searched=_told(searched, problem.space),
+        findings=() if violations else count.vacuity.findings(),
+        interrupted=interrupted,
+    )
+
+
+def _drawn(count: "_Counted", engine: Uniform, wanted: int) -> tuple[list[Evaluation], bool]:
+    """Simulate random candidates; return their evaluations, and whether the user stopped that."""
+    drawn: list[Evaluation] = []
+    try:
+        while len(drawn) < wanted:
+            drawn.append(count(engine.ask()[0]))
+    except KeyboardInterrupt:
+        return drawn, True
+    return drawn, False
+
+
+@dataclass(slots=True)
+class _Counted:
+    """Evaluates candidates without keeping trajectories, counts them, and notes what they do not test."""
+
+    problem: Problem
+    progress: Progress
+    count: int = 0
+    vacuity: Vacuity = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.vacuity = Vacuity(self.problem)
+
+    def __call__(self, candidate: Candidate) -> Evaluation:
+        evaluation = evaluate(self.problem, candidate)
+        self.vacuity.see(evaluation, self.count)
+        self.count += 1
+        self.progress(self.count)
+        return replace(evaluation, trajectory=None)
+
+
+def _for_splitting(budget: int, wanted: int | None) -> int:
+    if wanted is None:
+        return budget // 2 if budget // 2 >= least_budget() else 0
+    wanted = whole("splitting", wanted, least=0)
+    if wanted >= budget:
+        raise SpecError(
+            f"splitting: expected fewer simulations than the budget of {budget}, got {wanted}: the bound "
+            "needs some, too"
+        )
+    if 0 < wanted < least_budget():
+        raise SpecError(f"splitting: expected 0, or at least {least_budget()} simulations, got {wanted}")
+    return wanted
+
+
+def _split(problem: Problem, count: _Counted, budget: int, *, seed: int, confidence: float) -> Splitting:
+    box = UnitBox(problem.space)
+
+    def cost(point: NDArray[np.float64]) -> float:
+        return _robustness(count(box.candidate(point, origin="splitting", rationale="moved at random")))
+
+    return split(cost, box.dimension, budget=budget, seed=seed, confidence=confidence)
+
+
+def _robustness(evaluation: Evaluation) -> float:
+    return inf if evaluation.robustness is None else evaluation.robustness
+
+
+def upper_bound(happened: int, trials: int, confidence: float) -> float:
+    """Return the bound below which the probability lies with at least this confidence.
+
+    >>> round(upper_bound(0, 300, 0.95), 5)
+    0.00994
+    """
+    from scipy.special import betaincinv
+
+    return 1.0 if happened >= trials else float(betaincinv(happened + 1, trials - happened, confidence))
+
+
+def lower_bound(happened: int, trials: int, confidence: float) -> float:
+    """Return the bound above which the probability lies with at least this confidence."""
+    return 1.0 - upper_bound(trials - happened, trials, confidence)
+
+
+def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | None:
+    if not evaluations:
+        return None
+    smallest = min((e.robustness for e in evaluations if e.robustness is not None), default=None)
+    for number, evaluation in enumerate(evaluations, start=1):
+        if evaluation.violated:
+            drawable = UnitBox(space).represents(evaluation.candidate)
+            return Searched(len(evaluations), smallest, number, drawable)
+    return Searched(len(evaluations), smallest)
+
+
+def _splitting_text(found: Splitting, share: str) -> str:
+    effort = f"multilevel splitting, {counted(found.simulations, 'simulation')}"
+    if found.probability is None:
+        return f"No estimate ({effort}): it ended before a violation, which says nothing; the bound holds."
+    return (
+        f"Estimate, not a bound ({effort}): probability {found.probability:.2g}, {share} confidence interval "
+        f"{found.low:.2g} to {found.high:.2g} if a falling robustness leads to all violations."
+    )
+
+
+def _distribution_text(space: SearchSpace) -> str:
+    """Describe what the engine ``uniform`` draws from: each control point and parameter on its own."""
+    parts = [_input_text(r, space) for r in space.inputs]
+    parts += [f"{p.name} uniform in {_range_text(p)}" for p in space.parameters]
+    text = f"{'; '.join(parts)}; all numbers independent of each other"
+    if any(r.free is not None for r in space.inputs):
+        text += "; signals with other control points, which a search may try, are not drawn"
+    return text
+
+
+def _input_text(r: InputRange, space: SearchSpace) -> str:
+    if r.control_points == 1:
+        return f"{r.name} constant, uniform in {_range_text(r)}"
+    spacing = space.fixed_times(r)[1]
+    held = f", held for {r.hold:g} s" if r.hold is not None else ""
+    return (
+        f"{r.name} with {r.control_points} control points {spacing:.4g} s apart, {r.interpolation}{held}, "
+        f"each uniform in {_range_text(r)}"
+    )
+
+
+def _range_text(r: InputRange | ParameterRange) -> str:
+    unit = f" {r.unit}" if r.unit else ""
+    rounded = "" if r.kind == "real" else ", rounded to an allowed number"
+    return f"[{r.low:g}, {r.high:g}]{unit}{rounded}"

@@ -1,0 +1,356 @@
+"""Which part of its inputs' ranges, and of the system's behaviour, a run has tried; read from its record.
+
+Ranges are divided into parts. A part counts as tried if a simulation with a verdict had a value in it at any
+time. Trajectories are read one by one: a long run's would not fit in memory together.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations, pairwise
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.analyses.parts import (
+    PACES,
+    Array,
+    Counts,
+    allowed_labels,
+    cells_of,
+    edges_of,
+    fastest_rate,
+    labels_of,
+    pace_of,
+)
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import SpecError
+from falsifier.record import manifest
+from falsifier.record.journal import read_journal, recorded_candidates, recorded_trajectory
+from falsifier.record.manifest import InputRecord, Manifest
+from falsifier.record.records import EvaluatedRecord
+from falsifier.search.findings import Failure
+from falsifier.search.findings import failures as by_cause
+
+# Slices of the simulated time in which the values of an input are counted.
+SLICES = 40
+# Samples of an input over the simulated time: several per slice.
+_SAMPLES = 201
+
+Tried = Iterable[tuple[Candidate, Trajectory | None]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RangeCoverage:
+    """What was tried of one input or parameter.
+
+    Attributes:
+        searched: its name, range, unit and kind.
+        low: smallest value tried; None if nothing was.
+        high: largest value tried.
+        parts: number of simulations with a value in each part of the range, shape (p,).
+        times: the same by slice of the simulated time, shape (SLICES, p); None for a parameter.
+        paces: number of simulations by the input's fastest change, as PACES; empty for a parameter.
+        rate: fastest continuous change in units per s; None for a parameter, or if all changes were steps.
+        apart: shortest time in s between two changes of value; None if there were not two.
+    """
+
+    searched: InputRecord
+    low: float | None
+    high: float | None
+    parts: Counts
+    times: Counts | None
+    paces: Mapping[str, int]
+    rate: float | None
+    apart: float | None
+
+    @property
+    def tried(self) -> int:
+        """Number of parts of the range that were tried."""
+        return int((self.parts > 0).sum())
+
+    @property
+    def edges(self) -> list[tuple[float, float]]:
+        """Lower and upper end of each part; both are equal if a part is one whole number."""
+        return edges_of(self.searched)
+
+    @property
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """Ranges of values that were not tried."""
+        edges = self.edges
+        missing = np.flatnonzero(self.parts == 0)
+        groups = np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1) if missing.size else []
+        return tuple((edges[group[0]][0], edges[group[-1]][1]) for group in groups)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairCoverage:
+    """Which combinations of two inputs or parameters were tried at the same time.
+
+    Attributes:
+        first: name of one.
+        second: name of the other.
+        tried: whether each combination of parts was tried, shape (parts of first, parts of second).
+    """
+
+    first: str
+    second: str
+    tried: NDArray[np.bool_]
+
+    @property
+    def count(self) -> int:
+        """Number of combinations that were tried."""
+        return int(self.tried.sum())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutputCoverage:
+    """Which values an output reached.
+
+    Attributes:
+        name: its name.
+        unit: its unit, empty if unknown.
+        times: in s, shape (n,).
+        lows: smallest value at each time, shape (n,).
+        highs: largest value at each time, shape (n,).
+    """
+
+    name: str
+    unit: str
+    times: Array
+    lows: Array
+    highs: Array
+
+    @property
+    def low(self) -> float:
+        """Smallest value of all."""
+        return float(self.lows.min())
+
+    @property
+    def high(self) -> float:
+        """Largest value of all."""
+        return float(self.highs.max())
+
+
+@dataclass(frozen=True, slots=True)
+class ModeCoverage:
+    """Which values an integer, Boolean or enumeration had.
+
+    Attributes:
+        name: its name.
+        labels: name of each value that is known to exist; empty if that is not known.
+        seen: the values that it had.
+        changes: the changes that happened, as pairs of values.
+    """
+
+    name: str
+    labels: Mapping[int, str]
+    seen: frozenset[int]
+    changes: frozenset[tuple[int, int]]
+
+    @property
+    def unseen(self) -> tuple[int, ...]:
+        """Values that are known to exist and were not seen."""
+        return tuple(sorted(set(self.labels) - self.seen))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """What a run has tried, and what it has seen.
+
+    Attributes:
+        simulations: number of simulations with a verdict; others say nothing about the system.
+        failures: why the others failed, by cause.
+        trajectories: number of simulations whose trajectory was kept, from which outputs and modes are read.
+        stop_time: end of each simulation in s.
+        ranges: the inputs, then the parameters.
+        pairs: all pairs of them, the least tried first.
+        outputs: recorded real outputs.
+        modes: recorded and searched integers, Booleans and enumerations.
+    """
+
+    simulations: int
+    failures: tuple[Failure, ...]
+    trajectories: int
+    stop_time: float
+    ranges: tuple[RangeCoverage, ...]
+    pairs: tuple[PairCoverage, ...]
+    outputs: tuple[OutputCoverage, ...]
+    modes: tuple[ModeCoverage, ...]
+
+
+def coverage(directory: str | PathLike[str]) -> Coverage:
+    """Say which part of the search space a recorded run has tried, and what the system did.
+
+    Args:
+        directory: run directory; the run may still be going on.
+
+    Raises:
+        JournalError: if it is no run directory, or its record is damaged.
+        SpecError: if it is not a path.
+    """
+    if not isinstance(directory, str | PathLike):
+        raise SpecError(
+            f"coverage: expected a run directory, got {directory!r}; "
+            "falsify(..., directory=...) records a run"
+        )
+    place = Path(directory)
+    described, records = manifest.read(place), read_journal(place)
+    candidates = recorded_candidates(records)
+    ended = [r for r in records if isinstance(r, EvaluatedRecord)]
+    judged = [r for r in ended if any(r.verdicts.values())]
+    tried = ((candidates[r.index], recorded_trajectory(place, r.trajectory)) for r in judged)
+    reasons = ((r.index, r.reason) for r in ended if not any(r.verdicts.values()))
+    return coverage_of(described, tried, failures=by_cause(reasons))
+
+
+def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, ...] = ()) -> Coverage:
+    """Return the coverage of simulations.
+
+    Args:
+        described: what was searched.
+        tried: each candidate with a verdict, and its trajectory if there is one.
+        failures: why the simulations without a verdict failed.
+    """
+    count = _Count(described)
+    for candidate, trajectory in tried:
+        count.add(candidate)
+        if trajectory is not None:
+            count.reach(trajectory)
+    return count.coverage(failures)
+
+
+@dataclass(slots=True)
+class _Range:
+    """What was tried of one input or parameter so far."""
+
+    searched: InputRecord
+    is_input: bool
+    parts: Counts = field(init=False)
+    times: Counts = field(init=False)
+    paces: dict[str, int] = field(default_factory=lambda: dict.fromkeys(PACES, 0))
+    values: list[float] = field(default_factory=list)
+    rate: float | None = None
+    apart: float | None = None
+
+    def __post_init__(self) -> None:
+        count = len(edges_of(self.searched))
+        self.parts, self.times = np.zeros(count, np.intp), np.zeros((SLICES, count), np.intp)
+
+    def add(self, values: Array) -> Counts:
+        """Add the values of one simulation over time; return the part of each."""
+        cells = cells_of(self.searched, values)
+        self.parts[np.unique(cells)] += 1
+        within = np.arange(len(values)) * SLICES // len(values)
+        for slice_, part in np.unique(np.stack([within, cells]), axis=1).T:
+            self.times[slice_, part] += 1
+        known = [*self.values, *values]
+        self.values = [float(min(known)), float(max(known))]
+        return cells
+
+    def add_changes(self, signal: Signal, stop_time: float) -> None:
+        rate = fastest_rate(signal, stop_time)
+        self.paces[pace_of(signal, rate, self.searched, stop_time)] += 1
+        self.rate = max((x for x in (self.rate, rate) if x is not None), default=None)
+        self.apart = min((x for x in (self.apart, signal.shortest_dwell) if x is not None), default=None)
+
+    def coverage(self) -> RangeCoverage:
+        return RangeCoverage(
+            searched=self.searched,
+            low=self.values[0] if self.values else None,
+            high=self.values[1] if self.values else None,
+            parts=self.parts,
+            times=self.times if self.is_input else None,
+            paces=self.paces if self.is_input else {},
+            rate=self.rate,
+            apart=self.apart,
+        )
+
+
+class _Count:
+    """Everything that is counted, simulation by simulation."""
+
+    def __init__(self, described: Manifest) -> None:
+        self.described = described
+        self.simulations = self.trajectories = 0
+        self.ranges = [_Range(r, is_input=True) for r in described.inputs]
+        self.ranges += [_Range(p, is_input=False) for p in described.parameters]
+        sizes = [len(r.parts) for r in self.ranges]
+        # Rows and columns: the parts of the first range, then those of the second, and so on.
+        self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
+        self.together = np.zeros((sum(sizes), sum(sizes)), np.bool_)
+        self.times = np.linspace(0.0, described.stop_time, _SAMPLES)
+        self.outputs: dict[str, OutputCoverage] = {}
+        searched = [r.searched for r in self.ranges if r.searched.kind != "real"]
+        self.labels = {r.name: labels_of(r.kind, r.items) or allowed_labels(r) for r in searched}
+        self.labels |= {m.name: labels_of(m.kind, m.items) for m in described.modes}
+        self.seen: dict[str, set[int]] = {name: set() for name in self.labels}
+        self.changes: dict[str, set[tuple[int, int]]] = {name: set() for name in self.labels}
+
+    def add(self, candidate: Candidate) -> None:
+        """Count what one simulation tried."""
+        self.simulations += 1
+        rows = []
+        for r in self.ranges:
+            name = r.searched.name
+            if r.is_input:
+                signal = candidate.signals[name]
+                rows.append(r.add(signal.sample(self.times)))
+                r.add_changes(signal, self.described.stop_time)
+                self._modes(name, signal.values)
+            else:
+                value = candidate.parameters[name]
+                rows.append(r.add(np.full(_SAMPLES, value)))
+                self._modes(name, (value,))
+        if rows:
+            for column in np.unique(np.stack(rows), axis=1).T:
+                at = column + self.starts[:-1]
+                self.together[np.ix_(at, at)] = True
+
+    def reach(self, trajectory: Trajectory) -> None:
+        """Count what one simulation reached."""
+        self.trajectories += 1
+        inputs = {r.name for r in self.described.inputs}
+        for name, values in trajectory.columns.items():
+            if name in self.labels:
+                self._modes(name, values[np.flatnonzero(np.diff(values, prepend=np.nan))])
+            elif name not in inputs:
+                known = self.outputs.get(name)
+                self.outputs[name] = OutputCoverage(
+                    name,
+                    trajectory.units.get(name, ""),
+                    trajectory.times,
+                    values if known is None else np.minimum(known.lows, values),
+                    values if known is None else np.maximum(known.highs, values),
+                )
+
+    def coverage(self, failures: tuple[Failure, ...]) -> Coverage:
+        """Return what was counted."""
+        return Coverage(
+            simulations=self.simulations,
+            failures=failures,
+            trajectories=self.trajectories,
+            stop_time=self.described.stop_time,
+            ranges=tuple(r.coverage() for r in self.ranges),
+            pairs=tuple(sorted(self._pairs(), key=lambda pair: pair.tried.mean())),
+            outputs=tuple(self.outputs.values()),
+            modes=tuple(
+                ModeCoverage(name, labels, frozenset(self.seen[name]), frozenset(self.changes[name]))
+                for name, labels in self.labels.items()
+            ),
+        )
+
+    def _modes(self, name: str, values: Iterable[float]) -> None:
+        if name in self.labels:
+            numbers = [round(value) for value in values]
+            self.seen[name].update(numbers)
+            self.changes[name].update((a, b) for a, b in pairwise(numbers) if a != b)
+
+    def _pairs(self) -> Iterator[PairCoverage]:
+        for i, k in combinations(range(len(self.ranges)), 2):
+            rows, columns = (slice(self.starts[j], self.starts[j + 1]) for j in (i, k))
+            names = self.ranges[i].searched.name, self.ranges[k].searched.name
+            yield PairCoverage(*names, self.together[rows, columns])

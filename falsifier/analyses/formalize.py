@@ -1,0 +1,306 @@
+"""Requirements in words: a language model's readings, checked, told apart by examples and judged."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+from falsifier.analyses.lint import ranges_of, static_findings
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import FalsifierError, SpecError
+from falsifier.evaluation.evaluate import Evaluation, simulate
+from falsifier.llm.conversation import MAX_REASKS, NoValidReplyError, RejectedReplyError, converse
+from falsifier.llm.messages import Chat, ChatRequest, Exchange
+from falsifier.llm.prompts.formalizing import formalizing_messages
+from falsifier.llm.readings import (
+    ExampleSignal,
+    ReadingReply,
+    example_trajectory,
+    read_readings,
+    readings_schema,
+)
+from falsifier.problem.grid import fitting_interval
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.problem.subject import Subject, subject_of
+from falsifier.problem.unit_check import defined_units, factor_and_offset
+from falsifier.search.budget import Spent
+from falsifier.search.leaders import open_chat
+from falsifier.search.request import LLMSettings
+from falsifier.stl import Formula, Monitor, in_words
+from falsifier.stl.formula import And
+from falsifier.stl.implication import implies
+from falsifier.stl.intervals import margins
+from falsifier.stl.margins import ON_LIMIT, shown
+from falsifier.stl.tell_apart import tell_apart
+
+_LONGEST_SENTENCE = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One formula that a sentence may mean.
+
+    Attributes:
+        formula: the formula; it fits the model and its experiment.
+        meaning: what it means, as the language model says.
+        words: the formula said back in words, made from the formula alone.
+        problem: the problem with this requirement.
+        nominal: the nominal simulation, judged; None if there was none.
+    """
+
+    formula: Formula
+    meaning: str
+    words: str
+    problem: Problem
+    nominal: Evaluation | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Trajectories that tell two readings apart.
+
+    Attributes:
+        first: number of one reading, from 1.
+        second: number of the other one.
+        only_first: satisfies the first one only; None: none was found.
+        only_second: satisfies the second one only; None: none was found.
+    """
+
+    first: int
+    second: int
+    only_first: Trajectory | None
+    only_second: Trajectory | None
+
+
+@dataclass(frozen=True, slots=True)
+class Formalized:
+    """Readings of a sentence.
+
+    Attributes:
+        sentence: the requirement in words.
+        subject: the model, and the spec to write to.
+        readings: one to three formulas, the most probable first.
+        differences: how each two of them differ.
+        rejected: why other readings were rejected, in the order of the replies.
+        spent: calls, tokens and cost of the language model.
+    """
+
+    sentence: str
+    subject: Subject
+    readings: tuple[Reading, ...]
+    differences: tuple[Difference, ...]
+    rejected: tuple[str, ...]
+    spent: Spent
+
+
+def formalize(
+    target: str,
+    sentence: str,
+    llm: Chat | LLMSettings | str,
+    *,
+    reasks: int = MAX_REASKS,
+    nominal: bool = True,
+) -> Formalized:
+    """Return what a requirement in words may mean, as formulas.
+
+    Args:
+        target: an FMU, a spec, one of its requirements, or a bundled name.
+        sentence: the requirement.
+        llm: the language model: its name, settings, or a chat.
+        reasks: how often readings are asked for again if one of them is invalid.
+        nominal: whether to judge the readings on one simulation with the inputs at their start values.
+
+    Raises:
+        SpecError: if the target or the sentence cannot be used.
+        ChatError: if there is no reply, or no valid reading in any of them.
+        ModelError: if the FMU cannot be used.
+
+    >>> formalize("my.fmu", "the speed stays below 120", "openai/gpt-5-mini")  # doctest: +SKIP
+    """
+    if not sentence.strip() or len(sentence) > _LONGEST_SENTENCE:
+        raise SpecError(f"expected a sentence of 1 to {_LONGEST_SENTENCE} characters")
+    subject = subject_of(target)
+    settings = LLMSettings(name=llm) if isinstance(llm, str) else llm
+    chat = open_chat(settings) if isinstance(settings, LLMSettings) else settings
+    asked = _Asked(subject)
+    info, experiment = subject.problem.info, subject.problem.experiment
+    request = ChatRequest(
+        messages=formalizing_messages(sentence, info, experiment), reply_schema=readings_schema()
+    )
+    try:
+        readings = converse(chat, request, asked.read, asked.count, reasks=reasks)
+    except NoValidReplyError:
+        if not asked.valid:
+            raise
+        readings = asked.valid
+    if nominal:
+        readings = _judged(subject, readings)
+    differences = tuple(
+        _difference(i, j, readings[i - 1], readings[j - 1])
+        for i, j in combinations(range(1, len(readings) + 1), 2)
+    )
+    return Formalized(
+        sentence.strip(), subject, tuple(readings), differences, tuple(asked.rejected), asked.spent
+    )
+
+
+class _Asked:
+    """Reads replies, and keeps what is worth keeping of those that are rejected."""
+
+    def __init__(self, subject: Subject) -> None:
+        self.valid: list[Reading] = []
+        self.rejected: list[str] = []
+        self.spent = Spent()
+        self._subject = subject
+
+    def count(self, exchange: Exchange) -> None:
+        self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
+
+    def read(self, text: str) -> list[Reading]:
+        """Return the readings of a reply.
+
+        Raises:
+            RejectedReplyError: stating what is wrong with each invalid one.
+        """
+        valid: list[Reading] = []
+        problems: list[str] = []
+        for number, reply in enumerate(read_readings(text), start=1):
+            try:
+                reading = checked_reading(reply, self._subject)
+                _check_new(reading, valid)
+                valid.append(reading)
+            except RejectedReplyError as rejection:
+                problems.append(f"reading {number} ({reply.formula[:200]}): {rejection}")
+        if len(valid) >= len(self.valid):
+            self.valid = valid
+        if problems:
+            self.rejected += problems
+            raise RejectedReplyError("; ".join(problems))
+        return valid
+
+
+def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
+    """Return a reading that passed all checks.
+
+    Its formula must parse, name signals of the model, fit the stop time and the grid, compare what has the
+    same unit, and neither hold nor fail for all values in range. It must hold on the example that came with
+    it and fail on the counterexample: a reversed inequality contradicts its own examples.
+
+    Raises:
+        RejectedReplyError: stating what is wrong.
+    """
+    try:
+        formula, problem = subject.parsed(reply.formula)
+    except SpecError as error:
+        raise RejectedReplyError(str(error)) from None
+    _check_units(reply, formula, problem)
+    problem = replace(problem, requirement=Requirement(problem.name, formula))
+    for found in static_findings(problem):
+        if found.kind in ("always", "never", "units"):
+            raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
+    if _compares_reals(formula, problem) and margins(formula, ranges_of(problem)).low == -ON_LIMIT:
+        raise RejectedReplyError(
+            "it can be violated only exactly on its limit, so that no margin leads a search: "
+            "for x == 3 write abs(x - 3) <= 0.5"
+        )
+    _check_examples(reply, formula, problem)
+    stated = replace(
+        problem,
+        experiment=replace(
+            problem.experiment,
+            outputs=tuple(dict.fromkeys((*problem.experiment.outputs, *_recorded(formula, problem)))),
+        ),
+    )
+    return Reading(formula, reply.meaning, in_words(formula), stated)
+
+
+def _compares_reals(formula: Formula, problem: Problem) -> bool:
+    """Whether two reals are compared for equality; whole numbers can be equal."""
+    return any(
+        problem.info[name].kind == "real"
+        for predicate in formula.predicates
+        if predicate.operator in ("==", "!=")
+        for name in predicate.signals
+    )
+
+
+def _recorded(formula: Formula, problem: Problem) -> list[str]:
+    return [name for name in formula.signals if problem.info[name].causality != "input"]
+
+
+def _check_units(reply: ReadingReply, formula: Formula, problem: Problem) -> None:
+    units = defined_units(problem.model)
+    for name in formula.signals:
+        real = problem.info[name].unit
+        assumed = next((u.unit for u in reply.units if u.signal == name), real)
+        found = factor_and_offset(assumed, real, units) if assumed and real else (1.0, 0.0)
+        if found != (1.0, 0.0):
+            shift = f" {found[1]:+.6g}" if found and found[1] else ""
+            how = f" (1 {assumed} is {found[0]:.6g} {real}{shift})" if found else ""
+            raise RejectedReplyError(
+                f"{name} is in {real}, not in {assumed}: convert the numbers to {real}{how}"
+            )
+
+
+def _check_examples(reply: ReadingReply, formula: Formula, problem: Problem) -> None:
+    for signals, satisfied in ((reply.satisfied, True), (reply.violated, False)):
+        robustness = _on_example(signals, formula, problem)
+        if (robustness >= 0) != satisfied:
+            said, found = ("satisfied", "violated") if satisfied else ("violated", "satisfied")
+            raise RejectedReplyError(
+                f"the example that you call {said} is {found} by the formula, with robustness "
+                f"{shown(robustness):.4g}: is an inequality reversed, or a window wrong?"
+            )
+
+
+def _on_example(signals: Sequence[ExampleSignal], formula: Formula, problem: Problem) -> float:
+    experiment = problem.experiment
+    trajectory = example_trajectory(signals, formula.signals, experiment.times)
+    try:
+        monitor = Monitor(formula, experiment.output_interval, experiment.samples)
+        return monitor.evaluate(trajectory).robustness
+    except FalsifierError as error:
+        raise RejectedReplyError(f"the formula has no value on an example: {error}") from None
+
+
+def _check_new(reading: Reading, others: Sequence[Reading]) -> None:
+    for number, other in enumerate(others, start=1):
+        if implies(reading.formula, other.formula) and implies(other.formula, reading.formula):
+            raise RejectedReplyError(f"it requires the same as reading {number}; leave it out")
+
+
+def _judged(subject: Subject, readings: Sequence[Reading]) -> list[Reading]:
+    """Judge readings on simulations with the inputs at their start values, or else in the middle."""
+    info = subject.problem.info
+    inputs = {r.name: _start(info[r.name].start, r.low, r.high) for r in subject.problem.space.inputs}
+    parameters = {p.name: _start(info[p.name].start, p.low, p.high) for p in subject.problem.space.parameters}
+    try:
+        return [
+            replace(reading, nominal=simulate(reading.problem, dict(inputs), parameters))
+            for reading in readings
+        ]
+    finally:
+        subject.problem.model.close()
+
+
+def _start(start: float | str | None, low: float, high: float) -> float:
+    return float(start) if isinstance(start, int | float) and low <= start <= high else (low + high) / 2
+
+
+def _difference(first: int, second: int, one: Reading, other: Reading) -> Difference:
+    experiments = [reading.problem.experiment for reading in (one, other)]
+    stop, finest = experiments[0].stop_time, min(e.output_interval for e in experiments)
+    step = fitting_interval(And(one.formula, other.formula), stop, finest)
+    if step is None:  # no grid of a reasonable size fits the windows of both
+        return Difference(first, second, None, None)
+    found = [
+        tell_apart(
+            a.formula,
+            b.formula,
+            step=step,
+            samples=round(stop / step) + 1,
+            ranges=ranges_of(one.problem),
+        )
+        for a, b in ((one, other), (other, one))
+    ]
+    return Difference(first, second, *found)

@@ -1,0 +1,267 @@
+"""What is wrong with requirements before anything is searched: nothing moves them, or they cannot fail."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import permutations
+from typing import Literal
+
+import numpy as np
+
+from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import counted, listed
+from falsifier.errors import SpecError
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.fmu import FmuModel
+from falsifier.fmu.description import read_structure
+from falsifier.problem.loading import load_source, sources_of
+from falsifier.problem.problem import Problem, alike
+from falsifier.problem.source import ProblemSource
+from falsifier.problem.unit_check import defined_units, unit_conflicts
+from falsifier.search.vacuity import hidden_margin
+from falsifier.stl import Formula
+from falsifier.stl.formula import Always, And, Eventually, Or, Until, Window
+from falsifier.stl.implication import implies
+from falsifier.stl.intervals import Interval, decided
+
+FindingKind = Literal[
+    "invalid", "unmoved", "always", "never", "margin", "window", "units", "duplicate", "implied"
+]
+# Simulations of the measured check of whether an input moves a requirement's signals.
+SIMULATIONS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class LintFinding:
+    """One thing that is wrong with a requirement.
+
+    Attributes:
+        requirement: its name.
+        kind: ``invalid`` (it cannot be loaded), ``unmoved`` (no input moves it), ``always`` or ``never``
+            (it holds or fails for every trajectory in range), ``margin`` (its robustness cannot say how near
+            a violation is), ``window`` (a window that does not matter), ``units``, ``duplicate`` or
+            ``implied`` (by another requirement or another part).
+        place: the part of the formula; empty if it is about the whole requirement.
+        text: what is wrong.
+        advice: what to do.
+    """
+
+    requirement: str
+    kind: FindingKind
+    place: str
+    text: str
+    advice: str
+
+    def as_json(self) -> dict[str, str]:
+        """Return the finding as a JSON object."""
+        return asdict(self)
+
+
+def lint(
+    target: str | ProblemSource, *, profile: str | None = None, simulations: int = SIMULATIONS
+) -> list[LintFinding]:
+    """Return what is wrong with the requirements of a spec; empty if nothing was found.
+
+    Args:
+        target: a spec, one of its requirements or a bundled name; or a problem's source.
+        profile: name of a profile of the spec.
+        simulations: simulations of the measured check of whether inputs move the requirements' signals; 0:
+            only what the FMU declares counts.
+
+    Raises:
+        SpecError: if the spec as a whole cannot be read.
+        ModelError: if the FMU cannot be used.
+    """
+    findings: list[LintFinding] = []
+    problems: list[Problem] = []
+    stated = target if isinstance(target, ProblemSource) else ProblemSource(target=target, profile=profile)
+    for source in [stated] if stated.stl is not None else sources_of(stated):
+        try:
+            problems.append(load_source(source))
+        except SpecError as error:
+            if error.key is None or not error.key.startswith("requirements."):
+                raise
+            advice = "correct it; falsifier check says the same"
+            findings.append(LintFinding(source.name, "invalid", "", str(error), advice))
+    try:
+        for problem in problems:
+            findings += static_findings(problem)
+        for group in alike(problems):
+            findings += _repeated(group)
+            findings += unmoved_findings(group, simulations)
+    finally:
+        for problem in problems:
+            problem.model.close()
+    return findings
+
+
+def static_findings(problem: Problem) -> Iterator[LintFinding]:
+    """Yield what is wrong with one requirement by itself, without a simulation."""
+    name, formula = problem.name, problem.requirement.formula
+    for part, holds in decided(formula, ranges_of(problem)):
+        yield _decided(problem, part, holds=holds)
+    if hidden := hidden_margin(problem):
+        yield LintFinding(name, "margin", "", *hidden)
+    yield from _windows(problem)
+    for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
+        yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
+    for part in formula.walk():
+        if isinstance(part, And | Or):
+            yield from _implied_side(name, part)
+
+
+def ranges_of(problem: Problem) -> dict[str, Interval]:
+    """Return the range of each signal: what is searched or fixed, else what the model declares."""
+    found = {}
+    for v in problem.info.variables:
+        low, high = v.limits
+        found[v.name] = Interval(*(i if n is None else n for n, i in ((low, -np.inf), (high, np.inf))))
+    found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
+    searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
+    return found | {r.name: Interval(r.low, r.high) for r in searched}
+
+
+def _constants(problem: Problem) -> dict[str, float]:
+    """Return the values that stay the same: inputs and parameters that are fixed."""
+    causality = {v.name: v.causality for v in problem.info.variables}
+    return {n: v for n, v in problem.parameters.items() if causality.get(n) in ("input", "parameter")}
+
+
+def _range_text(name: str, found: Interval) -> str:
+    if found.low == found.high:
+        return f"{name} = {found.low:g}"
+    return f"{name} in [{found.low:g}, {found.high:g}]"
+
+
+def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
+    ranges = ranges_of(problem)
+    bounds = [_range_text(n, ranges[n]) for n in part.signals]
+    because = f"as long as {listed(bounds)}" if bounds else "whatever happens"
+    if part == problem.requirement.formula:
+        what = "no trajectory in range violates it" if holds else "every trajectory in range violates it"
+        advice = "check threshold, direction of the inequality and ranges; a search is of no use"
+    else:
+        what = "this part always holds" if holds else "this part never holds"
+        advice = "check its threshold and direction, or leave it out"
+    return LintFinding(problem.name, "always" if holds else "never", str(part), f"{what}, {because}", advice)
+
+
+def _windows(problem: Problem) -> Iterator[LintFinding]:
+    still = {*_constants(problem), *(p.name for p in problem.space.parameters)}
+    for part in dict.fromkeys(problem.requirement.formula.walk()):
+        if not isinstance(part, Always | Eventually | Until):
+            continue
+        if part.window == Window(0.0, 0.0) and not isinstance(part, Until):
+            text, advice = "the window contains only the present", f"leave it out: {part.children[0]}"
+        elif part.signals and set(part.signals) <= still:
+            text = (
+                f"{listed(list(part.signals))} does not change over time, so that the window does not matter"
+            )
+            advice = "leave the window out, or name a signal that changes"
+        else:
+            continue
+        yield LintFinding(problem.name, "window", str(part), text, advice)
+
+
+def _implied_side(name: str, part: And | Or) -> Iterator[LintFinding]:
+    """Yield the side of a conjunction or disjunction that does not matter, because the other implies it."""
+    sides = (part.left, part.right)
+    for one, other in (sides, sides[::-1]):
+        if not implies(one, other):
+            continue
+        spare, kept = (other, one) if isinstance(part, And) else (one, other)
+        because = "implies it" if isinstance(part, And) else "it implies"
+        text = f"it does not matter beside {kept}, which {because}"
+        kind: FindingKind = "implied"
+        if isinstance(spare, Always | Eventually | Until) and _differ_in_window(spare, kept):
+            kind = "window"
+        yield LintFinding(name, kind, str(spare), text, "leave it out, or correct its window or threshold")
+        return
+
+
+def _differ_in_window(one: Formula, other: Formula) -> bool:
+    return type(one) is type(other) and one.children == other.children
+
+
+def _repeated(group: Sequence[Problem]) -> Iterator[LintFinding]:
+    """Yield requirements that say the same as another one of the same search, or less."""
+    seen: set[frozenset[str]] = set()
+    for one, other in permutations(group, 2):
+        a, b = one.requirement.formula, other.requirement.formula
+        if not implies(a, b):
+            continue
+        if not implies(b, a):
+            yield LintFinding(
+                other.name,
+                "implied",
+                "",
+                f"{one.name} implies it: {a}",
+                f"leave one of them out, or keep {other.name} to learn which part fails",
+            )
+        elif frozenset((one.name, other.name)) not in seen:
+            seen.add(frozenset((one.name, other.name)))
+            text = f"it requires the same as {one.name}: {a}"
+            yield LintFinding(other.name, "duplicate", "", text, "leave one of them out")
+
+
+def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[LintFinding]:
+    """Yield requirements about signals on which nothing that is searched has an effect.
+
+    What the FMU declares counts only if no simulation contradicts it. Without a declaration, signals that are
+    continuous and the same in all simulations count.
+
+    Args:
+        group: problems that differ only in their requirement.
+        simulations: number of random simulations; 0: only what the FMU declares.
+    """
+    named = {p.name: set(p.requirement.formula.signals) for p in group}  # none: it is always decided
+    suspects = [p for p in group if named[p.name] and not named[p.name] & set(p.space.names)]
+    declared = {p.name: _is_declared_independent(p) for p in suspects}
+    asked = [p for p in suspects if declared[p.name] or _is_continuous(p)]
+    simulated = _simulated(group[0], simulations) if asked and simulations else []
+    for problem in asked:
+        signals = problem.requirement.formula.signals
+        moved = _moved(signals, simulated)
+        if moved or (not declared[problem.name] and len(simulated) < 2):
+            continue
+        measured = f"{listed(list(signals))} was the same in {counted(len(simulated), 'random simulation')}"
+        if declared[problem.name]:
+            text = "declared: the FMU's structure has no path from a searched input to its signals"
+            text += f"; measured: {measured}" if len(simulated) > 1 else ""
+        else:
+            text = f"measured: {measured}; the FMU does not declare whether inputs have an effect"
+        advice = "search other inputs, or name a signal on which they have an effect"
+        yield LintFinding(problem.name, "unmoved", "", text, advice)
+
+
+def _is_declared_independent(problem: Problem) -> bool:
+    """Whether the FMU says that no searched input reaches the requirement; it says nothing on parameters."""
+    model = problem.model
+    if not isinstance(model, FmuModel) or problem.space.parameters:
+        return False
+    if not problem.info.fmi_version.startswith(("2", "3")):
+        return False
+    known = read_structure(model.path, model.sha256).reaching
+    searched = set(problem.space.names)
+    signals = problem.requirement.formula.signals
+    return all(name in known and not known[name] & searched for name in signals)
+
+
+def _is_continuous(problem: Problem) -> bool:
+    """Whether every effect on its signals shows: a discrete one may keep its value in all simulations."""
+    known: Mapping[str, tuple[str, str]] = {v.name: (v.kind, v.variability) for v in problem.info.variables}
+    signals = problem.requirement.formula.signals
+    return all(known.get(name) == ("real", "continuous") for name in signals)
+
+
+def _simulated(problem: Problem, simulations: int) -> list[Trajectory]:
+    rng = np.random.default_rng(0)
+    low, high = problem.space.bounds.T
+    points = low + (high - low) * rng.random((simulations, len(low)))
+    found = (evaluate(problem, problem.space.decode(point)).trajectory for point in points)
+    return [trajectory for trajectory in found if trajectory is not None]
+
+
+def _moved(signals: Sequence[str], simulated: Sequence[Trajectory]) -> bool:
+    outcomes = {tuple(t[name].tobytes() for name in signals) for t in simulated}
+    return len(outcomes) > 1

@@ -1,0 +1,466 @@
+"""The record of a run: a directory of plain files from which even a killed run can be resumed.
+
+::
+
+    manifest.json            what was requested, with which versions; written once
+    journal.jsonl            what happened, one JSON object per line, append-only
+    trajectories/N-SUM.npz   outputs and inputs of evaluation N; Keep decides which ones are kept
+    lock                     held while a process writes here
+
+Lines are written before and after every simulation and after every reply of a language model. A last line
+that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
+a checksum, lines are numbered, and SUM in the name of a trajectory is that file's checksum: what was damaged
+is noticed. Only search/repair.py, which drops what is damaged, touches these files beside this module.
+"""
+
+import errno
+import json
+import logging
+import os
+import re
+import shlex
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.files import remove_partial, write_whole
+from falsifier.core.literals import one_line
+from falsifier.core.sealing import check_seal, checksum, seal
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import JournalError
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.record.records import (
+    AskedRecord,
+    ConfirmedRecord,
+    EndedRecord,
+    EvaluatedRecord,
+    ExchangeRecord,
+    FindingRecord,
+    Record,
+    VerdictRecord,
+    line_of,
+    parse_line,
+)
+from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
+from falsifier.search.request import Keep
+
+_LOG = logging.getLogger(__name__)
+
+MANIFEST = "manifest.json"
+JOURNAL = "journal.jsonl"
+TRAJECTORIES = "trajectories"
+LOCK = "lock"
+
+# Maximum time in s that lines may stay in the operating system's cache before they are forced to disk;
+# replies of a language model cost money and are forced to disk at once.
+_SYNC_PERIOD = 1.0
+# With Keep "history" the first so many trajectories are kept, then each that improves on the best.
+_KEPT_TRAJECTORIES = 200
+_TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
+# Errors of the operating system that say that a path can never be a folder.
+_NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
+# Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
+_ASKED = b'"kind":"asked"'
+_KIND_WITHIN = 40
+
+
+class Journal:
+    """Writes one run directory as a listener of the run; the only writer while it is open.
+
+    Args:
+        directory: run directory; created if missing.
+        keep: which trajectories are kept.
+        patience: time in s to wait for another process that writes here.
+
+    Raises:
+        JournalError: if another process still writes here after that time.
+    """
+
+    def __init__(self, directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> None:
+        self.directory = directory
+        self._keep = keep
+        with _can_be_a_folder(directory):
+            directory.mkdir(parents=True, exist_ok=True)
+            (directory / TRAJECTORIES).mkdir(exist_ok=True)
+        self._lock = FileLock(directory / LOCK)
+        try:
+            self._lock.acquire(timeout=patience)
+        except Timeout:
+            raise JournalError(
+                f"{directory}: another process is writing to this run; wait until it ends"
+            ) from None
+        path = directory / JOURNAL
+        try:
+            _check_is_file(path)
+            _drop_torn_line(path)
+            remove_partial(directory / TRAJECTORIES, _TRAJECTORY_NAMES)
+            remove_partial(directory, f"{re.escape(MANIFEST)}|{re.escape(JOURNAL)}")
+            self.records = read_journal(directory)
+            self._file = path.open("ab", buffering=0)
+        except BaseException:
+            self._lock.release()
+            raise
+        # A resumed run repeats the events that are recorded already; they are not written again.
+        self._recorded = Counter(map(_key, self.records))
+        self._lines = len(self.records)
+        self._synced = monotonic()
+
+    def __call__(self, event: Event) -> None:
+        """Record an event."""
+        match event:
+            case Asked():
+                self._add(
+                    AskedRecord(
+                        first=event.first,
+                        n=event.wanted,
+                        candidates=[c.to_json() for c in event.candidates],
+                        seconds=event.seconds,
+                        requirement=event.problem.name,
+                        proposer=event.proposer,
+                        told=event.told,
+                        elapsed=event.spent.seconds,
+                    )
+                )
+            case Exchanged():
+                exchange = event.exchange.model_dump(mode="json")
+                self._add(ExchangeRecord(exchange=exchange, elapsed=event.spent.seconds), at_once=True)
+            case Evaluated():
+                self._evaluated(event)
+            case Confirmed():
+                record = ConfirmedRecord.of(event.confirmation, index=event.index, spent=event.spent)
+                self._add(record, at_once=True)
+            case RunEnded():
+                ended = EndedRecord(
+                    status=event.status,
+                    reason=event.reason,
+                    spent=asdict(event.spent),
+                    findings={
+                        result.problem.name: [FindingRecord(**asdict(f)) for f in result.findings]
+                        for result in event.results
+                        if result.findings
+                    },
+                )
+                self.write(ended, at_once=True)
+            case _:
+                pass
+
+    def write(self, record: Record, *, at_once: bool = False) -> None:
+        """Append a record; at_once forces it to disk before returning.
+
+        Raises:
+            OSError: if it cannot be written; then nothing of it remains in the file.
+        """
+        size = self._file.seek(0, os.SEEK_END)
+        rest = memoryview(line_of(record, self._lines + 1))
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+            if at_once or monotonic() - self._synced > _SYNC_PERIOD:
+                os.fsync(self._file.fileno())
+                self._synced = monotonic()
+        except BaseException as error:
+            with suppress(OSError):
+                self._file.truncate(size)
+            if isinstance(error, OSError) and error.errno is not None:
+                error.filename = str(self._file.name)
+            raise
+        self._lines += 1
+
+    def close(self) -> None:
+        """Force everything to disk and let others write here."""
+        with suppress(OSError):  # the last line of a run was forced to disk when it was written
+            os.fsync(self._file.fileno())
+        self._file.close()
+        self._lock.release()
+
+    def _add(self, record: Record, *, at_once: bool = False) -> None:
+        """Append a record, unless the journal contains it already."""
+        if not self._is_recorded(_key(record)):
+            self.write(record, at_once=at_once)
+
+    def _is_recorded(self, key: "_Key") -> bool:
+        found = self._recorded[key] > 0
+        self._recorded[key] -= found
+        return found
+
+    def _evaluated(self, event: Evaluated) -> None:
+        """Append an evaluation, and save its trajectory if it is one to keep."""
+        if self._is_recorded(("evaluated", event.index)):
+            return
+        evaluation, file = event.evaluation, None
+        every = self._keep == "history" and event.index < _KEPT_TRAJECTORIES
+        if evaluation.trajectory is not None and (event.improved or every):
+            file = save_trajectory(self.directory, event.index, evaluation.trajectory)
+        self.write(
+            EvaluatedRecord(
+                index=event.index,
+                status=evaluation.status,
+                verdicts={name: VerdictRecord.of(e.verdict) for name, e in event.judged.items()},
+                reason=evaluation.reason,
+                seconds=evaluation.seconds,
+                log=list(evaluation.log),
+                trajectory=file,
+                elapsed=event.spent.seconds,
+            )
+        )
+        # Only after the record: a crash in between must not lose the trajectory that the journal refers to.
+        if file is not None and self._keep == "best":
+            for path in (self.directory / TRAJECTORIES).glob("*.npz"):
+                if path != self.directory / file:
+                    path.unlink()
+
+
+@contextmanager
+def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> Iterator[Journal]:
+    """Open the journal of a run directory, and close it even after an exception; see Journal."""
+    journal = Journal(directory, keep=keep, patience=patience)
+    try:
+        yield journal
+    finally:
+        journal.close()
+
+
+@contextmanager
+def _can_be_a_folder(directory: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _NO_FOLDER:
+            raise
+        raise JournalError(
+            f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
+        ) from None
+
+
+def _check_is_file(path: Path) -> None:
+    if path.is_dir():
+        raise JournalError(
+            f"{path} is a folder, not a journal; to set it aside: "
+            f"falsifier repair {shlex.quote(str(path.parent))}"
+        )
+
+
+def holds_run(directory: Path) -> bool:
+    """Whether a directory contains a run."""
+    with _can_be_a_folder(directory):
+        return (directory / MANIFEST).exists()
+
+
+def holds_lines(directory: Path) -> bool:
+    """Whether a directory contains a journal with at least one line."""
+    path = directory / JOURNAL
+    return path.exists() and path.stat().st_size > 0
+
+
+def read_manifest(directory: Path) -> dict[str, Any]:
+    """Read a run directory's manifest as plain JSON.
+
+    Raises:
+        JournalError: if there is none, or it is damaged.
+    """
+    path = directory / MANIFEST
+    try:
+        content = path.read_bytes()
+        check_seal(content)
+        manifest: dict[str, Any] = json.loads(content)
+        del manifest["sum"]
+    except (FileNotFoundError, NotADirectoryError):
+        raise JournalError(f"{directory}: not a run directory: it contains no {MANIFEST}") from None
+    except (ValueError, OSError, RecursionError) as error:
+        raise JournalError(
+            f"{path} is damaged: {one_line(str(error))}; this run cannot be continued: start a new one"
+        ) from None
+    return manifest
+
+
+def write_manifest(directory: Path, manifest: dict[str, Any]) -> None:
+    """Write the manifest of a run directory."""
+    content = {key: value for key, value in manifest.items() if key != "sum"}
+    write_whole(directory / MANIFEST, seal(json.dumps(content, indent=2)))
+
+
+def read_journal(directory: Path, *, with_candidates: bool = True) -> list[Record]:
+    """Read all complete records of a run directory in order; empty if there is no journal.
+
+    Args:
+        directory: run directory.
+        with_candidates: False: skip the records of what engines suggested, which are long.
+
+    Raises:
+        JournalError: if a line is invalid, unless it is an incomplete last line.
+    """
+    reader = JournalReader(directory, with_candidates=with_candidates)
+    return list(reader.new())
+
+
+class JournalReader:
+    """Reads a journal that is still growing.
+
+    Args:
+        directory: run directory; the run need not have started.
+        with_candidates: see read_journal.
+    """
+
+    def __init__(self, directory: Path, *, with_candidates: bool = True) -> None:
+        self.path = directory / JOURNAL
+        self.offset = 0
+        self.line = 0
+        self._with_candidates = with_candidates
+
+    @property
+    def shrank(self) -> bool:
+        """Whether the file is shorter than what was read; then start again with a new reader."""
+        return self.path.exists() and self.path.stat().st_size < self.offset
+
+    @property
+    def begun(self) -> bool:
+        """Whether anything has been read."""
+        return self.offset > 0
+
+    def new(self) -> Iterator[Record]:
+        """Yield the complete records written since the last call.
+
+        Raises:
+            JournalError: if a line is invalid.
+        """
+        _check_is_file(self.path)
+        if not self.path.exists() or self.path.stat().st_size == self.offset:
+            return
+        with self.path.open("rb") as file:
+            file.seek(self.offset)
+            for line in file:
+                if not line.endswith(b"\n"):  # cut off by a crash, or still being written
+                    return
+                self.line += 1
+                record = self._checked(line)
+                self.offset += len(line)
+                if record is not None:
+                    yield record
+
+    def _checked(self, line: bytes) -> Record | None:
+        """Check a line; return its record, or None if it is of a kind to skip."""
+        try:
+            check_seal(line)
+            if not self._with_candidates and _ASKED in line[:_KIND_WITHIN]:
+                return None
+            return parse_line(line, self.line)
+        except ValueError as error:
+            raise JournalError(
+                f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
+                f"falsifier repair {shlex.quote(str(self.path.parent))}"
+            ) from None
+
+
+def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
+    """Recorded candidates by the index of their evaluation."""
+    return {
+        record.first + i: Candidate.from_json(candidate)
+        for record in records
+        if isinstance(record, AskedRecord)
+        for i, candidate in enumerate(record.candidates)
+    }
+
+
+def recorded_evaluations(
+    directory: Path, records: Sequence[Record], requirement: str | None = None
+) -> dict[int, Evaluation]:
+    """Recorded evaluations by their index, in its order, each with its trajectory if that was kept.
+
+    Args:
+        directory: run directory.
+        records: records of its journal.
+        requirement: name of the requirement whose verdicts to return; None: of each evaluation, the
+            requirement whose engine suggested the candidate.
+    """
+    candidates = recorded_candidates(records)
+    turn: dict[int, str] = {}
+    evaluations = {}
+    for record in records:
+        if isinstance(record, AskedRecord):
+            turn |= dict.fromkeys(
+                range(record.first, record.first + len(record.candidates)), record.requirement
+            )
+        elif isinstance(record, EvaluatedRecord):
+            verdict = record.verdicts.get(requirement or turn[record.index])
+            evaluations[record.index] = Evaluation(
+                candidates[record.index],
+                record.status,
+                verdict.verdict if verdict else None,
+                record.reason,
+                recorded_trajectory(directory, record.trajectory),
+                record.seconds,
+                tuple(record.log),
+            )
+    return dict(sorted(evaluations.items()))
+
+
+def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
+    """Write a trajectory to a run directory and force it to disk; return its name for the record."""
+    buffer = BytesIO()
+    trajectory.save(buffer)
+    content = buffer.getvalue()
+    name = f"{TRAJECTORIES}/{index}-{checksum(content)}.npz"
+    write_whole(directory / name, content)
+    return name
+
+
+def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
+    """Load the trajectory of a record; None if it was not kept, or is damaged, of which a warning tells."""
+    if name is None:
+        return None
+    path = directory / name
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        _tell_lost(path, error.strerror or "it cannot be read")
+        return None
+    if is_intact(path, content):
+        return Trajectory.load(BytesIO(content))
+    _tell_lost(path, "its checksum does not match")
+    return None
+
+
+@cache
+def _tell_lost(path: Path, why: str) -> None:
+    """Tell it once, however often a command reads the file."""
+    _LOG.warning("%s is damaged: %s. It is left out, or simulated again where it is needed.", path, why)
+
+
+def is_intact(path: Path, content: bytes) -> bool:
+    """Whether the content of a trajectory's file matches the checksum in its name."""
+    return path.stem.rpartition("-")[2] == checksum(content)
+
+
+_Key = tuple[str | int, ...]
+
+
+def _key(record: Record) -> _Key:
+    """What a record is about: a resumed run does not write a record about the same again."""
+    match record:
+        case AskedRecord():
+            return record.kind, record.first
+        case EvaluatedRecord():
+            return record.kind, record.index
+        case ConfirmedRecord():
+            return record.kind, record.index, record.requirement
+        case _:
+            return (record.kind,)
+
+
+def _drop_torn_line(path: Path) -> None:
+    if not path.exists():
+        return
+    content = path.read_bytes()
+    end = content.rfind(b"\n") + 1
+    if end < len(content):
+        with path.open("r+b") as file:
+            file.truncate(end)

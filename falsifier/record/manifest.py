@@ -1,0 +1,266 @@
+"""The manifest of a run directory: what was requested, with which versions, files and ranges."""
+
+import platform
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from falsifier import __version__
+from falsifier.context.values import Context
+from falsifier.core.model import Variable
+from falsifier.core.space import InputRange, ParameterRange, ValueKind
+from falsifier.errors import JournalError, rejected
+from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
+from falsifier.problem.loading import spec_file
+from falsifier.problem.problem import Held, Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.problem.source import Searched
+from falsifier.record.journal import MANIFEST, read_manifest
+from falsifier.search.parameterization import parameterization_note, parameterization_of
+from falsifier.search.refine import levels_of
+from falsifier.search.request import RunRequest
+
+_RECORDED_PACKAGES = ("litellm", "numba", "numpy", "rtamt", "scipy")
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+
+class InputRecord(_Strict):
+    """One searched input or parameter, so that reports can draw a run without its model."""
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+    description: str = ""
+    kind: ValueKind = "real"
+    items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
+
+
+class HeldRecord(_Strict):
+    """One input or parameter that is not searched."""
+
+    name: str
+    causality: Literal["input", "parameter"]
+    value: float | str | None = Field(description="At which it is held; null: the model's own.")
+    reason: str = Field(description="Why it is not searched.")
+
+
+class ModeRecord(_Strict):
+    """One recorded signal of the model that is not real."""
+
+    name: str
+    kind: ValueKind
+    items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
+
+
+class RequirementRecord(_Strict):
+    """One requirement."""
+
+    name: str
+    formula: str
+    description: str = ""
+
+    @classmethod
+    def of(cls, requirement: Requirement) -> "RequirementRecord":
+        """Return the record of a requirement."""
+        return cls(
+            name=requirement.name, formula=str(requirement.formula), description=requirement.description
+        )
+
+
+class LevelRecord(_Strict):
+    """One level of a search that refines its inputs."""
+
+    first: int = Field(description="Number of simulations before it.")
+    searched: str = Field(description="How it searches the inputs, in words.")
+
+
+class Manifest(_Strict):
+    """Content of manifest.json: everything needed to repeat the run and to report on it."""
+
+    falsifier: str = Field(description="Version of this package.")
+    python: str
+    platform: str
+    packages: dict[str, str] = Field(description="Versions of the packages that influence the numbers.")
+    started: str = Field(description="Date and time in UTC.")
+    request: RunRequest
+    engine: str = Field(description="Name of the engine, even if it was made in Python.")
+    requirements: tuple[RequirementRecord, ...] = Field(min_length=1)
+    fingerprints: dict[str, str] = Field(
+        description="Hash of what is searched and how it is simulated, by requirement."
+    )
+    model: str = Field(description="Name of the model.")
+    components: tuple[str, ...] = Field((), description="Names of the components, if the model is a system.")
+    parameterization: Searched = Field(
+        description="free: the engine could choose the control points of at least one input; refined: only "
+        "after a search with the spec's own."
+    )
+    levels: tuple[LevelRecord, ...] = Field(
+        (), description="If the inputs are refined step by step: the levels, coarse first."
+    )
+    inputs: tuple[InputRecord, ...]
+    parameters: tuple[InputRecord, ...]
+    not_searched: tuple[HeldRecord, ...] = Field(
+        description="The other inputs and the parameters, with the values at which they are held."
+    )
+    modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
+    stop_time: float = Field(description="End of each simulation in s.")
+    hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec, by path.")
+    contexts: dict[str, Context] = Field(
+        {}, description="What the language model was told of context files, by requirement."
+    )
+    sum: str = Field("", description="Checksum of the file up to here.")
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """The inputs and parameters that were not searched."""
+        return tuple(Held(**record.model_dump()) for record in self.not_searched)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the requirements; several if they share a search."""
+        return tuple(r.name for r in self.requirements)
+
+    @property
+    def shared(self) -> bool:
+        """Whether several requirements share a search."""
+        return len(self.requirements) > 1
+
+    @property
+    def requirement(self) -> RequirementRecord:
+        """The requirement; the first one if several share a search."""
+        return self.requirements[0]
+
+    @property
+    def fmu_sha256(self) -> str | None:
+        """SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither."""
+        return fmus_sha256(digest for path, digest in self.hashes.items() if path.endswith(".fmu"))
+
+    def of(self, name: str) -> "Manifest":
+        """Return the manifest reduced to one requirement.
+
+        Raises:
+            JournalError: for an unknown name; it lists the known ones.
+        """
+        if name not in self.names:
+            raise JournalError(f"this run searched {', '.join(self.names)}, not {name}")
+        which = self.names.index(name)
+        request = self.request.model_copy(update={"problems": self.request.problems[which : which + 1]})
+        return self.model_copy(update={"requirements": (self.requirements[which],), "request": request})
+
+
+def read(directory: Path) -> Manifest:
+    """Read the manifest of a run directory.
+
+    Raises:
+        JournalError: if there is none, or it is invalid.
+    """
+    try:
+        return Manifest.model_validate(read_manifest(directory))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        message = rejected(first["msg"], first["input"])
+        raise JournalError(f"{directory}/{MANIFEST}: {key}: {message}") from None
+
+
+def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> Manifest:
+    """Make the manifest of a run before it starts."""
+    problem = problems[0]
+    space = problem.space
+    levels = levels_of(request, space)
+    is_refined = len(levels) > 1
+    return Manifest(
+        **environment(),
+        request=request,
+        engine=engine,
+        requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
+        fingerprints={p.name: p.fingerprint for p in problems},
+        model=problem.info.name,
+        components=problem.info.components,
+        parameterization="refined" if is_refined else parameterization_of(levels[0].space),
+        levels=tuple(
+            LevelRecord(first=level.first, searched=parameterization_note(level.space))
+            for level in (levels if is_refined else ())
+        ),
+        inputs=tuple(_range_record(r) for r in space.inputs),
+        parameters=tuple(_range_record(p) for p in space.parameters),
+        not_searched=tuple(HeldRecord(**asdict(held)) for held in problem.held),
+        modes=tuple(_modes(problem)),
+        stop_time=space.stop_time,
+        hashes=file_hashes(problem),
+        contexts={p.name: p.context for p in problems if p.context != Context()},
+    )
+
+
+def environment() -> dict[str, Any]:
+    """Versions, platform and time, as keyword arguments of a manifest."""
+    return {
+        "falsifier": __version__,
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "packages": {name: found for name in _RECORDED_PACKAGES if (found := _version(name))},
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def file_hashes(problem: Problem) -> dict[str, str]:
+    """SHA-256, by path, of the files that determine what is simulated: the FMUs and the spec."""
+    spec = None if problem.source is None else spec_file(problem.source)
+    # What is in a package was extracted to a folder of this process; the package's own hash covers it.
+    fmus = [] if is_packaged(problem.model) else fmu_files(problem.model)
+    return {str(p): sha256(p.read_bytes()).hexdigest() for p in (*fmus, *([spec] if spec else []))}
+
+
+def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
+    """Refuse to resume a run or campaign if a file or problem differs from when it was started.
+
+    Args:
+        directory: directory of the run or campaign.
+        recorded: hashes by path, or fingerprints by requirement, from the record.
+        found: the same, computed now.
+
+    Raises:
+        JournalError: naming what has changed.
+    """
+    for name, digest in found.items():
+        if recorded.get(name, digest) != digest:
+            raise JournalError(f"{directory}: {name} has changed since the start; start a new run instead")
+
+
+def _range_record(range_: InputRange | ParameterRange) -> InputRecord:
+    return InputRecord(
+        name=range_.name,
+        low=range_.low,
+        high=range_.high,
+        unit=range_.unit,
+        description=range_.description,
+        kind=range_.kind,
+        items=range_.items,
+    )
+
+
+def _modes(problem: Problem) -> Iterator[ModeRecord]:
+    for name in problem.experiment.outputs:
+        variable = problem.info[name] if name in problem.info else Variable(name)
+        if variable.kind in ("integer", "boolean", "enumeration"):
+            yield ModeRecord(name=name, kind=variable.kind, items=tuple(variable.literals.items()))
+
+
+@cache
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

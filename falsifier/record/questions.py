@@ -1,0 +1,147 @@
+"""What a recorded run asked a language model, what came of it, and which of its violations are in doubt."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from falsifier.core.candidate import Candidate
+from falsifier.errors import JournalError
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.messages import Exchange
+from falsifier.problem.problem import Problem
+from falsifier.record.records import (
+    AskedRecord,
+    ConfirmedRecord,
+    EvaluatedRecord,
+    ExchangeRecord,
+    Record,
+)
+from falsifier.stl.margins import signed
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of one candidate.
+
+    Attributes:
+        index: index of its evaluation.
+        candidate: what was proposed.
+        text: robustness, or why there is none, and whether a violation was confirmed; empty if it was not
+            simulated.
+        seconds: how long the simulation took, in s.
+    """
+
+    index: int
+    candidate: Candidate
+    text: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Iteration:
+    """One call of an engine, and what came of it.
+
+    Attributes:
+        exchanges: what was asked and answered during the call, rejected replies included.
+        outcomes: one per candidate.
+        seconds: how long the call took, with its questions, in s.
+    """
+
+    exchanges: tuple[Exchange, ...]
+    outcomes: tuple[Outcome, ...]
+    seconds: float
+
+    @property
+    def question_seconds(self) -> float:
+        """How long its questions took, in s."""
+        return sum(exchange.seconds for exchange in self.exchanges)
+
+    @property
+    def simulation_seconds(self) -> float:
+        """How long its simulations took, in s."""
+        return sum(outcome.seconds for outcome in self.outcomes)
+
+
+def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
+    """Return the calls of the engine of one requirement in order.
+
+    Exchanges after the last call are a call of their own, without candidates: the run ended during it.
+    """
+    told, asked = _outcomes(records := list(records), requirement), list[ExchangeRecord]()
+    found = []
+    for record in records:
+        if isinstance(record, ExchangeRecord):
+            asked.append(record)
+        elif isinstance(record, AskedRecord):
+            if record.requirement == requirement:
+                outcomes = [
+                    Outcome(i, Candidate.from_json(c), *told.get(i, ("", 0.0)))
+                    for i, c in enumerate(record.candidates, start=record.first)
+                ]
+                found.append(Iteration(_exchanges(asked), tuple(outcomes), record.seconds))
+            asked = []
+    return [*found, Iteration(_exchanges(asked), (), 0.0)] if asked else found
+
+
+def _exchanges(records: Iterable[ExchangeRecord]) -> tuple[Exchange, ...]:
+    return tuple(Exchange.model_validate(record.exchange) for record in records)
+
+
+def _outcomes(records: Iterable[Record], requirement: str) -> dict[int, tuple[str, float]]:
+    """Return what came of each evaluation, and how long it took, by index."""
+    found: dict[int, tuple[str, float]] = {}
+    for record in records:
+        if isinstance(record, EvaluatedRecord):
+            verdict = record.verdicts.get(requirement)
+            text = (
+                f"robustness {signed(verdict.robustness)}" if verdict else f"{record.status}: {record.reason}"
+            )
+            found[record.index] = text, record.seconds
+        elif isinstance(record, ConfirmedRecord) and record.requirement == requirement:
+            text, seconds = found[record.index]
+            reason = "" if record.outcome == "confirmed" else f" ({record.reason})"
+            found[record.index] = f"{text}, {record.outcome}{reason}", seconds
+    return found
+
+
+def exchange_before(records: Iterable[Record], index: int) -> Exchange | None:
+    """Return the last exchange before an evaluation's candidate was suggested; None if there was none.
+
+    Raises:
+        JournalError: if the journal contains no such evaluation.
+    """
+    last: ExchangeRecord | None = None
+    for record in records:
+        if isinstance(record, ExchangeRecord):
+            last = record
+        elif isinstance(record, AskedRecord) and 0 <= index - record.first < len(record.candidates):
+            return None if last is None else Exchange.model_validate(last.exchange)
+    raise JournalError(f"the run has no sample {index + 1}")
+
+
+def doubtful_confirmations(
+    problem: Problem, records: Iterable[Record], evaluations: Mapping[int, Evaluation]
+) -> list[Confirmation]:
+    """Return the recorded confirmations of violations that do not count, of one requirement.
+
+    Args:
+        problem: problem whose requirement was violated.
+        records: records of a journal.
+        evaluations: evaluations of the same run by their index.
+    """
+    return [
+        Confirmation(
+            problem=problem,
+            evaluation=evaluations[record.index],
+            outcome=record.outcome,
+            robustness=record.robustness,
+            reference=record.reference,
+            reason=record.reason,
+            halved=record.halved,
+        )
+        for record in records
+        if isinstance(record, ConfirmedRecord)
+        and record.requirement == problem.name
+        and record.outcome != "confirmed"
+        and record.index in evaluations
+    ]

@@ -1,0 +1,178 @@
+"""Resumes a run by replay: steps that the journal contains are taken from it, the rest is carried out.
+
+The engine is asked again and must suggest what was recorded; that restores its state. Evaluations,
+confirmations and replies of a language model come from the journal and cost nothing. The question without a
+valid reply that ended a run is asked again; it stays paid for.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines.protocol import Engine
+from falsifier.errors import JournalError
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.conversation import MAX_REASKS
+from falsifier.llm.messages import Chat, Exchange
+from falsifier.llm.replay import RecordedChat, Recording
+from falsifier.problem.problem import Problem
+from falsifier.record.journal import recorded_evaluations
+from falsifier.record.records import (
+    AskedRecord,
+    ConfirmedRecord,
+    EndedRecord,
+    ExchangeRecord,
+    Record,
+    elapsed_at,
+    spent_of,
+)
+from falsifier.search.budget import Spent
+from falsifier.search.moves import Ask, Move
+from falsifier.search.proposals import proposals
+from falsifier.search.steps import Steps
+
+
+@dataclass(slots=True)
+class Replayed:
+    """The steps that a journal contains, then live ones.
+
+    Attributes:
+        live: carries out the rest.
+        asked: what engines suggested, by the index of the first candidate's evaluation.
+        evaluations: recorded evaluations by index; those that a repair dropped are carried out.
+        confirmed: recorded confirmations by evaluation index and requirement.
+        recording: recorded replies of a language model.
+        seconds: wall-clock seconds of the recorded part.
+        unrepeated: what was spent on questions that are not played back.
+    """
+
+    live: Steps
+    asked: dict[int, AskedRecord]
+    evaluations: dict[int, Evaluation]
+    confirmed: dict[tuple[int, str], ConfirmedRecord]
+    recording: Recording
+    seconds: float
+    unrepeated: Spent
+    replayed: int = field(init=False)
+    _next: int = 0
+
+    def __post_init__(self) -> None:
+        self.replayed = len(self.evaluations)
+
+    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
+        """Repeat the recorded moves: ask the same proposer once as much has been told as then."""
+        record = self.asked.get(self._next)
+        if record is None:
+            return decide()
+        return Ask(record.proposer, record.n) if settled >= record.told else None
+
+    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
+        """Let the engine repeat its recorded suggestions.
+
+        Raises:
+            JournalError: if it suggests something else.
+        """
+        record = self.asked.get(self._next)
+        if record is None:
+            return self.live.ask(problem, engine, wanted)
+        # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
+        candidates = proposals(engine, problem.space, record.n)
+        if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
+            raise JournalError(
+                f"cannot resume: candidate {record.first} of the engine {engine.name!r} differs from the "
+                "journal, which was written with other settings or another version; start a new run"
+            )
+        return candidates, record.n, record.seconds
+
+    def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
+        """Return functions for recorded evaluations, and start live ones of candidates without."""
+        first, self._next = self._next, self._next + len(candidates)
+        return [self._start(problem, *item) for item in enumerate(candidates, first)]
+
+    def _start(self, problem: Problem, index: int, candidate: Candidate) -> Callable[[], Evaluation]:
+        """Start what is left of an evaluation: all of it, its trajectory, or nothing."""
+        recorded = self.evaluations.get(index)
+        if recorded is None:
+            return self.live.start(problem, [candidate])[0]
+        if recorded.verdict is None or recorded.trajectory is not None:
+            return lambda: recorded
+        # The trajectory was not kept, but engines need it.
+        simulate = self.live.start(problem, [recorded.candidate])[0]
+        return lambda: replace(recorded, trajectory=simulate().trajectory)
+
+    def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
+        """Tell the engine, which has to learn again what it had learnt."""
+        return self.live.tell(engine, evaluations)
+
+    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
+        """Return the recorded confirmation of a violation; without one, confirm it."""
+        record = self.confirmed.get((index, problem.name))
+        if record is None:
+            return self.live.confirm(problem, evaluation, index)
+        return Confirmation(
+            problem=problem,
+            evaluation=evaluation,
+            outcome=record.outcome,
+            robustness=record.robustness,
+            reference=record.reference,
+            reason=record.reason,
+            halved=record.halved,
+        )
+
+    def chat(self, inner: Chat) -> Chat:
+        """Return a chat that plays the recorded replies first."""
+        return RecordedChat(self.recording, self.live.chat(inner))
+
+
+def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
+    """Return steps that replay a journal; with an empty journal, the live ones."""
+    if not records:
+        return live
+    exchanges, unrepeated = _played_back(records)
+    return Replayed(
+        live,
+        {r.first: r for r in records if isinstance(r, AskedRecord)},
+        recorded_evaluations(directory, records),
+        {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
+        Recording(exchanges),
+        max(map(elapsed_at, records)),
+        unrepeated,
+    )
+
+
+def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
+    """The exchanges that a resumed run plays back, and what the others had cost when the run ended.
+
+    A question to which no reply was valid, at which the run failed, is asked again: its recorded replies
+    would only fail once more. One that was cut off, whatever by, goes on after its last reply.
+    """
+    kept: list[Exchange] = []
+    unrepeated, answered = Spent(), 0
+    for record in records:
+        if isinstance(record, ExchangeRecord):
+            kept.append(Exchange.model_validate(record.exchange))
+        elif isinstance(record, AskedRecord):
+            answered = len(kept)
+        elif isinstance(record, EndedRecord):
+            rejected = sum(bool(e.problem) and e.reply is not None for e in kept[answered:])
+            if record.status == "failed" and rejected > MAX_REASKS:
+                del kept[answered:]
+            unrepeated = _difference(spent_of(record.spent), kept)
+    return kept, unrepeated
+
+
+def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
+    """What was spent on a language model beyond the exchanges that are played back."""
+    usages = [exchange.usage for exchange in played]
+    costs = [usage.cost for usage in usages if usage.cost is not None]
+    cost = None if spent.cost is None else max(0.0, round(spent.cost - sum(costs), 12))
+    return Spent(
+        calls=spent.calls - sum(exchange.requests for exchange in played),
+        timed_out=spent.timed_out - sum(usage.timed_out for usage in usages),
+        prompt_tokens=spent.prompt_tokens - sum(usage.prompt_tokens for usage in usages),
+        completion_tokens=spent.completion_tokens - sum(usage.completion_tokens for usage in usages),
+        reasoning_tokens=spent.reasoning_tokens - sum(usage.reasoning_tokens for usage in usages),
+        cost=cost,
+    )

@@ -1,0 +1,404 @@
+"""The entry points of the search: ``falsify`` starts a run, ``resume`` continues one."""
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import overload
+
+from falsifier.core.arguments import instance, whole
+from falsifier.core.candidate import Candidate
+from falsifier.core.files import file_name
+from falsifier.core.fitting import fit
+from falsifier.engines import ENGINES
+from falsifier.engines.protocol import AsksLLM, Engine
+from falsifier.engines.starting import KNOWN, Starting
+from falsifier.errors import JournalError, SpecError
+from falsifier.evaluation.workers import local_executor
+from falsifier.llm.messages import Chat
+from falsifier.problem.loading import load_source, load_sources, reloadable
+from falsifier.problem.problem import Problem, alike, check_names
+from falsifier.problem.refinement import widened
+from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
+from falsifier.record.journal import holds_lines, holds_run, open_journal, write_manifest
+from falsifier.record.manifest import Manifest
+from falsifier.record.replay import replayed
+from falsifier.search.budget import Budget, budget_of, what_counts
+from falsifier.search.events import Listener
+from falsifier.search.leaders import make_engines, make_scouts, told_problems
+from falsifier.search.levels import Level
+from falsifier.search.loop import search
+from falsifier.search.moves import Objective
+from falsifier.search.refine import level_starts, levels_of, make_refining
+from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.search.result import Result
+from falsifier.search.steps import Live, Steps
+
+Falsifiable = Problem | ProblemSource | str
+LLM = LLMSettings | Chat | str
+
+
+@overload
+def falsify(
+    problem: Falsifiable,
+    engine: str | Engine | None = ...,
+    *,
+    llm: LLM | None = ...,
+    budget: Budget | int | None = ...,
+    objective: Objective | None = ...,
+    seed: int = ...,
+    directory: Path | str | None = ...,
+    jobs: int = ...,
+    start_from: Iterable[Candidate] = ...,
+    refine: bool = ...,
+    listeners: Iterable[Listener] = ...,
+) -> Result: ...
+
+
+@overload
+def falsify(
+    problem: list[Falsifiable] | tuple[Falsifiable, ...],
+    engine: str | None = ...,
+    *,
+    llm: LLM | None = ...,
+    budget: Budget | int | None = ...,
+    objective: Objective | None = ...,
+    seed: int = ...,
+    directory: Path | str | None = ...,
+    jobs: int = ...,
+    start_from: Iterable[Candidate] = ...,
+    refine: bool = ...,
+    listeners: Iterable[Listener] = ...,
+) -> list[Result]: ...
+
+
+# Sequence[Falsifiable] would include str, which is one target; and list is invariant.
+@overload
+def falsify(
+    problem: Sequence[Problem | ProblemSource] | list[str],
+    engine: str | None = ...,
+    *,
+    llm: LLM | None = ...,
+    budget: Budget | int | None = ...,
+    objective: Objective | None = ...,
+    seed: int = ...,
+    directory: Path | str | None = ...,
+    jobs: int = ...,
+    start_from: Iterable[Candidate] = ...,
+    refine: bool = ...,
+    listeners: Iterable[Listener] = ...,
+) -> list[Result]: ...
+
+
+def falsify(
+    problem: Falsifiable | Sequence[Falsifiable],
+    engine: str | Engine | None = None,
+    *,
+    llm: LLM | None = None,
+    budget: Budget | int | None = None,
+    objective: Objective | None = None,
+    seed: int = 0,
+    directory: Path | str | None = None,
+    jobs: int = 1,
+    start_from: Iterable[Candidate] = (),
+    refine: bool = False,
+    listeners: Iterable[Listener] = (),
+) -> Result | list[Result]:
+    """Search for inputs that violate one requirement, or several.
+
+    Requirements that differ in nothing else share a search: every simulation is judged against all of them,
+    and they share one budget. Requirements that differ in what is varied or how it is simulated are searched
+    in groups, one after the other, each with the full budget and its own directory below the given one.
+
+    Args:
+        problem: what to falsify: a Problem, or a target of ``falsifier run`` such as ``"AT1"``; or a list.
+        engine: name of an engine, or an engine made in Python; default: ``surrogate``, or the language model
+            if one is given.
+        llm: name of a language model such as ``"openai/gpt-5-mini"``, its settings, or a chat with it.
+        budget: limits; a plain number limits the simulations. Default: 100 simulations, or 60 s if time is
+            the objective.
+        objective: ``"simulations"``: find a violation in few simulations; ``"time"``: in little time, so
+            that cheap proposals are simulated while the engine thinks or beside it, as long as a simulation
+            takes less time than a proposal. Default: simulations if the budget limits their number,
+            otherwise time.
+        seed: seed of an engine given by name.
+        directory: where to record the run, so that it can be resumed; None: no record.
+        jobs: number of simulations at a time.
+        start_from: known candidates, which are simulated first and count in the budget; they are fitted to
+            the search space.
+        refine: search inputs with their own control points first, then faster ones, level by level; each
+            level gets the same share of the budget.
+        listeners: called with every event.
+
+    Returns:
+        One result, or for a list of problems a list of results in the same order.
+
+    Raises:
+        SpecError: if a problem, an engine, a language model or a number is not valid, or two problems have
+            the same name.
+        CandidateError: if an engine made in Python returns a candidate outside the search space, or one to
+            start from does not fit it.
+        ModelError: if the FMU cannot be used.
+        ChatError: if the language model cannot be asked; raised before the first simulation.
+        JournalError: if the directory already contains a run.
+
+    >>> falsify("AT1", budget=20).status  # doctest: +SKIP
+    'falsified'
+    """
+    several = not isinstance(problem, Falsifiable)
+    if several and not isinstance(problem, Iterable):
+        raise SpecError(f"expected a Problem, a target such as 'AT1' or a list, got {type(problem).__name__}")
+    problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
+    check_names(problems)
+    _check_engine(engine)
+    seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)
+    limits = _budget(budget, objective)
+    if objective not in (None, "simulations", "time"):
+        raise SpecError(f"objective: expected 'simulations' or 'time', got {objective!r}")
+    if refine and not isinstance(engine, str | None):
+        raise SpecError("refine: each level has an engine of its own: pass the name of an engine instead")
+    groups, known = alike(problems), list(start_from)
+    chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
+    name, settings = engine if isinstance(engine, str) or engine is None else engine.name, _settings(llm)
+    results: dict[str, Result] = {}
+    for same in groups:
+        group = widened(same) if refine else same
+        space = group[0].space
+        request = RunRequest(
+            problems=_sources(group) if directory is not None else (),
+            engine=name,
+            llm=settings,
+            levels=level_starts(space, name, settings, limits) if refine else (),
+            seed=seed,
+            budget=limits,
+            jobs=jobs,
+            objective=what_counts(objective, limits),
+            start_from=tuple(fit(space, each).candidate.to_json() for each in known),
+        )
+        place = None if directory is None else Path(directory)
+        if place is not None and len(groups) > 1:
+            place = place / file_name(group[0].name)
+        found = carry_out(
+            request,
+            group,
+            place,
+            engine=None if isinstance(engine, str) else engine,
+            chat=chat,
+            listeners=listeners,
+        )
+        results |= {result.problem.name: result for result in found}
+    ordered = [results[each.name] for each in problems]
+    return ordered if several else ordered[0]
+
+
+def resume(
+    directory: Path | str,
+    *,
+    problems: Sequence[Problem] = (),
+    engine: Engine | None = None,
+    chat: Chat | None = None,
+    budget: Budget | int | None = None,
+    listeners: Iterable[Listener] = (),
+) -> list[Result]:
+    """Continue a recorded run; nothing that is recorded is simulated or asked again.
+
+    Args:
+        directory: run directory, or a folder of run directories, which are continued one after the other.
+        problems: what is searched, if it was made in Python: the problems of all these runs.
+        engine: the engine, if it was made in Python: a new instance in its initial state.
+        chat: chat with the language model, if it was made in Python.
+        budget: limits of the whole run, including what is recorded; a plain number replaces the limit on
+            simulations alone; default: the original limits.
+        listeners: called with every event.
+
+    Returns:
+        One result per requirement.
+
+    Raises:
+        JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
+    """
+    if isinstance(problems, Problem | str) or not isinstance(problems, Sequence):
+        raise SpecError(
+            f"problems: expected a list, got {type(problems).__name__}; for one: problems=[problem]"
+        )
+    for problem in problems:
+        instance("problems", problem, Problem, "a list of Problem")
+    directory = Path(directory)
+    places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
+    results: list[Result] = []
+    described_at = {place: manifest.read(place) for place in places or [directory]}
+    searched = [name for described in described_at.values() for name in described.names]
+    for problem in problems:
+        if problem.name not in searched:
+            raise JournalError(f"{directory}: this run searched {', '.join(searched)}, not {problem.name}")
+    for place, described in described_at.items():
+        request = described.request
+        if budget is not None:
+            request = request.model_copy(update={"budget": _changed(request.budget, budget)})
+        if not problems and not request.problems:
+            raise JournalError(
+                f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
+            )
+        if engine is None and request.llm is None and described.engine not in ENGINES:
+            raise JournalError(
+                f"{place}: this run's engine was made in Python: call resume() with engine=..."
+            )
+        if problems:
+            loaded = _given(problems, described, place)
+            loaded = widened(loaded) if request.levels else loaded
+        else:
+            loaded = load_sources(request.problems)
+        results += carry_out(
+            request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
+        )
+    return results
+
+
+def carry_out(
+    request: RunRequest,
+    problems: Sequence[Problem],
+    directory: Path | None,
+    *,
+    described: Manifest | None = None,
+    engine: Engine | None = None,
+    chat: Chat | None = None,
+    listeners: Iterable[Listener] = (),
+    resume: bool = False,
+    patience: float = 0.0,
+) -> list[Result]:
+    """Carry out a request whose problems are loaded; for falsify, resume and the workers of campaigns.
+
+    Args:
+        request: what to run.
+        problems: what is searched; they differ only in their requirement.
+        directory: run directory; None: no record.
+        described: manifest of the request; None: it is made here.
+        engine: the engine, if it was made in Python.
+        chat: chat with the language model, if it was made in Python.
+        listeners: called with every event.
+        resume: continue from the directory's journal; without a journal, start.
+        patience: time in s to wait for another process that writes to the directory.
+    """
+    started = perf_counter()
+    if engine is not None and len(problems) > 1:
+        raise SpecError(
+            "an engine made in Python can search only one requirement: pass the name of an engine instead"
+        )
+    with ExitStack() as stack:
+        begun = directory is not None and holds_run(directory)
+        if begun and not resume:
+            raise JournalError(
+                f"{directory} already contains a run: choose another directory, or to continue it: "
+                + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
+            )
+        if directory is not None and not begun and holds_lines(directory):
+            raise JournalError(
+                f"{directory} contains a journal without its manifest, so nobody knows what it belongs to: "
+                "choose another directory, or delete it"
+            )
+        # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
+        levels = levels_of(request, problems[0].space)
+        recorded = manifest.read(directory).contexts if begun and directory else {}
+        told = told_problems(request, problems, described.contexts if described else recorded)
+        made = [engine] if engine is not None else _engines(request, told, levels, chat)
+        scouts = make_scouts(request, problems)
+        known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
+        engines: list[Engine] = [Starting(each, known) for each in made] if known else made
+        for problem in problems:
+            stack.callback(problem.model.close)
+        live = Live(stack.enter_context(local_executor(request.jobs, problems[0].model)))
+        steps: Steps = live
+        all_listeners = tuple(listeners)
+        if directory is not None:
+            described = described or manifest.describe(request, told, engines[0].name)
+            if begun:
+                _check_same(directory, described)
+            journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
+            if not begun:
+                write_manifest(directory, described.model_dump(mode="json"))
+            steps = replayed(directory, journal.records, live)
+            all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
+        return search(
+            problems,
+            engines,
+            request.budget,
+            steps=steps,
+            scouts=scouts,
+            objective=request.objective,
+            jobs=request.jobs,
+            in_batches=bool(request.levels) or any(isinstance(each, AsksLLM) for each in made),
+            levels=levels,
+            directory=directory,
+            listeners=all_listeners,
+            prepared=perf_counter() - started,
+        )
+
+
+def _engines(
+    request: RunRequest, problems: Sequence[Problem], levels: Sequence[Level], chat: Chat | None
+) -> list[Engine]:
+    if request.levels:
+        return list(make_refining(request, problems, levels, chat))
+    return make_engines(request, problems, chat)
+
+
+def _given(problems: Sequence[Problem], described: Manifest, place: Path) -> list[Problem]:
+    """Return the problems that a run searched, in its order, from those that the user gave."""
+    by_name = {problem.name: problem for problem in problems}
+    missing = [name for name in described.names if name not in by_name]
+    if missing:
+        raise JournalError(f"{place}: this run also searched {', '.join(missing)}: add it to problems=[...]")
+    return [by_name[name] for name in described.names]
+
+
+def _problem(given: Falsifiable) -> Problem:
+    if isinstance(given, Problem):
+        return given
+    if not isinstance(given, Falsifiable):
+        raise SpecError(f"expected a Problem or a target such as 'AT1', got {type(given).__name__}")
+    return load_source(ProblemSource(target=given) if isinstance(given, str) else given)
+
+
+def _check_engine(engine: object) -> None:
+    """Check that an engine is a name, or has what an engine needs."""
+    is_made = (
+        hasattr(engine, "ask") and hasattr(engine, "tell") and isinstance(getattr(engine, "name", 0), str)
+    )
+    if not is_made and not isinstance(engine, str | None):
+        raise SpecError(
+            f"engine: expected a name, or an object with name, ask() and tell(), got {type(engine).__name__}"
+        )
+
+
+def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
+    """Where the problems come from; empty if any of them was made or changed in Python."""
+    sources = [reloadable(problem) for problem in problems]
+    return tuple(s for s in sources if s is not None) if all(sources) else ()
+
+
+def _budget(given: Budget | int | None, objective: Objective | None = None) -> Budget:
+    if isinstance(given, Budget):
+        return given
+    return budget_of(None if given is None else whole("budget", given, least=1), objective=objective)
+
+
+def _changed(budget: Budget, given: Budget | int) -> Budget:
+    """The limits of a run that is continued with others."""
+    if isinstance(given, Budget):
+        return given
+    return replace(budget, simulations=whole("budget", given, least=1))
+
+
+def _settings(llm: LLM | None) -> LLMSettings | None:
+    if llm is None or isinstance(llm, LLMSettings):
+        return llm
+    return LLMSettings(name=llm if isinstance(llm, str) else llm.llm)
+
+
+def _check_same(directory: Path, described: Manifest) -> None:
+    recorded = manifest.read(directory)
+    manifest.check_unchanged(directory, recorded.hashes, described.hashes)
+    manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)

@@ -1,0 +1,194 @@
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from falsifier.analyses.assess import Searched, assess, lower_bound, upper_bound
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange, SearchSpace
+from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.record.run import falsify
+from falsifier.testing import BIAS, FREE, START, Array, lag_problem
+from tests.problems import mostly_broken, never
+
+
+def direct(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Give the parameter itself, so that the probability of a violation is that of a uniform number."""
+    return {"x": np.full(times.shape, parameters["bias"])}
+
+
+def system(limit: float):  # type: ignore[no-untyped-def]
+    return lag_problem(f"G[0,10] (x <= {limit})", inputs=0, parameters=[BIAS], response=direct)
+
+
+def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
+    problem = system(0.8)
+    found = assess(problem, budget=60, seed=3)
+    same = falsify(system(5.0), "uniform", budget=60, seed=3).evaluations
+    expected = sum(e.candidate.parameters["bias"] > 0.8 for e in same)
+    assert (found.drawn, found.violations) == (60, expected) and expected > 0
+    assert found.bound == upper_bound(expected, 60, 0.95)
+    assert found.interval == (lower_bound(expected, 60, 0.975), upper_bound(expected, 60, 0.975))
+    assert found.smallest.robustness == pytest.approx(0.8 - max(e.candidate.parameters["bias"] for e in same))
+
+
+def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
+    found = assess(system(2.0), budget=100, confidence=0.99)
+    assert found.interval == (0.0, upper_bound(0, 100, 0.995)) and found.splitting is None
+    assert "between" not in found.text
+    assert found.bound == pytest.approx(1 - 0.01 ** (1 / 100))
+    for part in (
+        "0 of 100 random simulations violate",
+        "With 99 % confidence, the probability of a violation is at most 0.045",
+        "smallest robustness of these was +1.0",
+        "bias uniform in [-1, 1]",
+    ):
+        assert part in found.text
+
+
+def test_splitting_takes_its_part_of_the_budget_and_is_marked_as_an_estimate() -> None:
+    counts: list[int] = []
+    found = assess(system(0.998), budget=3800, splitting=3750, seed=1, progress=counts.append)
+    assert found.drawn == 50 and found.splitting is not None
+    assert counts[-1] == 50 + found.splitting.simulations <= 3800
+    assert found.splitting.low <= 1e-3 <= found.splitting.high
+    assert "Estimate, not a bound" in found.text
+
+
+def test_a_condition_that_never_held_makes_the_bound_say_little() -> None:
+    problem = lag_problem(
+        "G[0,10] (x >= 5 -> x <= 0)", inputs=0, parameters=[BIAS], response=direct, name="VACUOUS"
+    )
+    found = assess(problem, budget=30, seed=1)
+    run = falsify(problem, "uniform", budget=30, seed=1)
+    assert found.findings == run.findings
+    assert [finding.kind for finding in found.findings] == ["condition"]
+    for part in (
+        "the probability of a violation is at most 0.095",
+        "a part of the requirement was not tested",
+        "The condition x >= 5 never held in 30 simulations",
+        "x reached 0.9",
+    ):
+        assert part in found.text
+
+
+def test_a_requirement_that_nothing_moves_is_told() -> None:
+    still = lag_problem(
+        inputs=0, parameters=[BIAS], response=lambda times, *_: {"x": np.zeros_like(times)}, name="STILL"
+    )
+    found = assess(still, budget=30)
+    assert "Nothing that was searched had an effect on x" in found.text
+    assert not assess(system(0.8), budget=30).findings
+
+
+def test_failed_simulations_are_never_to_the_system_s_credit() -> None:
+    found = assess(lag_problem("G[0,10] (x <= 3)", response=mostly_broken), budget=50, seed=1)
+    failed = sum(failure.count for failure in found.failures)
+    assert found.violations == 0 and failed > 25
+    assert found.bound == upper_bound(failed, 50, 0.95)
+    assert f"{failed} simulations failed: lag: " in found.text
+    assert "The bound counts failed simulations as violations" in found.text
+    with pytest.raises(SimulationError, match="out of order"):
+        assess(lag_problem(response=never), budget=3)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"budget": 0}, "budget"),
+        ({"budget": 10, "confidence": 95}, "between 0 and 1"),
+        ({"budget": 10, "splitting": 10}, "fewer simulations than the budget"),
+        ({"budget": 1000, "splitting": 20}, "expected 0, or at least"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(options: dict[str, float], said: str) -> None:
+    with pytest.raises(SpecError, match=said):
+        assess(system(0.5), **options)  # type: ignore[arg-type]
+
+
+def test_a_problem_with_nothing_to_vary_is_refused() -> None:
+    with pytest.raises(SpecError, match="nothing to vary"):
+        assess(lag_problem(inputs=0), budget=5)
+
+
+def test_what_was_drawn_when_the_user_stopped_counts() -> None:
+    def stop(count: int) -> None:
+        if count == 7:
+            raise KeyboardInterrupt
+
+    found = assess(system(5.0), budget=50, progress=stop)
+    # The simulation that was just counted is lost; nothing else is.
+    assert (found.drawn, found.interrupted) == (6, True)
+    assert found.bound == upper_bound(0, 6, 0.95)
+    assert "Stopped by the user" in found.text
+    with pytest.raises(KeyboardInterrupt):
+        assess(system(5.0), budget=50, progress=lambda count: stop(7))
+
+
+def test_a_search_that_found_nothing_is_stated_beside_the_bound() -> None:
+    searched = falsify(system(5.0), "corners", budget=4).evaluations
+    found = assess(system(5.0), budget=10, searched=searched)
+    assert found.searched is not None
+    assert (found.searched.violation, found.searched.smallest) == (None, 4.0)
+    assert "A search of 4 simulations came nearer: its smallest robustness was +4" in found.text
+
+
+def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero() -> None:
+    searched = falsify(system(0.9999), "corners", budget=10).evaluations
+    found = assess(system(0.9999), budget=100, searched=searched)
+    assert found.violations == 0
+    number = len(searched)
+    assert found.searched == Searched(number, searched[-1].robustness, number)
+    assert f"The search found a violation in {number} simulation" in found.text
+    assert "none of 100 draws did: the probability is below 0.0295, not zero." in found.text
+
+
+def test_a_violation_with_signals_that_are_not_drawn_says_nothing_of_the_draws() -> None:
+    problem = lag_problem(free=FREE)
+    edge = Candidate({"u": Signal((0.0, 0.1), (0.9, 1.0))})
+    assert evaluate(problem, edge).violated
+    found = assess(problem, budget=5, searched=[evaluate(problem, edge)])
+    assert found.searched is not None and not found.searched.drawable
+    assert "control points that are not drawn" in found.text and "not zero" not in found.text
+
+
+def test_what_a_probability_is_of_is_said() -> None:
+    problem = lag_problem(points=5, parameters=[START], free=FREE)
+    text = assess(problem, budget=3).text
+    for part in (
+        "inputs drawn uniformly from the search space with this parameterization, not of inputs in operation",
+        "u with 5 control points 2.5 s apart, linear, each uniform in [-1, 1] V",
+        "x0 uniform in [-1, 1]",
+        "other control points, which a search may try, are not drawn",
+    ):
+        assert part in text
+    gear = InputRange("u", 1, 4, kind="integer", interpolation="constant")
+    held = InputRange("v", 0, 1, control_points=3, hold=0.5, interpolation="pchip")
+    problem = replace(lag_problem(inputs=2, limit=4), space=SearchSpace((gear, held), (), 10.0))
+    text = assess(problem, budget=3).text
+    assert "u constant, uniform in [1, 4], rounded to an allowed number" in text
+    assert "v with 3 control points 5 s apart, pchip, held for 0.5 s" in text and "not drawn" not in text
+
+
+def test_at_a_bound_so_few_or_so_many_are_just_as_improbable_as_stated() -> None:
+    for happened, trials in ((0, 10), (3, 100), (99, 100)):
+        assert binom.cdf(happened, trials, upper_bound(happened, trials, 0.95)) == pytest.approx(0.05)
+    assert binom.sf(3 - 1, 100, lower_bound(3, 100, 0.9)) == pytest.approx(0.1)
+    assert upper_bound(0, 1000, 0.95) == pytest.approx(3 / 1000, rel=5e-3)
+    assert (lower_bound(0, 1000, 0.95), upper_bound(7, 7, 0.95)) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("probability", [1e-4, 1e-2, 0.3])
+def test_bounds_hold_at_least_as_often_as_stated(probability: float) -> None:
+    """Exactly, over all outcomes, with the probability of each."""
+    trials = 300
+    outcomes = range(trials + 1)
+    weights = binom.pmf(np.arange(trials + 1), trials, probability)
+    above = [upper_bound(k, trials, 0.95) >= probability for k in outcomes]
+    within = [lower_bound(k, trials, 0.975) <= probability <= upper_bound(k, trials, 0.975) for k in outcomes]
+    assert weights[above].sum() >= 0.95
+    assert weights[within].sum() >= 0.95

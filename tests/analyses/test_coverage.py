@@ -1,0 +1,109 @@
+"""Small records whose coverage is known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from falsifier import Candidate, Signal, Trajectory, coverage, falsify
+from falsifier.analyses.coverage import Coverage, coverage_of
+from falsifier.errors import SpecError
+from falsifier.record.manifest import InputRecord, Manifest, ModeRecord, describe
+from falsifier.search.request import RunRequest
+from falsifier.testing import lag_problem
+from falsifier.views.coverage_text import coverage_json, coverage_text
+from tests.problems import mostly_broken
+
+TIMES = np.linspace(0.0, 10.0, 11)
+
+
+def described(*inputs: InputRecord, parameters: tuple[InputRecord, ...] = ()) -> Manifest:
+    made = describe(RunRequest(problems=()), [lag_problem()], "uniform")
+    modes = (ModeRecord(name="gear", kind="enumeration", items=(("N", 0), ("D", 1), ("R", 2))),)
+    return made.model_copy(update={"inputs": inputs, "parameters": parameters, "modes": modes})
+
+
+def tried(*signals: Signal, trajectory: Trajectory | None = None) -> Coverage:
+    u = InputRecord(name="u", low=0.0, high=100.0)
+    return coverage_of(described(u), [(Candidate({"u": s}), trajectory) for s in signals])
+
+
+def test_parts_of_a_range_that_no_value_was_in_are_gaps() -> None:
+    (u,) = tried(Signal((0.0,), (5.0,)), Signal((0.0, 10.0), (20.0, 49.0), "linear")).ranges
+    assert (u.low, u.high) == (5.0, 49.0)
+    assert u.parts.tolist() == [1, 0, 1, 1, 1, 0, 0, 0, 0, 0]
+    assert u.gaps == ((10.0, 20.0), (50.0, 100.0))
+
+
+def test_values_are_counted_where_they_were_in_time() -> None:
+    (u,) = tried(Signal((0.0, 5.0), (5.0, 95.0), "constant")).ranges
+    assert u.times is not None
+    assert (u.times[:19, 0] == 1).all() and (u.times[21:, 0] == 0).all()
+    assert (u.times[:19, 9] == 0).all() and (u.times[21:, 9] == 1).all()
+
+
+def test_the_shortest_time_between_two_changes_is_of_all_simulations() -> None:
+    slow = Signal((0.0, 2.0, 6.0), (0.0, 1.0, 2.0), "constant")
+    quick = Signal((0.0, 2.0, 2.5), (0.0, 1.0, 2.0), "constant")
+    assert tried(slow, quick).ranges[0].apart == 0.5
+
+
+def test_combinations_are_of_values_at_the_same_time() -> None:
+    ranges = [InputRecord(name=name, low=0.0, high=10.0) for name in "uv"]
+    steps = Signal((0.0, 5.0), (0.5, 9.5), "constant")
+    p = InputRecord(name="p", low=0.0, high=1.0)
+    found = coverage_of(
+        described(*ranges, parameters=(p,)), [(Candidate({"u": steps, "v": steps}, {"p": 0.55}), None)]
+    )
+    pairs = {(pair.first, pair.second): pair.tried for pair in found.pairs}
+    assert np.argwhere(pairs["u", "v"]).tolist() == [[0, 0], [9, 9]]
+    assert np.argwhere(pairs["u", "p"]).tolist() == [[0, 5], [9, 5]]
+    assert found.pairs[0].count == 2
+
+
+def test_whole_numbers_are_parts_of_their_own_and_modes() -> None:
+    u = InputRecord(name="u", low=0, high=2, kind="integer")
+    found = coverage_of(described(u), [(Candidate({"u": Signal((0.0, 5.0), (0.0, 2.0), "constant")}), None)])
+    assert found.ranges[0].parts.tolist() == [1, 0, 1]
+    assert found.ranges[0].gaps == ((1.0, 1.0),)
+    mode = found.modes[0]
+    assert (mode.name, mode.unseen) == ("u", (1,))
+    assert (set(mode.seen), set(mode.changes)) == ({0, 2}, {(0, 2)})
+
+
+def test_outputs_and_modes_are_read_from_trajectories() -> None:
+    first = Trajectory(TIMES, {"x": TIMES, "gear": np.where(TIMES > 4, 1.0, 0.0), "u": TIMES}, {"x": "m"})
+    second = Trajectory(TIMES, {"x": -TIMES, "gear": np.zeros(11), "u": TIMES}, {"x": "m"})
+    u = InputRecord(name="u", low=0.0, high=100.0)
+    candidate = Candidate({"u": Signal((0.0,), (1.0,))})
+    found = coverage_of(described(u), [(candidate, first), (candidate, second), (candidate, None)])
+    assert (found.simulations, found.trajectories) == (3, 2)
+    (x,) = found.outputs
+    assert (x.name, x.unit, x.low, x.high) == ("x", "m", -10.0, 10.0)
+    assert x.highs[3] == 3.0 and x.lows[3] == -3.0
+    (gear,) = found.modes
+    assert (set(gear.seen), gear.unseen, set(gear.changes)) == ({0, 1}, (2,), {(0, 1)})
+
+
+def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> None:
+    result = falsify(lag_problem("G[0,10] (x <= 2)", inputs=2), "uniform", budget=6, directory=tmp_path)
+    found = coverage(tmp_path)
+    values = [v for e in result.evaluations for v in e.candidate.signals["u"].values]
+    assert (found.simulations, found.trajectories, found.failures) == (6, 6, ())
+    assert found.ranges[0].low == pytest.approx(min(values))
+    assert found.ranges[0].high == pytest.approx(max(values))
+    assert [o.name for o in found.outputs] == ["x"]
+
+
+def test_what_is_no_path_is_refused() -> None:
+    with pytest.raises(SpecError, match="coverage: expected a run directory, got None"):
+        coverage(None)  # type: ignore[arg-type]
+
+
+def test_causes_of_failed_simulations_are_counted(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 3)", response=mostly_broken)
+    result = falsify(problem, "uniform", budget=20, seed=1, directory=tmp_path)
+    found = coverage(tmp_path)
+    assert found.failures == result.failures and found.failures[0].count > 1
+    assert found.failures[0].text in coverage_text(found, "R")
+    assert coverage_json(found)["failures"][0]["simulation"] == found.failures[0].simulation

@@ -1,0 +1,181 @@
+"""Findings on requirements that say nothing, and none on the bundled specs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from falsifier.analyses.lint import lint, static_findings, unmoved_findings
+from falsifier.cli.inspect import check
+from falsifier.core.files import bundled
+from falsifier.errors import SpecError
+from falsifier.problem.source import ProblemSource
+from falsifier.testing import Array, lag_problem
+from tests.problem.support import AT, spec
+
+SPEC = f"""
+[model]
+fmu = "{AT.as_posix()}"
+interface = "co-simulation"
+stop_time = 50.0
+output_interval = 0.01
+[inputs.throttle]
+range = [0, 100]
+control_points = 3
+[inputs.brake]
+value = 0
+"""
+# Specs whose simulations take milliseconds; those with hidden faults are among them.
+CHEAP = ("AT", "CC", "ChargerHandshake", "HeaterLimpHome", "NN", "PulseMeter")
+# By bundled spec: what is found, all of it true.
+BUNDLED = {spec: [(f"{spec}6{part}", "implied") for part in "abc"] for spec in ("AT", "ATsplit")}
+BUNDLED["ChargerHandshake"] = [("ChargerHandshake", "margin")]
+
+
+@pytest.mark.parametrize(
+    "name", sorted(p.stem for p in bundled("specs").glob("*.toml") if p.stem != "published")
+)
+def test_bundled_specs_raise_no_false_alarm(name: str) -> None:
+    found = lint(name, simulations=2 if name in CHEAP else 0)
+    assert [(f.requirement, f.kind) for f in found] == BUNDLED.get(name, [])
+    assert all("6abc implies it" in f.text for f in found if f.kind == "implied")
+
+
+FOUND = [
+    ("G[0,20] (throttle <= 100)", "always", "G[0,20] (throttle <= 100)", "throttle in [0, 100]"),
+    ("F[0,20] (throttle > 100.5)", "never", "F[0,20] (throttle > 100.5)", "every trajectory"),
+    ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search is"),
+    ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake = 0"),
+    ("G[0,0] (speed <= 120)", "window", "G[0,0] (speed <= 120)", "leave it out: speed <= 120"),
+    ("F[0,3] (throttle <= 3*speed)", "", "", ""),
+    ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
+    ("G[0,20] (speed <= 120 and speed <= 130)", "implied", "speed <= 130", "which implies it"),
+    ("F[0,9] (speed >= 90) or F[0,5] (speed >= 90)", "window", "F[0,5] (speed >= 90)", "which it implies"),
+    ("G[0,20] (speed - rpm <= 5)", "units", "speed - rpm <= 5", "speed is in mph, rpm in "),
+    ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),
+    ("G[0,20] (sped <= 5)", "invalid", "", "did you mean 'speed'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("formula", "kind", "place", "words"), FOUND)
+def test_what_says_nothing_is_found_with_its_place(
+    tmp_path: Path, formula: str, kind: str, place: str, words: str
+) -> None:
+    text = f"{SPEC}[requirements.R]\nformula = '{formula}'\n"
+    found = lint(spec(tmp_path, text), simulations=0)
+    assert [(f.requirement, f.kind, f.place) for f in found] == ([("R", kind, place)] if kind else [])
+    assert all(words in f"{f.text} {f.advice}" for f in found)
+
+
+@pytest.mark.parametrize(
+    "formula", ["G[0,20] (gear == 3)", "G[0,20] (gear != 3)", "F (gear == 3 and speed > 9)"]
+)
+def test_whole_numbers_that_can_be_equal_are_no_finding(tmp_path: Path, formula: str) -> None:
+    path = tmp_path / "my.toml"
+    path.write_text(f"{SPEC}[requirements.R]\nformula = '{formula}'\n")
+    assert lint(str(path), simulations=0) == []
+
+
+HEATER = f"""
+[model]
+fmu = "{bundled("fmus/HeaterLimpHome.fmu").as_posix()}"
+interface = "co-simulation"
+[inputs.disagreement]
+range = [0, 10]
+control_points = 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        ("F[0,1] limp", "can only be -0.5 or 0.5, because limp is Boolean"),
+        ("G[0,9] (limp == 1 or not limp)", "can only be -1 or -0.5 or 0 or 0.5, because limp is Boolean"),
+        ("G[0,9] (limp -> power <= 30)", ""),
+    ],
+)
+def test_a_requirement_about_booleans_alone_has_no_margin(tmp_path: Path, formula: str, told: str) -> None:
+    path = spec(tmp_path, f"{HEATER}[requirements.R]\nformula = '{formula}'\n")
+    found = [f for f in lint(path, simulations=0) if f.kind == "margin"]
+    assert len(found) == bool(told)
+    assert all(told in f.text and "temperature and power" in f.advice for f in found)
+    said = CliRunner().invoke(check, [path]).output
+    assert ("Boolean" in said) == bool(told)
+
+
+def test_a_searched_parameter_does_not_change_over_time() -> None:
+    from dataclasses import replace
+
+    from falsifier.problem.requirement import Requirement
+    from falsifier.stl import parse
+
+    problem = lag_problem()
+    fixed = replace(problem, parameters={"u": 1.0}, space=problem.space)
+    assert not list(static_findings(problem))
+    with_input = replace(fixed, requirement=Requirement("R", parse("G[0,3] (u <= 2)")))
+    assert [f.kind for f in static_findings(with_input)] == ["always", "window"]
+
+
+def test_requirements_that_repeat_others_are_found(tmp_path: Path) -> None:
+    formulas = {
+        "A": "G[0,20] (speed <= 120)",
+        "B": "G[0,20] (120 >= speed)",
+        "C": "G[5,10] (speed <= 130)",
+        "D": "G[0,20] (rpm <= 4750)",
+    }
+    text = SPEC + "".join(f"[requirements.{n}]\nformula = '{f}'\n" for n, f in formulas.items())
+    found = lint(spec(tmp_path, text), simulations=0)
+    assert [(f.requirement, f.kind) for f in found] == [
+        ("B", "duplicate"), ("C", "implied"), ("C", "implied")
+    ]  # fmt: skip
+    # With another input range the same formula is another requirement.
+    other = text.replace("[requirements.C]", "[requirements.C]\ninputs.throttle.range = [0, 50]")
+    assert [f.requirement for f in lint(spec(tmp_path, other), simulations=0)] == ["B"]
+
+
+def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Not even look at the input."""
+    return {"x": np.sin(times)}
+
+
+def test_what_no_input_moves_is_measured_and_says_so() -> None:
+    (found,) = unmoved_findings([lag_problem(response=still)], 3)
+    assert (found.kind, found.place) == ("unmoved", "")
+    assert found.text.startswith("measured: x was the same in 3 random simulations; the FMU does not declare")
+    assert not list(unmoved_findings([lag_problem()], 3))
+    assert not list(unmoved_findings([lag_problem(response=still)], 0))
+
+
+def test_what_the_fmu_declares_counts_unless_a_simulation_contradicts_it(tmp_path: Path) -> None:
+    fmu = tmp_path / "car.fmu"
+    with ZipFile(AT) as old, ZipFile(fmu, "w") as new:
+        for item in old.infolist():
+            content = old.read(item)
+            if item.filename == "modelDescription.xml":
+                outputs, rest = content.split(b"</Outputs>")
+                content = outputs.replace(b'" />', b'" dependencies="" />') + b"</Outputs>" + rest
+            new.writestr(item, content)
+    text = (
+        SPEC.replace(AT.as_posix(), fmu.as_posix()) + "[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"
+    )
+    (declared,) = lint(spec(tmp_path, text), simulations=0)
+    assert declared.text.startswith("declared: the FMU's structure has no path")
+    assert lint(str(tmp_path / "my.toml"), simulations=2) == []
+
+
+def test_a_spec_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="low < high"):
+        lint(
+            spec(
+                tmp_path, SPEC.replace("[0, 100]", "[100, 0]") + "[requirements.R]\nformula = 'speed <= 1'\n"
+            )
+        )
+
+
+@pytest.mark.parametrize(("formula", "kind"), [("G[0,10] (5 < 3)", "never"), ("5 > 3", "always")])
+def test_a_formula_without_signals_is_decided(formula: str, kind: str) -> None:
+    (found,) = lint(ProblemSource(target="AT1", stl=formula), simulations=0)
+    assert (found.kind, found.text.endswith(", whatever happens")) == (kind, True)

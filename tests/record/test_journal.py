@@ -1,0 +1,99 @@
+"""Reading and writing the record of a run."""
+
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import JournalError
+from falsifier.record.journal import (
+    Journal,
+    JournalReader,
+    open_journal,
+    read_journal,
+    recorded_candidates,
+    recorded_evaluations,
+)
+from falsifier.record.records import Record, line_of
+from falsifier.record.run import falsify
+from falsifier.views.report.page import html_report
+from tests.problems import impossible
+from tests.record.test_questions import asked
+from tests.record.test_tally import evaluated
+
+
+def test_candidates_are_found_in_batches(tmp_path: Path) -> None:
+    lines: list[Record] = [
+        asked(0, {"origin": "a"}, {"origin": "b"}),
+        evaluated(0, 1.0),
+        asked(2, {"origin": "c"}),
+    ]
+    (tmp_path / "journal.jsonl").write_bytes(b"".join(line_of(line, i) for i, line in enumerate(lines, 1)))
+    found = recorded_candidates(read_journal(tmp_path))
+    assert [found[i].origin for i in range(3)] == ["a", "b", "c"]
+
+
+def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> None:
+    reader = JournalReader(tmp_path)
+    assert list(reader.new()) == [] and not reader.begun
+    path = tmp_path / "journal.jsonl"
+    lines = [line_of(evaluated(i, float(i)), i + 1) for i in range(3)]
+    path.write_bytes(lines[0] + lines[1][:20])
+    assert [r.index for r in reader.new()] == [0]  # type: ignore[union-attr]
+    path.write_bytes(b"".join(lines))
+    assert [r.index for r in reader.new()] == [1, 2]  # type: ignore[union-attr]
+    path.write_bytes(lines[0])
+    assert reader.shrank
+
+
+def test_lines_of_candidates_can_be_passed_over(tmp_path: Path) -> None:
+    falsify(impossible(), "uniform", budget=2, directory=tmp_path)
+    kinds = [r.kind for r in read_journal(tmp_path)]
+    assert kinds == ["asked", "evaluated", "asked", "evaluated", "ended"]
+    assert [r.kind for r in read_journal(tmp_path, with_candidates=False)] == [
+        k for k in kinds if k != "asked"
+    ]
+
+
+def test_one_writer_per_directory(tmp_path: Path) -> None:
+    with open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
+        Journal(tmp_path)
+
+
+def test_a_damaged_line_is_named(tmp_path: Path) -> None:
+    falsify(impossible(), "uniform", budget=3, directory=tmp_path)
+    path = tmp_path / "journal.jsonl"
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], "{broken", *lines[2:]]) + "\n")
+    with pytest.raises(JournalError, match="line 2 is damaged"):
+        read_journal(tmp_path)
+
+
+def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(tmp_path: Path) -> None:
+    dead = 2**22 + 7
+    folder = tmp_path / "trajectories"
+    folder.mkdir()
+    left = [folder / f"3-0123456789abcdef.npz.{dead}.partial", tmp_path / f"journal.jsonl.{dead}.partial"]
+    others = [folder / f"mine.npz.{dead}.partial", folder / "3-0123456789abcdef.npz.1.partial.txt"]
+    for path in (*left, *others):
+        path.touch()
+    with open_journal(tmp_path):
+        pass
+    assert not any(path.exists() for path in left)
+    assert all(path.exists() for path in others)
+
+
+@pytest.mark.parametrize("damage", ["changed", "missing"])
+def test_a_trajectory_that_is_damaged_is_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, damage: str
+) -> None:
+    falsify(impossible(), "uniform", budget=1, directory=tmp_path)
+    (first,) = sorted((tmp_path / "trajectories").iterdir())
+    if damage == "missing":
+        first.unlink()
+    else:
+        first.write_bytes(first.read_bytes()[:-1] + b"?")
+    for _ in range(2):
+        found = recorded_evaluations(tmp_path, read_journal(tmp_path))
+    assert found[0].trajectory is None
+    assert caplog.text.count(f"{first.name} is damaged") == 1
+    assert "not shown: its file is damaged or missing" in html_report(tmp_path)

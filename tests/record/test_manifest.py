@@ -1,0 +1,79 @@
+from pathlib import Path
+
+import pytest
+
+from falsifier.errors import JournalError
+from falsifier.problem.loading import load_problem
+from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
+from falsifier.record.journal import write_manifest
+from falsifier.record.manifest import Manifest, describe, file_hashes
+from falsifier.search.request import RunRequest
+from falsifier.testing import FREE, START, lag_problem
+
+SOURCES = tuple(ProblemSource(target=f"AT:{name}") for name in ("AT1", "AT2"))
+PROBLEMS = [load_problem("AT1"), load_problem("AT2")]
+DESCRIBED = describe(RunRequest(problems=SOURCES), PROBLEMS, "corners")
+
+
+def test_it_says_what_was_asked_for_and_with_what(tmp_path: Path) -> None:
+    assert (DESCRIBED.names, DESCRIBED.shared, DESCRIBED.requirement.name) == (("AT1", "AT2"), True, "AT1")
+    assert DESCRIBED.requirement.formula == "G[0,20] (speed <= 120)"
+    assert [(i.name, i.low, i.high, i.unit) for i in DESCRIBED.inputs] == [
+        ("throttle", 0, 100, "%"),
+        ("brake", 0, 325, "ft.lbf"),
+    ]
+    assert (DESCRIBED.model, DESCRIBED.parameterization, DESCRIBED.stop_time) == ("ArchComp.AT", "free", 50.0)
+    assert {Path(p).name for p in DESCRIBED.hashes} == {"AT.fmu", "AT.toml"}
+    assert DESCRIBED.fmu_sha256 == PROBLEMS[0].model.sha256  # type: ignore[attr-defined]
+    assert {"numpy", "rtamt"} <= DESCRIBED.packages.keys()
+    write_manifest(tmp_path, DESCRIBED.model_dump(mode="json"))
+    assert manifest.read(tmp_path) == DESCRIBED
+
+
+def test_a_problem_made_in_python_has_no_files() -> None:
+    described = describe(RunRequest(problems=()), [lag_problem(free=FREE, parameters=[START])], "mine")
+    assert (described.hashes, described.fmu_sha256, described.shared) == ({}, None, False)
+    assert [p.name for p in described.parameters] == ["x0"]
+    assert [(h.name, h.value) for h in described.held] == [("gain", 1.0), ("bias", 0.0)]
+    assert describe(RunRequest(problems=()), [lag_problem()], "mine").parameterization == "fixed"
+
+
+def test_one_requirement_of_several_is_a_manifest_of_its_own() -> None:
+    alone = DESCRIBED.of("AT2")
+    assert (alone.names, alone.shared) == (("AT2",), False)
+    assert alone.request.source == SOURCES[1]
+    assert Manifest.model_validate(alone.model_dump()) == alone
+    with pytest.raises(JournalError, match="AT1, AT2"):
+        DESCRIBED.of("AT3")
+
+
+def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(JournalError, match=str(tmp_path)):
+        manifest.read(tmp_path)
+    content = DESCRIBED.model_dump(mode="json") | {"stop_time": "late"}
+    write_manifest(tmp_path, content)
+    with pytest.raises(JournalError, match="stop_time"):
+        manifest.read(tmp_path)
+    (tmp_path / "manifest.json").write_text("{")
+    with pytest.raises(JournalError, match="is damaged"):
+        manifest.read(tmp_path)
+
+
+def test_changed_files_are_named_and_new_ones_are_none(tmp_path: Path) -> None:
+    manifest.check_unchanged(tmp_path, {"a": "1"}, {"a": "1", "b": "2"})
+    with pytest.raises(JournalError, match="a has changed"):
+        manifest.check_unchanged(tmp_path, {"a": "1"}, {"a": "2"})
+
+
+def test_hashes_follow_the_content_of_the_spec(tmp_path: Path) -> None:
+    fmu = PROBLEMS[0].model.path  # type: ignore[attr-defined]
+    spec = tmp_path / "my.toml"
+    text = f'[model]\nfmu = "{fmu}"\ninterface = "co-simulation"\n[inputs.throttle]\ncontrol_points = 2\n'
+    text += "[requirements.R]\nformula = 'G[0,20] (speed <= 120)'\n"
+    found = []
+    for more in ("", "# a comment\n"):
+        spec.write_text(text + more)
+        found.append(file_hashes(load_problem(str(spec))))
+    assert found[0].keys() == found[1].keys()
+    assert [found[0][p] == found[1][p] for p in found[0]] == [True, False]

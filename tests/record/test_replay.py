@@ -1,0 +1,199 @@
+import shutil
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from threading import Barrier
+
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.model import Model
+from falsifier.engines import make_engine
+from falsifier.errors import JournalError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+from falsifier.record.journal import read_journal
+from falsifier.record.records import AskedRecord, EvaluatedRecord
+from falsifier.record.run import falsify, resume
+from falsifier.search.budget import Budget
+from falsifier.search.events import Evaluated, Event
+from falsifier.search.result import Result
+from falsifier.testing import lag_problem
+from tests.patience import HANG
+from tests.record.support import run
+
+
+@pytest.mark.parametrize("engine", ["uniform", "corners", "sobol"])
+@pytest.mark.parametrize("keep", [1, 8, 17])
+def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine: str, keep: int) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    whole = run(problem, tmp_path / "whole", engine=engine)
+    lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    cut = tmp_path / "cut"
+    shutil.copytree(tmp_path / "whole", cut)
+    torn = lines[keep][: len(lines[keep]) // 2]
+    (cut / "journal.jsonl").write_bytes(b"".join(lines[:keep]) + torn)
+    resumed = run(problem, cut, engine=engine)
+    assert [(e.candidate.key, e.robustness) for e in resumed.evaluations] == [
+        (e.candidate.key, e.robustness) for e in whole.evaluations
+    ]
+    kinds = [r.kind for r in read_journal(cut)]
+    assert kinds.count("evaluated") == 20
+    assert kinds.count("asked") == 20
+
+
+def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    run(problem, tmp_path, budget=3)
+    with pytest.raises(JournalError, match="candidate 0 of the engine 'uniform' differs from the journal"):
+        resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
+
+
+def test_time_stands_still_while_a_record_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ticks = count()
+    monkeypatch.setattr("falsifier.search.loop.perf_counter", lambda: float(next(ticks)))
+    problem = lag_problem("G[0,10] (x <= 99)")
+    whole = run(problem, tmp_path, budget=20)
+    again = run(problem, tmp_path, budget=20)
+    assert whole.spent.seconds > 20
+    assert whole.spent.seconds <= again.spent.seconds < whole.spent.seconds + 8
+
+
+def test_a_run_whose_time_is_used_up_is_still_repeated(tmp_path: Path) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    whole = run(problem, tmp_path, budget=5)
+    (resumed,) = resume(
+        tmp_path,
+        problems=[problem],
+        engine=make_engine("uniform", problem, seed=1),
+        budget=Budget(8, seconds=1e-9),
+    )
+    assert keys(resumed) == keys(whole)
+    assert resumed.reason == "the time limit of 1e-09 s is reached"
+
+
+def test_the_time_of_a_run_that_was_killed_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.search.loop.perf_counter", ScriptedClock(10.0))
+    problem = lag_problem("G[0,10] (x <= 2)")
+    run(problem, tmp_path, budget=5)
+    journal = tmp_path / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:-1]))
+    last = read_journal(tmp_path)[-1]
+    assert isinstance(last, EvaluatedRecord) and last.elapsed > 100.0
+    (resumed,) = resume(tmp_path, problems=[problem], budget=Budget(8, seconds=100.0))
+    assert resumed.reason == "the time limit of 100 s is reached"
+    assert resumed.spent.simulations == 5 and resumed.spent.seconds > last.elapsed
+
+
+class ScriptedClock:
+    """A clock for whoever measures one step: each reading is so many seconds after the one before."""
+
+    def __init__(self, step: float) -> None:
+        self.step, self.now = step, 0.0
+
+    def __call__(self) -> float:
+        self.now += self.step
+        return self.now
+
+
+def measure(monkeypatch: pytest.MonkeyPatch, *, proposal: float, simulation: float) -> None:
+    """Let every proposal and every simulation take so many seconds."""
+
+    def simulated(problem: Problem, candidate: Candidate) -> Evaluation:
+        return replace(evaluate(problem, candidate), seconds=simulation)
+
+    monkeypatch.setattr("falsifier.search.steps.perf_counter", ScriptedClock(proposal))
+    monkeypatch.setattr("falsifier.evaluation.workers.evaluate", simulated)
+
+
+@contextmanager
+def threads(jobs: int, model: Model) -> Iterator[Executor]:
+    with ThreadPoolExecutor(jobs) as executor:
+        yield executor
+
+
+def proposers(directory: Path) -> list[tuple[str, int, int, int]]:
+    records = [r for r in read_journal(directory) if isinstance(r, AskedRecord)]
+    return [(r.proposer, r.first, len(r.candidates), r.told) for r in records]
+
+
+def timed(problem: Problem, directory: Path, jobs: int) -> Result:
+    return falsify(problem, "uniform", budget=40, objective="time", seed=1, jobs=jobs, directory=directory)
+
+
+def keys(result: Result) -> list[object]:
+    return [(e.candidate.key, e.candidate.origin, e.robustness) for e in result.evaluations]
+
+
+def test_what_the_clock_decided_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    measure(monkeypatch, proposal=0.5, simulation=0.125)
+    whole = timed(problem, tmp_path / "whole", 1)
+    asked = proposers(tmp_path / "whole")
+    assert asked[:3] == [("engine", 0, 1, 0), ("scout", 1, 4, 1), ("scout", 5, 2, 5)]
+    assert 10 < whole.spent.scouts == sum(n for who, _, n, _ in asked if who == "scout") < 40
+    assert whole.objective == "time"
+    lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    for kept in (1, 5, 20, len(lines)):
+        cut = tmp_path / str(kept)
+        shutil.copytree(tmp_path / "whole", cut)
+        (cut / "journal.jsonl").write_bytes(b"".join(lines[:kept]))
+        recorded = sum(n for _, _, n, _ in proposers(cut))
+        # This time simulations are dear: what is recorded is repeated all the same, the rest is the engine's.
+        measure(monkeypatch, proposal=0.1, simulation=60.0)
+        (resumed,) = resume(cut, problems=[problem])
+        assert keys(resumed)[:recorded] == keys(whole)[:recorded]
+        assert len(resumed.evaluations) == 40
+        assert proposers(cut)[: len(proposers(tmp_path / "whole"))] == asked or kept < len(lines)
+
+
+def test_proposals_beside_the_engine_are_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.record.run.local_executor", threads)
+    problem = lag_problem("G[0,10] (x <= 2)")
+    measure(monkeypatch, proposal=0.5, simulation=0.125)
+    whole = timed(problem, tmp_path, 2)
+    scouts = [i for i, (who, *_) in enumerate(proposers(tmp_path)) if who == "scout"]
+    assert scouts
+    for i in scouts[:-1]:
+        # The engine thought while the scout's candidates were simulated, and was told of them later.
+        assert proposers(tmp_path)[i][3] == proposers(tmp_path)[i + 1][3]
+    (resumed,) = resume(tmp_path, problems=[problem])
+    assert keys(resumed) == keys(whole)
+
+
+def test_with_several_cores_an_engine_is_asked_as_soon_as_one_is_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    monkeypatch.setattr("falsifier.record.run.local_executor", threads)
+    whole = falsify(problem, "cma", budget=12, seed=1, jobs=3, directory=tmp_path)
+    assert [told for *_, told in proposers(tmp_path)] == [0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
+    (resumed,) = resume(tmp_path, problems=[problem])
+    assert keys(resumed) == keys(whole)
+
+
+def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)")
+    monkeypatch.setattr("falsifier.record.run.local_executor", threads)
+    whole = falsify(problem, "uniform", budget=6, seed=1, jobs=2, directory=tmp_path)
+    shutil.rmtree(tmp_path / "trajectories")
+    together = Barrier(2)
+
+    def simulated(problem: Problem, candidate: Candidate) -> Evaluation:
+        together.wait(HANG)
+        return evaluate(problem, candidate)
+
+    monkeypatch.setattr("falsifier.evaluation.workers.evaluate", simulated)
+    events: list[Event] = []
+    (resumed,) = resume(tmp_path, problems=[problem], listeners=[events.append])
+    assert keys(resumed) == keys(whole)
+    evaluated = [event.evaluation for event in events if isinstance(event, Evaluated)]
+    assert len(evaluated) == 6 and all(each.trajectory is not None for each in evaluated)

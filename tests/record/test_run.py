@@ -1,0 +1,224 @@
+"""The one way to search, as users call it."""
+
+import json
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import pytest
+from numpy import int64
+
+from falsifier.core.files import bundled
+from falsifier.engines import make_engine
+from falsifier.errors import JournalError, SpecError
+from falsifier.llm.scripted import ScriptedChat
+from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
+from falsifier.record.journal import holds_run
+from falsifier.record.run import falsify, resume
+from falsifier.search.budget import Budget
+from falsifier.search.events import Event, RunStarted
+from falsifier.search.request import LLMSettings
+from falsifier.testing import lag_problem
+from tests.problems import easy, easy_again, hard, impossible
+
+EASY = "python:tests.problems:easy"
+
+
+def reply(level: float) -> str:
+    return json.dumps({"rationale": "", "signals": [{"name": "u", "values": [level] * 4}]})
+
+
+@pytest.mark.parametrize(
+    "problem", [easy(), EASY, ProblemSource(target=EASY)], ids=["problem", "name", "source"]
+)
+def test_a_problem_is_given_as_itself_by_its_name_or_by_its_source(problem: object) -> None:
+    result = falsify(problem, "corners", budget=5)  # type: ignore[call-overload]
+    assert (result.problem.name, result.falsified) == ("EASY", True)
+    assert result.directory is None
+
+
+def test_several_problems_give_several_results_in_their_order() -> None:
+    apart = lag_problem(points=2, name="APART")
+    results = falsify([impossible(), apart, hard()], "corners", budget=5)
+    assert [r.problem.name for r in results] == ["NEVER", "APART", "HARD"]
+    assert [r.falsified for r in results] == [False, True, True]
+    (only,) = falsify([easy()], "corners", budget=5)
+    assert only.falsified
+
+
+@pytest.mark.parametrize("other", [easy_again(), lag_problem(points=2, name="EASY")], ids=["shared", "apart"])
+def test_problems_of_one_call_have_different_names(other: Problem, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"two of the problems are named 'EASY'.*name=\.\.\."):
+        falsify([easy(), hard(), other], "corners", budget=5, directory=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None:
+    formulas = {"low": "G[0,1] (speed <= 500)", "high": "G[0,1] (speed <= -1)"}
+    fmu = bundled("fmus") / "AT.fmu"
+    problems = [Problem.from_fmu(fmu, formula, name=name) for name, formula in formulas.items()]
+    results = falsify(problems, "corners", budget=1, directory=tmp_path)
+    assert [(r.problem.name, r.falsified) for r in results] == [("low", False), ("high", True)]
+    assert [r.problem.name for r in resume(tmp_path)] == ["low", "high"]
+    assert Problem.from_fmu(fmu, formulas["low"]).name == "stl"
+
+
+def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Path) -> None:
+    falsify([impossible(), lag_problem(points=2, name="APART")], "corners", budget=2, directory=tmp_path)
+    assert {p.name for p in tmp_path.iterdir() if holds_run(p)} == {"NEVER", "APART"}
+    falsify([impossible(), hard()], "corners", budget=2, directory=tmp_path / "shared")
+    assert manifest.read(tmp_path / "shared").names == ("NEVER", "HARD")
+
+
+def test_simulations_count_if_their_number_is_limited(tmp_path: Path) -> None:
+    def counted(**options: Any) -> object:
+        place = tmp_path / str(len(list(tmp_path.iterdir())))
+        falsify(lag_problem(), "corners", directory=place, **options)
+        return manifest.read(place).request.objective
+
+    assert counted() == counted(budget=5) == counted(budget=Budget(5, seconds=9.0)) == "simulations"
+    assert counted(budget=5, objective="time") == counted(objective="time") == "time"
+    assert counted(budget=Budget(None, seconds=9.0)) is None
+    with pytest.raises(SpecError, match="expected 'simulations' or 'time', got 'money'"):
+        falsify(lag_problem(), objective="money")  # type: ignore[call-overload]
+
+
+def test_a_budget_may_be_a_number_of_simulations() -> None:
+    counts = [falsify(impossible(), "uniform", budget=b).spent.simulations for b in (3, Budget(3))]
+    assert counts == [3, 3]
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("seed", -1),
+        ("seed", 0.5),
+        ("jobs", 0),
+        ("jobs", True),
+        ("budget", 2.5),
+        ("budget", "10"),
+        ("budget", True),
+    ],
+)
+def test_numbers_that_cannot_be_used_are_named(name: str, given: object) -> None:
+    with pytest.raises(SpecError, match=f"{name}: expected a whole number, at least"):
+        falsify(easy(), "corners", **{name: given})  # type: ignore[call-overload]
+
+
+def test_whole_numbers_may_be_those_of_numpy() -> None:
+    result = falsify(impossible(), "uniform", budget=int64(3), seed=int64(7))  # type: ignore[call-overload]
+    assert result.spent.simulations == 3
+
+
+def test_any_sequence_of_problems_gives_a_list() -> None:
+    assert [r.problem.name for r in falsify(deque([easy(), hard()]), "corners", budget=1)] == ["EASY", "HARD"]
+
+
+def test_a_chat_leads_by_itself_and_its_name_is_recorded(tmp_path: Path) -> None:
+    result = falsify(
+        EASY, llm=ScriptedChat([reply(0.0), reply(1.0)], llm="mine"), budget=5, directory=tmp_path
+    )
+    assert result.falsified and result.spent.calls == 2
+    described = manifest.read(tmp_path)
+    assert described.request.llm == LLMSettings(name="mine")
+    assert described.request.source == ProblemSource(target=EASY)
+
+
+def test_an_engine_made_in_python_searches_one_requirement() -> None:
+    engine = make_engine("corners", easy(), seed=0)
+    assert falsify(easy(), engine, budget=5).falsified
+    with pytest.raises(SpecError, match="one requirement"):
+        falsify((easy(), hard()), engine, budget=5)  # type: ignore[call-overload]
+
+
+def test_a_wrong_name_leaves_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="'corners'"):
+        falsify(easy(), "corner", directory=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_directory_is_used_once(tmp_path: Path) -> None:
+    falsify(EASY, "corners", budget=5, directory=tmp_path)
+    with pytest.raises(JournalError, match="resume"):
+        falsify(EASY, "corners", budget=5, directory=tmp_path)
+
+
+class TestResume:
+    def test_a_run_that_has_ended_is_what_it_was(self, tmp_path: Path) -> None:
+        first = falsify(EASY, "corners", budget=5, directory=tmp_path)
+        events: list[Event] = []
+        (again,) = resume(tmp_path, listeners=[events.append])
+        assert (again.status, again.robustness) == (first.status, first.robustness)
+        assert again.spent.simulations == first.spent.simulations
+        assert isinstance(events[0], RunStarted) and events[0].replayed == first.spent.simulations
+
+    def test_with_more_budget_it_goes_on(self, tmp_path: Path) -> None:
+        falsify("python:tests.problems:impossible", "uniform", budget=3, directory=tmp_path)
+        (more,) = resume(str(tmp_path), budget=7)
+        assert more.spent.simulations == 7
+        whole = falsify(impossible(), "uniform", budget=7)
+        assert [e.candidate.key for e in more.evaluations] == [e.candidate.key for e in whole.evaluations]
+
+    def test_a_number_changes_the_limit_on_simulations_alone(self, tmp_path: Path) -> None:
+        limits = Budget(3, seconds=1e6)
+        falsify("python:tests.problems:impossible", "uniform", budget=limits, directory=tmp_path)
+        events: list[Event] = []
+        resume(tmp_path, budget=4, listeners=[events.append])
+        assert isinstance(events[0], RunStarted) and events[0].budget == Budget(4, seconds=1e6)
+
+    def test_a_folder_of_runs_is_resumed_one_by_one(self, tmp_path: Path) -> None:
+        for name in ("easy", "impossible"):
+            falsify(f"python:tests.problems:{name}", "corners", budget=2, directory=tmp_path / name)
+        assert [r.problem.name for r in resume(tmp_path)] == ["EASY", "NEVER"]
+
+    def test_what_was_made_in_python_must_be_given_again(self, tmp_path: Path) -> None:
+        falsify(lag_problem(), "uniform", budget=2, directory=tmp_path / "problem")
+        with pytest.raises(JournalError, match=r"problems=\[...\]"):
+            resume(tmp_path / "problem")
+
+        class Mine:
+            name = "mine"
+
+            def __init__(self) -> None:
+                inner = make_engine("uniform", easy(), seed=0)
+                self.ask, self.tell = inner.ask, inner.tell
+
+        falsify(EASY, Mine(), budget=2, directory=tmp_path / "engine")
+        with pytest.raises(JournalError, match="engine="):
+            resume(tmp_path / "engine")
+        (result,) = resume(tmp_path / "engine", engine=Mine(), budget=3)
+        assert result.spent.simulations == 3
+
+    def test_a_changed_problem_is_refused(self, tmp_path: Path) -> None:
+        falsify(lag_problem(), "uniform", budget=2, directory=tmp_path)
+        with pytest.raises(JournalError, match="LAG has changed"):
+            resume(tmp_path, problems=[lag_problem(limit=2.0)])
+
+    def test_no_run_no_resumption(self, tmp_path: Path) -> None:
+        with pytest.raises(JournalError, match="not a run directory"):
+            resume(tmp_path)
+
+
+def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    problem = load_problem("AT1")
+    changed = replace(problem, experiment=replace(problem.experiment, step_size=0.005))
+    falsify(changed, "corners", budget=1, directory=tmp_path)
+    assert manifest.read(tmp_path).request.problems == ()
+
+
+def test_a_run_is_resumed_with_the_problems_that_it_searched(tmp_path: Path) -> None:
+    loose = lag_problem("G[0,10] (x <= 5)", name="loose")
+    falsify(loose, "uniform", budget=2, directory=tmp_path / "one")
+    with pytest.raises(JournalError, match="this run searched loose, not tight"):
+        resume(tmp_path / "one", problems=[lag_problem(name="tight")])
+    apart = [loose, lag_problem("G[0,10] (x <= 6)", name="wide", limit=2.0)]
+    falsify(apart, "uniform", budget=2, directory=tmp_path / "two")
+    resumed = resume(tmp_path / "two", problems=apart, budget=3)
+    assert [(r.problem.name, r.spent.simulations) for r in resumed] == [("loose", 3), ("wide", 3)]
+    with pytest.raises(JournalError, match=r"also searched|searched loose"):
+        resume(tmp_path / "two", problems=apart[:1])

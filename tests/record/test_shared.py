@@ -1,0 +1,128 @@
+"""Several requirements falsified in one search are a run for each of them."""
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from falsifier.campaigns.analysis import Run, load, load_run, main_table, read_published
+from falsifier.campaigns.analysis.tables import comparable
+from falsifier.errors import JournalError
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.run import falsify, resume
+from falsifier.search.result import Result
+from falsifier.testing import lag_problem
+from falsifier.views.report import html_report, junit_report, markdown_report
+from tests.problems import hard, impossible
+
+PROBLEMS = (impossible(), hard(), lag_problem("G[0,10] (x <= 0.8)", name="HARDER"))
+BUDGET = 24
+
+
+def search(directory: Path, *, stop_at: int | None = None) -> list[Result]:
+    """Search for all three, or be interrupted in a simulation."""
+    calls = 0
+
+    def interrupt(_: object) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == stop_at:
+            raise KeyboardInterrupt
+
+    listeners = [interrupt] if stop_at else []
+    if holds_run(directory):
+        return resume(directory, problems=PROBLEMS, listeners=listeners)
+    return falsify(PROBLEMS, "uniform", seed=6, budget=BUDGET, directory=directory, listeners=listeners)
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("runs") / "shared"
+
+
+@pytest.fixture(scope="module")
+def results(directory: Path) -> dict[str, Result]:
+    return {result.problem.name: result for result in search(directory)}
+
+
+@pytest.fixture(scope="module")
+def runs(directory: Path, results: dict[str, Result]) -> dict[str, Run]:
+    return {run.requirement: run for run in load(directory)}
+
+
+def test_every_requirement_has_its_own_numbers(results: dict[str, Result], runs: dict[str, Run]) -> None:
+    assert list(runs) == ["NEVER", "HARD", "HARDER"]
+    for name, run in runs.items():
+        result = results[name]
+        assert run.status == result.status
+        assert run.reason == result.reason
+        assert run.simulations == result.spent.simulations == len(run.robustness)
+        assert run.robustness.tolist() == [e.robustness for e in result.evaluations[: run.simulations]]
+        assert run.spent.simulation_seconds == pytest.approx(result.spent.simulation_seconds)
+        assert result.best is not None
+        assert run.verdict == result.best.verdict
+        assert run.manifest.requirement.formula == str(result.problem.requirement.formula)
+    assert [runs[n].falsified for n in runs] == [False, True, True]
+    assert 0 < runs["HARD"].simulations < runs["HARDER"].simulations < runs["NEVER"].simulations == BUDGET
+
+
+def test_what_was_recorded_is_what_each_would_have_judged(directory: Path, runs: dict[str, Run]) -> None:
+    recorded = recorded_evaluations(directory, read_journal(directory))
+    candidates = [e.candidate for e in recorded.values()]
+    for problem in PROBLEMS:
+        robustness = runs[problem.name].robustness
+        judged = [evaluate(problem, candidate).robustness for candidate in candidates[: len(robustness)]]
+        assert robustness.tolist() == judged
+
+
+def test_one_must_be_named(directory: Path, runs: dict[str, Run]) -> None:
+    assert load_run(directory, "HARDER").simulations == runs["HARDER"].simulations
+    with pytest.raises(JournalError, match="choose one of NEVER, HARD, HARDER"):
+        load_run(directory)
+    with pytest.raises(JournalError, match="NEVER, HARD, HARDER, not OTHER"):
+        load_run(directory, "OTHER")
+
+
+def test_the_table_has_a_row_for_each_and_no_published_numbers(runs: dict[str, Run]) -> None:
+    table = main_table(runs.values(), read_published())
+    assert [row[:3] for row in table.rows] == [
+        ("NEVER", "uniform, shared search", "0/1"),
+        ("HARD", "uniform, shared search", "1/1"),
+        ("HARDER", "uniform, shared search", "1/1"),
+    ]
+    assert comparable(replace(runs["HARDER"].method, together=False))
+    assert not comparable(runs["HARDER"].method)
+
+
+def test_reports_have_each(directory: Path, runs: dict[str, Run]) -> None:
+    page = html_report(directory)
+    assert f"3 requirements, 3 runs, 2 falsified, {BUDGET} simulations" in page
+    for name, run in runs.items():
+        part = page.partition(f'id="requirement-{name}"')[2].partition("</section>")[0]
+        assert run.manifest.requirement.formula.replace("<", "&lt;") in part
+        violated = f"{run.simulations}" if run.falsified else "–"
+        assert f"<td>{violated}</td></tr>" in part, "as the number of the simulation that violated it"
+        assert run.verdict is not None
+        assert f"robustness {run.verdict.robustness:+.6g}" in part
+    markdown = markdown_report(directory)
+    assert f"falsifier replay {directory / 'counterexample-HARDER.json'}" in markdown
+    (suite,) = ElementTree.fromstring(junit_report(directory))
+    assert [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["3", "2", "0", "0"]
+    assert float(suite.get("time") or 0) == pytest.approx(runs["NEVER"].spent.seconds, abs=1e-3)
+
+
+def test_a_resumed_search_says_the_same(tmp_path: Path, runs: dict[str, Run]) -> None:
+    search(tmp_path, stop_at=12)
+    assert {run.status for run in load(tmp_path)} >= {"interrupted"}
+    search(tmp_path)
+    for run in load(tmp_path):
+        assert run.robustness.tolist() == runs[run.requirement].robustness.tolist()
+        assert (run.status, run.reason) == (runs[run.requirement].status, runs[run.requirement].reason)
+
+
+def test_a_folder_of_runs_is_all_of_them(tmp_path: Path, results: dict[str, Result]) -> None:
+    search(tmp_path / "first")
+    search(tmp_path / "second")
+    assert [run.requirement for run in load(tmp_path)] == [*results, *results]
