@@ -6,11 +6,13 @@ needs a display.
 
 from typing import TYPE_CHECKING
 
-from falsifier.views.plotting.campaign import plot_comparison, plot_history, plot_iteration_times, plot_rates
-from falsifier.views.plotting.coverage import plot_coverage
+from falsifier.views.plotting.analyses import plot_coverage
 from falsifier.views.plotting.diagnosis import plot_diagnosis
 from falsifier.views.plotting.diagram import plot_diagram
-from falsifier.views.plotting.evaluation import (
+from falsifier.views.plotting.prediction import plot_predictions
+from falsifier.views.plotting.robustness_map import plot_robustness_map
+from falsifier.views.plotting.runs import plot_comparison, plot_history, plot_iteration_times, plot_rates
+from falsifier.views.plotting.simulation import (
     plot,
     plot_evaluation,
     plot_panel,
@@ -18,8 +20,6 @@ from falsifier.views.plotting.evaluation import (
     png,
     save_figure,
 )
-from falsifier.views.plotting.prediction import plot_predictions
-from falsifier.views.plotting.robustness_map import plot_robustness_map
 from falsifier.views.plotting.trajectory import plot_signal, plot_trajectory
 
 if TYPE_CHECKING:

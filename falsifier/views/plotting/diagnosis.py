@@ -7,7 +7,7 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Formula
 from falsifier.stl.formula import Always, Eventually, Until
 from falsifier.views.plotting.axes import figure_of
-from falsifier.views.plotting.evaluation import plot_requirement
+from falsifier.views.plotting.simulation import plot_requirement
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

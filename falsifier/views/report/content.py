@@ -17,7 +17,7 @@ from falsifier.search.levels import outcomes
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit, margin_words
-from falsifier.views.panels import Panel, panels
+from falsifier.views.plotting.panels import Panel, panels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

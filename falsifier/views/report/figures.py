@@ -8,7 +8,7 @@ from falsifier.campaigns.analysis import Run
 from falsifier.core.words import counted
 from falsifier.stl.margins import shown
 from falsifier.views.html import Html, el, join
-from falsifier.views.panels import Bound, Panel
+from falsifier.views.plotting.panels import Bound, Panel
 from falsifier.views.report.plots import COLOURS, Plots, history_plot, rate_plot, simulation_plots
 
 # Evenly spaced times of a simulation's table, beside the marked one.

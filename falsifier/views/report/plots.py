@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import Run
 from falsifier.campaigns.analysis.curves import falsification_curve, improvements, thinned
-from falsifier.views.panels import Bound, Panel
+from falsifier.views.plotting.panels import Bound, Panel
 
 Array = NDArray[np.float64]
 Values = Mapping[str, object]

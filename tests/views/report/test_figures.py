@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from falsifier.campaigns.analysis import Run, load
-from falsifier.views.panels import Bound, Panel
+from falsifier.views.plotting.panels import Bound, Panel
 from falsifier.views.report.figures import history_figure, rate_figure, simulation_figures
 
 TIMES = np.linspace(0.0, 10.0, 101)

@@ -13,7 +13,7 @@ import pytest
 from falsifier.campaigns.analysis import Run, load
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.views.panels import Bound, Panel
+from falsifier.views.plotting.panels import Bound, Panel
 from falsifier.views.report.plots import (
     Plots,
     columns,

@@ -14,8 +14,8 @@ from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
-from falsifier.views.panels import Bound, Panel, panels
 from falsifier.views.plotting.axes import caption, figure_of, own_axes, whole_ticks, wrapped
+from falsifier.views.plotting.panels import Bound, Panel, panels
 from falsifier.views.plotting.trajectory import plot_trajectory
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
-from falsifier.views.panels import Panel, judged_windows, panels
+from falsifier.views.plotting.panels import Panel, judged_windows, panels
 
 STEP = Candidate({"u": Signal((0.0, 4.0), (1.0, 0.0), "constant")})
 

@@ -12,8 +12,8 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.testing import START, lag_problem
-from falsifier.views.panels import Panel
 from falsifier.views.plotting import plot, plot_evaluation, plot_panel, plot_requirement, png, save_figure
+from falsifier.views.plotting.panels import Panel
 from tests.fmu.small_systems import LOOP, system
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import conditional, hard, unusable
