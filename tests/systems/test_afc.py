@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tests.systems.driving import Array, Driver, golden, robustness
-from tests.systems.independent import afc
 
 GOLDEN = golden("AFC")
 STOP = GOLDEN["stop_time"]
@@ -50,22 +49,6 @@ def test_golden_answers_to_steps(fmu: Driver, name: str) -> None:
     for requirement, expected in run["robustness_until_55_s"].items():
         measured = robustness(requirement, "AFC", found, stop_time=STOP + PIECE)
         assert measured == pytest.approx(expected, abs=3e-5), requirement
-
-
-def test_independent_ratios(fmu: Driver) -> None:
-    rng = np.random.default_rng(36)
-    for run in range(10):
-        low, high = (61.2, 81.2) if run % 3 == 2 else (0.0, 61.1)
-        pedal = pieces(rng.uniform(low, high, 10).tolist())
-        engine = rng.uniform(900, 1100)
-        found = drive(fmu, pedal, engine)
-        mu, mode, pressure = afc.ratios(pedal, np.full(len(pedal), engine))
-        assert np.array_equal(found["mode"], mode)
-        assert np.abs(found["pressure"] - pressure).max() < 5e-5
-        # The independent integration spreads the jump of the ratio at 10 s over one of its steps.
-        difference = np.abs(found["mu"] - mu)
-        assert difference.max() < 3e-4
-        assert difference[1100:].max() < 5e-5
 
 
 def test_a_dead_sensor_opens_the_loop(fmu: Driver) -> None:

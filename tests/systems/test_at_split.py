@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from falsifier import falsify
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.evaluation.evaluate import evaluate
@@ -80,7 +79,3 @@ def test_each_requirement_is_violated_by_the_same_inputs(case: dict[str, Any]) -
     robustness = evaluate(TWO[k], owned(candidate, "car")).robustness
     assert robustness is not None and robustness < 0
     assert robustness == pytest.approx(case["held"], abs=0.2)
-
-
-def test_a_search_finds_one() -> None:
-    assert falsify(TWO[1], engine="corners", budget=10).falsified

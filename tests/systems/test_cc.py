@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from tests.systems.driving import Array, Driver, evenly, golden, robustness
-from tests.systems.independent import cc
 
 GOLDEN = golden("CC")
 POSITIONS = ("y1", "y2", "y3", "y4", "y5")
@@ -39,19 +38,6 @@ def test_golden_violations(fmu: Driver, requirement: str) -> None:
     measured = robustness(requirement, "CC", dict(zip(POSITIONS, positions.T, strict=True)), stop_time=STOP)
     assert measured < 0
     assert measured == pytest.approx(run["robustness"], abs=2e-3)
-
-
-def test_independent_motion(fmu: Driver) -> None:
-    rng = np.random.default_rng(31)
-    times = np.linspace(0, STOP, 10001)
-    for run in range(20):
-        throttle, brake = (evenly(list(v), STOP).sample(times) for v in rng.random((2, 10)))
-        if run % 4 == 3:
-            throttle, brake = np.round(throttle), np.round(brake)
-        positions, modes = drive(fmu, throttle, brake)
-        expected, _ = cc.drive(throttle, brake, 0.01)
-        assert np.abs(positions - expected).max() < 1e-3
-        assert np.count_nonzero(np.diff(modes, axis=0)) > 100
 
 
 def test_many_mode_changes_are_all_taken(fmu: Driver) -> None:

@@ -2,12 +2,49 @@ import numpy as np
 import pytest
 
 from tests.systems.driving import Array, Driver, golden, robustness
-from tests.systems.independent.faults import CLOSE, LOCK, PRECHARGE, UNLOCK, charger
 
 GOLDEN = golden("ChargerHandshake")
 STOP, PERIOD = GOLDEN["stop_time"], 0.1
 OUTPUTS = ("phase", "locked", "closed", "voltage")
-READY = 4
+
+
+WAIT, LOCK, UNLOCK, PRECHARGE, CLOSE, OPEN, RESET = range(1, 8)
+IDLE, LOCKED, PRECHARGING, READY, CHARGING = range(1, 6)
+_NEXT = {(IDLE, LOCK): LOCKED, (LOCKED, PRECHARGE): PRECHARGING, (READY, CLOSE): CHARGING}
+_LONGEST = {LOCKED: 25, PRECHARGING: 40, READY: 20}
+_ABORTS = {
+    LOCKED: {UNLOCK},
+    PRECHARGING: {WAIT, LOCK, UNLOCK, CLOSE},
+}
+
+
+def charger(command: Array, *, period: float = PERIOD) -> Array:
+    """Return phase, lock, contactors and voltage at every tick, shape (ticks, 4).
+
+    Args:
+        command: command of the car at every tick.
+        period: sample time in s.
+    """
+    phase, since, locked, voltage = IDLE, 0, 0, 0.0
+    rows = []
+    for tick, asked in enumerate(command.astype(int)):
+        too_late = tick - since > _LONGEST.get(phase, 10**9)
+        if too_late or asked in {OPEN, RESET} | _ABORTS.get(phase, set()):
+            following, locked = IDLE, 0
+        elif phase == PRECHARGING and voltage >= 380:
+            following = READY
+        else:
+            following = _NEXT.get((phase, asked), phase)
+        if following == LOCKED != phase:
+            locked = 1
+        if asked == UNLOCK and following != CHARGING:
+            locked = 0
+        if following != phase:
+            phase, since = following, tick
+        rows.append((phase, locked, int(phase == CHARGING), voltage))
+        goal, lag = (400.0, 0.8) if phase >= PRECHARGING else (0.0, 0.5)
+        voltage = goal + (voltage - goal) * float(np.exp(-period / lag))
+    return np.array(rows, dtype=np.float64)
 
 
 def commands(pieces: list[int]) -> Array:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from falsifier import falsify
 from falsifier.core.candidate import Candidate
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
@@ -53,10 +52,6 @@ def test_the_same_attitude_hits_the_ground() -> None:
 
 def test_the_violation_is_confirmed_at_half_the_step() -> None:
     assert confirm(TWO, evaluate(TWO, owned(attitude("B"), "aircraft"))).outcome == "confirmed"
-
-
-def test_a_search_finds_it() -> None:
-    assert falsify(TWO, engine="corners", budget=8).falsified
 
 
 def test_requests_that_are_held_for_a_sample_avoid_the_crash() -> None:

@@ -2,11 +2,41 @@ import numpy as np
 import pytest
 
 from tests.systems.driving import Array, Driver, golden, robustness
-from tests.systems.independent.faults import heater
 
 GOLDEN = golden("HeaterLimpHome")
 STOP, PERIOD = GOLDEN["stop_time"], 0.1
 OUTPUTS = ("temperature", "limp", "trips")
+
+
+def heater(disagreement: Array) -> Array:
+    """Return temperature, limp-home mode and trips at every tick of 0.1 s, shape (ticks, 3).
+
+    Args:
+        disagreement: difference between the sensors at every tick, in K.
+    """
+    rows = np.empty((len(disagreement), 3))
+    bath, part = 60.0, 50.0
+    limp, frozen, tripped = False, False, False
+    agreed, ended = 0, -1000000
+    for tick, apart in enumerate(disagreement):
+        agreed = agreed + 1 if 0.1 < apart < 0.3 else 0
+        was_limp = limp
+        limp = 6.8 < apart < 7.2 or (limp and agreed < 11)
+        if was_limp and not limp:
+            ended = tick
+        if limp and not was_limp:
+            frozen = tick - ended >= 15
+        wish = 5 * (60 - bath) + part
+        given = min(max(wish, 0.0), 30.0 if limp else 100.0)
+        if limp and not frozen:
+            part = min(100.0, part + 0.05 * (wish - given))
+        if not limp and 0 < wish < 100:
+            part += 0.02 * (60 - bath)
+        tripped = tripped or bath >= 64
+        rows[tick] = bath, limp, tripped
+        goal = 20 + 0.8 * (0.0 if tripped else given)
+        bath = goal + (bath - goal) * np.exp(-0.1 / 40)
+    return rows
 
 
 def held(pieces: list[float]) -> Array:

@@ -5,7 +5,6 @@ import pytest
 
 from falsifier.core.signals import Signal
 from tests.systems.driving import Driver, golden, robustness
-from tests.systems.independent import nn
 
 GOLDEN = golden("NN")
 STOP = GOLDEN["stop_time"]
@@ -53,30 +52,3 @@ def test_golden_start(fmu: Driver) -> None:
 def test_first_prediction_is_the_same_for_all_references(fmu: Driver, reference: float) -> None:
     rows = fmu.run({"Ref": np.full(2, reference)}, ("NNPos",), stop_time=0.01, samples=2)
     assert rows[0, 0] == pytest.approx(GOLDEN["start"]["NNPos_at_0"], abs=1e-7)
-
-
-def test_independent_motion(fmu: Driver) -> None:
-    """The loop is chaotic: positions agree at first, later only their statistics do."""
-    rng = np.random.default_rng(32)
-    references = np.empty((SAMPLES, 24))
-    for run in range(24):
-        points = list(rng.uniform(1, 3, 8))
-        smooth = Signal.evenly(points, stop_time=STOP)
-        held = Signal.evenly(points, stop_time=STOP, interpolation="constant")
-        references[:, run] = (smooth if run % 2 else held).sample(TIMES)
-    expected, predictions = nn.positions(references)
-    outputs = [
-        fmu.run({"Ref": reference}, ("Pos", "NNPos"), stop_time=STOP, samples=SAMPLES)
-        for reference in references.T
-    ]
-    position = np.column_stack([rows[:, 0] for rows in outputs])
-    prediction = np.column_stack([rows[:, 1] for rows in outputs])
-    difference = np.abs(position - expected)
-    assert difference[:151].max() < 1e-6
-    assert difference[:201].max() < 1e-3
-    assert difference[:301].max() < 0.05
-    assert np.abs(prediction - predictions)[:101].max() < 1e-5
-    error, expected_error = position - references, expected - references
-    # References that differ by 1e-9 scatter this median by 1.3 % on each side (eight repetitions).
-    assert np.median(np.abs(error)) == pytest.approx(np.median(np.abs(expected_error)), rel=0.08)
-    assert error.std() == pytest.approx(expected_error.std(), rel=0.02)

@@ -3,7 +3,6 @@ import pytest
 
 from falsifier.core.signals import Signal
 from tests.systems.driving import Array, Driver, golden, robustness
-from tests.systems.independent import pm
 
 GOLDEN = golden("PM")
 STOP = GOLDEN["stop_time"]
@@ -41,12 +40,3 @@ def test_periods(fmu: Driver) -> None:
     rates = np.full(11, 70.9)
     rows = fmu.run({"LRL_input": rates}, ("LRL", "Period"), stop_time=0.01, samples=11)
     assert rows[-1].tolist() == [70, 857]
-
-
-def test_independent_counts(fmu: Driver) -> None:
-    rng = np.random.default_rng(34)
-    for pieces in (1, 2, 5, 10, 100) * 5:
-        signal = Signal.evenly(list(rng.uniform(50, 90, pieces)), stop_time=STOP, interpolation="constant")
-        rates = signal.sample(TIMES)
-        same = np.diff(rates, prepend=rates[0]) == 0  # at a step, outputs are read before the input is set
-        assert count(fmu, rates)[same].tolist() == pm.counts(rates)[same].tolist()

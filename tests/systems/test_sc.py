@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tests.systems.driving import Array, Driver, evenly, golden, robustness
-from tests.systems.independent import sc
 
 GOLDEN = golden("SC")
 STOP = GOLDEN["stop_time"]
@@ -36,19 +35,3 @@ def test_golden_pressures(fmu: Driver, name: str) -> None:
             assert columns[output][round(row["time"] * 400)] == pytest.approx(row[output], rel=2e-6)
     measured = robustness("SC", "SC", columns, stop_time=STOP)
     assert measured == pytest.approx(run["robustness"], abs=2e-5)
-
-
-def test_independent_condenser(fmu: Driver) -> None:
-    rng = np.random.default_rng(33)
-    times = np.linspace(0, STOP, 3501)
-    flows = np.column_stack([evenly(list(v), STOP).sample(times) for v in rng.uniform(3.99, 4.01, (24, 18))])
-    flows[:, ::4] = np.where(flows[:, ::4] > 4, 4.4, 3.6)  # far from the benchmark's range
-    expected = sc.outputs(flows, 0.01)
-    for run, flow in enumerate(flows.T):
-        rows = fmu.run({"Fs": flow}, OUTPUTS, stop_time=STOP, samples=len(times))
-        for output, column in zip(OUTPUTS, rows.T, strict=True):
-            if output == "Q":
-                column, reference = column[1:], expected[output][1:, run]
-            else:
-                reference = expected[output][:, run]
-            assert np.abs(column - reference).max() < 1e-5 * np.abs(reference).max(), output

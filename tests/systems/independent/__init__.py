@@ -1,1 +1,0 @@
-"""The same equations once more, written and integrated in another way."""
