@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import Literal
 
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.fmu import FmuModel
 from tests.modelica.conftest import Build
-from tests.modelica.support import Exchange, Floats, Instance, opened, said_on_failure
+from tests.modelica.support import INTERFACES, Floats, Instance, opened, said_on_failure
 
-Interface = Literal["co-simulation", "model-exchange"]
-INTERFACES: tuple[Interface, ...] = ("co-simulation", "model-exchange")
 STOP, STEP = 2.0, 0.01
 NAMES = ("x", "late", "ramp", "steps", "varying", "crossings")
 TIMES = np.linspace(0, STOP, 201)
@@ -113,39 +110,6 @@ def test_a_saved_state_has_what_is_in_the_delays(build: Build, serialized: bool)
         target.fmu.freeFMUState(saved)
 
 
-def test_a_saved_state_of_a_model_exchange_fmu_has_what_is_in_the_delays(build: Build) -> None:
-    """With forward Euler steps, continuing from the saved state gives the same rows as without it."""
-    with opened(build("Delays"), exchange=True) as [instance]:
-        import ctypes
-
-        fmu, size = instance.fmu, 2
-        instance.start()
-        fmu.newDiscreteStates()
-        fmu.enterContinuousTimeMode()
-        slopes = (ctypes.c_double * size)()
-
-        def steps(first: int, last: int) -> list[list[float]]:
-            rows = []
-            for k in range(first, last):
-                x = (ctypes.c_double * size)()
-                fmu.getContinuousStates(x, size)
-                fmu.getDerivatives(slopes, size)
-                moved = [x[j] + STEP * slopes[j] for j in range(size)]
-                fmu.setTime((k + 1) * STEP)
-                fmu.setContinuousStates((ctypes.c_double * size)(*moved), size)
-                fmu.completedIntegratorStep()
-                rows.append(instance.row(["x", "ramp", "late", "varying"]))
-            return rows
-
-        steps(0, 80)
-        saved = fmu.getFMUState()
-        expected = steps(80, 150)
-        fmu.setFMUState(saved)
-        assert steps(80, 150) == expected
-        fmu.freeFMUState(saved)
-        assert expected[-1][1] == pytest.approx(1.2, abs=1e-12)
-
-
 def test_reset_empties_the_delays(build: Build) -> None:
     with opened(build("Delays")) as [fmu]:
         fmu.start(T=0.3)
@@ -182,19 +146,6 @@ def test_instances_have_delays_of_their_own(build: Build) -> None:
             two.step(STEP)
         assert two.get("late") == 2
         assert one.get("late") == pytest.approx(30, abs=1.01)
-
-
-def test_a_host_that_tries_steps_and_goes_back_gets_the_same(build: Build) -> None:
-    """This host finds events by completing trial steps, and continues from an earlier time."""
-    names = ["x", "late", "ramp", "steps", "crossings"]
-    with opened(build("Delays")) as [fmu]:
-        expected = fmu.start().run(names, 1.0, STEP)
-    with opened(build("Delays"), exchange=True) as [fmu]:
-        host = Exchange(fmu).start()
-        rows = host.run(names, 1.0, STEP)
-    assert host.events > 5
-    assert rows[:, 1:4] == pytest.approx(expected[:, 1:4], abs=2e-5)
-    assert rows[-1, 4:].tolist() == expected[-1, 4:].tolist() == [6, 1]
 
 
 @pytest.mark.parametrize(

@@ -50,28 +50,6 @@ def test_every_fmu_of_the_table_is_there() -> None:
     assert sorted(entry["file"] for entry in table.values()) == [path.name for path in FMUS]
 
 
-def test_units_ranges_and_descriptions_of_the_transmission() -> None:
-    description = read_model_description(str(AT))
-    variables = {v.name: v for v in description.modelVariables}
-    throttle = variables["throttle"]
-    assert (throttle.unit, float(throttle.min), float(throttle.max), throttle.causality) == (
-        "%",
-        0,
-        100,
-        "input",
-    )
-    assert "Throttle" in throttle.description
-    gear = variables["gear"]
-    assert (gear.type, gear.causality, gear.variability, int(gear.min), int(gear.max)) == (
-        "Integer", "output", "discrete", 1, 4,
-    )  # fmt: skip
-    assert [v.name for v in description.modelVariables if v.causality == "output"] == ["speed", "rpm", "gear"]
-    assert variables["waitTicks"].variability == "tunable"
-    experiment = description.defaultExperiment
-    assert (float(experiment.stopTime), float(experiment.stepSize)) == (50, 0.01)
-    assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
-
-
 def test_parameters_are_fixed_tunable_or_constant(build: Build) -> None:
     found = {}
     for model in ("Decay", "Counter", "Arrays", "Inherited"):
@@ -84,14 +62,6 @@ def test_parameters_are_fixed_tunable_or_constant(build: Build) -> None:
     assert found["Counter", "period"] == ("parameter", "fixed")
     assert found["Arrays", "n"] == ("local", "constant")  # decides sizes
     assert found["Counter", "held"] == ("output", "discrete")
-
-
-def test_states_and_their_derivatives_are_linked(build: Build) -> None:
-    description = read_model_description(str(build("Arrays")))
-    derivatives = {v.name: v.derivative.name for v in description.modelVariables if v.derivative}
-    names = ["x[1]", "x[2]", "tank[1].y", "tank[2].y", "tank[3].y"]
-    assert derivatives == {f"der({name})": name for name in names}
-    assert len(description.derivatives) == 5
 
 
 def test_sources_and_binaries_for_three_platforms() -> None:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.fmu import FmuModel, read_info
 from tests.modelica.conftest import Build
-from tests.modelica.support import opened
+from tests.modelica.support import INTERFACES, opened
 
 WAIT, UP, DOWN = 1.0, 2.0, 3.0
 
@@ -28,10 +26,8 @@ def test_items_are_described(build: Build, fmi: int) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("interface", ["co-simulation", "model-exchange"])
-def test_enumerations_as_inputs_parameters_and_states(
-    build: Build, fmi: int, interface: Literal["co-simulation", "model-exchange"]
-) -> None:
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_enumerations_as_inputs_parameters_and_states(build: Build, fmi: int, interface: Interface) -> None:
     command = Signal((0.0, 0.2, 0.4, 0.6, 0.8), (WAIT, UP, DOWN, UP, UP), "constant")
     outputs = ("count", "before", "code", "later", "gain[1]", "gain[2]", "gain[3]")
     model = FmuModel(build("Enumerated", fmi=fmi), interface=interface)

@@ -17,7 +17,7 @@ from tests.systems.driving import ROOT, Array, evenly
 ONE, TWO = problems("AT"), problems("ATsplit")
 NAMES = {"speed": "car.speed", "rpm": "car.rpm", "gear": "shift.gear"}
 TICK, STOP = 0.04, 50.0
-GOLDEN: dict[str, Any] = json.loads((ROOT / "tests" / "fixtures" / "at_golden.json").read_text())
+GOLDEN: dict[str, Any] = json.loads((ROOT / "tests" / "systems" / "golden" / "AT.json").read_text())
 
 
 def driven(times: list[float], throttle: list[float], brake: list[float]) -> Candidate:
