@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.analyses.parts import (
+from falsifier.analyses.range_parts import (
     PACES,
     Array,
     Counts,

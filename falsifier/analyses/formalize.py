@@ -24,7 +24,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.problem.subject import Subject, subject_of
 from falsifier.problem.unit_check import defined_units, factor_and_offset
 from falsifier.search.budget import Spent
-from falsifier.search.leaders import open_chat
+from falsifier.search.make_engines import open_chat
 from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, in_words
 from falsifier.stl.formula import And

@@ -24,7 +24,7 @@ from falsifier.stl.formula import Always, And, Eventually, Or, Until, Window
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import Interval, decided
 
-FindingKind = Literal[
+LintKind = Literal[
     "invalid", "unmoved", "always", "never", "margin", "window", "units", "duplicate", "implied"
 ]
 # Simulations of the measured check of whether an input moves a requirement's signals.
@@ -47,7 +47,7 @@ class LintFinding:
     """
 
     requirement: str
-    kind: FindingKind
+    kind: LintKind
     place: str
     text: str
     advice: str
@@ -172,7 +172,7 @@ def _implied_side(name: str, part: And | Or) -> Iterator[LintFinding]:
         spare, kept = (other, one) if isinstance(part, And) else (one, other)
         because = "implies it" if isinstance(part, And) else "it implies"
         text = f"it does not matter beside {kept}, which {because}"
-        kind: FindingKind = "implied"
+        kind: LintKind = "implied"
         if isinstance(spare, Always | Eventually | Until) and _differ_in_window(spare, kept):
             kind = "window"
         yield LintFinding(name, kind, str(spare), text, "leave it out, or correct its window or threshold")

@@ -101,7 +101,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Revalidated:
     """Result of re-simulating one claimed counterexample.
 
     Attributes:
@@ -143,7 +143,7 @@ def read_rows(path: Path) -> list[Row]:
 
 def validate(
     rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS, find: Finder | None = None
-) -> list[Finding]:
+) -> list[Revalidated]:
     """Re-simulate all claimed counterexamples.
 
     Args:
@@ -248,9 +248,9 @@ def _matrix(text: str) -> Matrix:
     return np.array(numbers, dtype=np.float64) if rows else np.empty((0, 0))
 
 
-def _checked(row: Row, budget: int, find: Finder) -> Finding:
+def _checked(row: Row, budget: int, find: Finder) -> Revalidated:
     if row.simulations > budget:
-        return Finding(
+        return Revalidated(
             row,
             holds=False,
             robustness=None,
@@ -260,18 +260,20 @@ def _checked(row: Row, budget: int, find: Finder) -> Finding:
         problem = find(row.requirement, row.instance, row.stop_time)
         candidate = _candidate(row, problem)
     except (FalsifierError, ValueError) as error:
-        return Finding(row, holds=False, robustness=None, reason=str(error))
+        return Revalidated(row, holds=False, robustness=None, reason=str(error))
     evaluation = evaluate(problem, candidate)
     robustness = evaluation.robustness
     if robustness is None:
-        return Finding(row, holds=False, robustness=None, reason=f"simulation failed: {evaluation.reason}")
+        return Revalidated(
+            row, holds=False, robustness=None, reason=f"simulation failed: {evaluation.reason}"
+        )
     if robustness < 0:
-        return Finding(row, holds=True, robustness=robustness, reason="reproduced")
+        return Revalidated(row, holds=True, robustness=robustness, reason="reproduced")
     allowed = tolerance(row.requirement)
     if robustness < allowed:
         reason = f"accepted, within the tolerance of {allowed:g}"
-        return Finding(row, holds=True, robustness=robustness, reason=reason)
-    return Finding(row, holds=False, robustness=robustness, reason="not reproduced")
+        return Revalidated(row, holds=True, robustness=robustness, reason=reason)
+    return Revalidated(row, holds=False, robustness=robustness, reason="not reproduced")
 
 
 def _candidate(row: Row, problem: Problem) -> Candidate:

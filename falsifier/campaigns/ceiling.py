@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from falsifier.campaigns.plan import CampaignRequest
+from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.words import counted
 from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS

@@ -16,7 +16,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from falsifier.campaigns.plan import CampaignRequest
+from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.files import write_whole
 from falsifier.core.sealing import check_seal, seal
 from falsifier.errors import JournalError, rejected

@@ -13,10 +13,10 @@ from falsifier.campaigns.directory import (
     run_directories,
     run_directory,
 )
-from falsifier.campaigns.plan import Method, method_of
+from falsifier.campaigns.request import Method, method_of
 from falsifier.record import manifest
 from falsifier.record.journal import JournalReader
-from falsifier.record.tally import FINISHED, RunStatus, Tally
+from falsifier.record.summary import FINISHED, RunStatus, Summary
 from falsifier.search.budget import Spent
 from falsifier.search.request import RunRequest
 
@@ -102,35 +102,35 @@ class _Followed:
     directory: Path
     method: Method
     requirement: str | None = None
-    tally: Tally = field(init=False)
+    summary: Summary = field(init=False)
     reader: JournalReader = field(init=False)
 
     def __post_init__(self) -> None:
         self.begin()
 
     def begin(self) -> None:
-        self.tally = Tally(self.requirement)
+        self.summary = Summary(self.requirement)
         self.reader = JournalReader(self.directory, with_candidates=False)
 
     def read(self) -> None:
         if self.reader.shrank:  # an incomplete line was dropped, or the directory was replaced
             self.begin()
         for record in self.reader.new():
-            self.tally.add(record)
+            self.summary.add(record)
         if self.reader.begun:
-            self.tally.begin()
+            self.summary.begin()
 
     def progress(self) -> RunProgress:
-        tally = self.tally
+        summary = self.summary
         return RunProgress(
             name=self.name,
             requirement=self.requirement or self.request.problems[0].name,
             method=self.method,
             seed=self.request.seed,
-            status="running" if tally.is_incomplete else tally.status,
-            reason=tally.reason,
-            best=tally.best_robustness,
-            spent=tally.spent,
+            status="running" if summary.is_incomplete else summary.status,
+            reason=summary.reason,
+            best=summary.best_robustness,
+            spent=summary.spent,
         )
 
 

@@ -15,10 +15,10 @@ from falsifier.campaigns.directory import (
     run_directory,
     write_campaign,
 )
-from falsifier.campaigns.plan import CampaignRequest, method_of
 from falsifier.campaigns.progress import Follower, Progress
+from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import Schedule
-from falsifier.campaigns.work import Done, Task, unpack
+from falsifier.campaigns.worker import Done, RunTask, unpack
 from falsifier.context.values import Context
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import JournalError, SpecError
@@ -29,9 +29,9 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import holds_run, open_journal, write_manifest
 from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, read
 from falsifier.record.records import EndedRecord
-from falsifier.record.tally import read_tally
+from falsifier.record.summary import read_summary
 from falsifier.search.budget import Budget
-from falsifier.search.leaders import check_names, told_problems
+from falsifier.search.make_engines import check_names, told_problems
 from falsifier.search.request import RunRequest
 
 Listener = Callable[[Progress], None]
@@ -41,7 +41,7 @@ _PATIENCE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CampaignEnd:
     """How work on a campaign ended.
 
     Attributes:
@@ -60,7 +60,7 @@ def run_campaign(
     jobs: int = 1,
     executor: str | None = None,
     listeners: Iterable[Listener] = (),
-) -> Outcome:
+) -> CampaignEnd:
     """Start a campaign.
 
     Args:
@@ -96,7 +96,7 @@ def resume_campaign(
     executor: str | None = None,
     limits: Budget | None = None,
     listeners: Iterable[Listener] = (),
-) -> Outcome:
+) -> CampaignEnd:
     """Continue a campaign: finished runs are kept, the others are resumed from their journals.
 
     Args:
@@ -134,7 +134,7 @@ def _work(
     problems: Mapping[ProblemSource, Problem],
     workers: Workers,
     listeners: tuple[Listener, ...],
-) -> Outcome:
+) -> CampaignEnd:
     stop = directory / STOP
     stop.unlink(missing_ok=True)
     watch = _Watch(directory, record.request.limits, listeners)
@@ -150,9 +150,9 @@ def _work(
         problem = problems[request.problems[0]]
         told = told_problems(request, [problem], _recorded(run_directory(directory, name)))
         described = describe(request, told, method_of(request).label)
-        tasks.append(Task(name, request, problem, described, directory.absolute(), mark))
+        tasks.append(RunTask(name, request, problem, described, directory.absolute(), mark))
 
-    def report(task: Task, done: Done) -> None:
+    def report(task: RunTask, done: Done) -> None:
         place = run_directory(directory, task.name)
         if done.packed is not None:
             unpack(done.packed, place)
@@ -172,7 +172,7 @@ def _work(
     stop.unlink(missing_ok=True)
     if watch.error is not None:
         raise watch.error
-    return Outcome(progress, watch.reason)
+    return CampaignEnd(progress, watch.reason)
 
 
 class _Watch:
@@ -260,12 +260,12 @@ def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
     return {path: digest for p in problems.values() for path, digest in file_hashes(p).items()}
 
 
-def _record_failure(directory: Path, task: Task, reason: str) -> None:
+def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     """Record in a run's journal why it failed, if its worker could not do so."""
-    tally = read_tally(directory)
-    if tally.status not in ("waiting", "running"):
+    summary = read_summary(directory)
+    if summary.status not in ("waiting", "running"):
         return
     with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
         if not holds_run(directory):
             write_manifest(directory, task.manifest.model_dump(mode="json"))
-        journal.write(EndedRecord(status="failed", reason=reason, spent=asdict(tally.spent)), at_once=True)
+        journal.write(EndedRecord(status="failed", reason=reason, spent=asdict(summary.spent)), at_once=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from time import monotonic
 
-from falsifier.campaigns.work import Done, Missing, Task, fmu_file, run_task
+from falsifier.campaigns.worker import Done, Missing, RunTask, fmu_file, run_task
 from falsifier.errors import FalsifierError
 from falsifier.evaluation.workers import Workers
 
@@ -17,7 +17,7 @@ _TICK = 0.25
 # Time in s without any worker after which that is reported: a cluster needs a moment to replace one.
 _ALONE_SECONDS = 20.0
 
-Report = Callable[[Task, Done], None]
+Report = Callable[[RunTask, Done], None]
 Tick = Callable[[], bool]
 
 
@@ -33,12 +33,12 @@ class Schedule:
         calls: maximum number of concurrent runs that use a language model.
     """
 
-    def __init__(self, tasks: Iterable[Task], workers: Workers, *, calls: int) -> None:
+    def __init__(self, tasks: Iterable[RunTask], workers: Workers, *, calls: int) -> None:
         self._workers = workers
         self._calls = calls
         self._waiting = deque(tasks)
-        self._suspects: deque[Task] = deque()
-        self._running: dict[Future[Done | Missing], Task] = {}
+        self._suspects: deque[RunTask] = deque()
+        self._running: dict[Future[Done | Missing], RunTask] = {}
         self._served = monotonic()
         self._is_reported = False
 
@@ -91,7 +91,7 @@ class Schedule:
                 return
             self._start(task)
 
-    def _next(self) -> Task | None:
+    def _next(self) -> RunTask | None:
         """First waiting run that the limit on runs with a language model allows."""
         asking = sum(task.request.llm is not None for task in self._running.values())
         for task in self._waiting:
@@ -100,7 +100,7 @@ class Schedule:
                 return task
         return None
 
-    def _start(self, task: Task, files: dict[str, bytes] | None = None) -> None:
+    def _start(self, task: RunTask, files: dict[str, bytes] | None = None) -> None:
         try:
             self._running[self._workers.executor.submit(run_task, task, files or {})] = task
         except BrokenExecutor:  # a worker died while idle
@@ -126,7 +126,7 @@ class Schedule:
             else:
                 report(task, outcome)
 
-    def _recover(self, task: Task, reason: str, report: Report) -> None:
+    def _recover(self, task: RunTask, reason: str, report: Report) -> None:
         """Restart the pool after a worker died; report the run if it was alone, otherwise suspect all."""
         alone = not self._running
         others = list(self._running.values())

@@ -13,10 +13,10 @@ from typing import Any, NoReturn, get_args
 import click
 
 from falsifier.campaigns import (
+    CampaignEnd,
     CampaignRequest,
     Follower,
     Method,
-    Outcome,
     cross,
     run_campaign,
     suite,
@@ -26,7 +26,7 @@ from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.analysis.tables import TABLES, statistics_json
 from falsifier.campaigns.ceiling import ceiling
 from falsifier.campaigns.directory import is_campaign
-from falsifier.campaigns.plan import as_searched
+from falsifier.campaigns.request import as_searched
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.suites import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.cli.llm_options import (
@@ -65,7 +65,7 @@ from falsifier.llm.messages import Effort
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
-from falsifier.search.leaders import price_of
+from falsifier.search.make_engines import price_of
 from falsifier.search.moves import Objective
 from falsifier.search.request import LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
@@ -249,7 +249,7 @@ def resume_campaign(
     finish(directory, outcome, table="main", as_json=as_json)
 
 
-def finish(directory: Path, outcome: Outcome, *, table: str, as_json: bool) -> NoReturn:
+def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) -> NoReturn:
     """Save all tables, print one of them, and exit with the campaign's exit code."""
     runs, published = load(directory), read_published()
     for name, make in TABLES.items():

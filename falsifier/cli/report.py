@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from falsifier.campaigns.archcomp import Finding, export, read_rows
+from falsifier.campaigns.archcomp import Revalidated, export, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS
 from falsifier.cli.files import check_out
@@ -69,13 +69,13 @@ def validate(*, file: Path, budget: int, as_json: bool) -> None:
     conclude(text, 0 if all(f.holds for f in findings) else 1)
 
 
-def _finding_line(f: Finding) -> str:
+def _finding_line(f: Revalidated) -> str:
     rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
     robustness = "" if f.robustness is None else f", robustness {signed(f.robustness)}"
     return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
 
 
-def _finding_json(finding: Finding) -> dict[str, object]:
+def _finding_json(finding: Revalidated) -> dict[str, object]:
     return {
         "row": finding.row.number,
         "requirement": finding.row.requirement,

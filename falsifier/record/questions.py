@@ -20,7 +20,7 @@ from falsifier.stl.margins import signed
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Sample:
     """What came of one candidate.
 
     Attributes:
@@ -43,12 +43,12 @@ class Iteration:
 
     Attributes:
         exchanges: what was asked and answered during the call, rejected replies included.
-        outcomes: one per candidate.
+        samples: one per candidate.
         seconds: how long the call took, with its questions, in s.
     """
 
     exchanges: tuple[Exchange, ...]
-    outcomes: tuple[Outcome, ...]
+    samples: tuple[Sample, ...]
     seconds: float
 
     @property
@@ -59,7 +59,7 @@ class Iteration:
     @property
     def simulation_seconds(self) -> float:
         """How long its simulations took, in s."""
-        return sum(outcome.seconds for outcome in self.outcomes)
+        return sum(sample.seconds for sample in self.samples)
 
 
 def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
@@ -67,18 +67,18 @@ def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
 
     Exchanges after the last call are a call of their own, without candidates: the run ended during it.
     """
-    told, asked = _outcomes(records := list(records), requirement), list[ExchangeRecord]()
+    told, asked = _results(records := list(records), requirement), list[ExchangeRecord]()
     found = []
     for record in records:
         if isinstance(record, ExchangeRecord):
             asked.append(record)
         elif isinstance(record, AskedRecord):
             if record.requirement == requirement:
-                outcomes = [
-                    Outcome(i, Candidate.from_json(c), *told.get(i, ("", 0.0)))
+                samples = [
+                    Sample(i, Candidate.from_json(c), *told.get(i, ("", 0.0)))
                     for i, c in enumerate(record.candidates, start=record.first)
                 ]
-                found.append(Iteration(_exchanges(asked), tuple(outcomes), record.seconds))
+                found.append(Iteration(_exchanges(asked), tuple(samples), record.seconds))
             asked = []
     return [*found, Iteration(_exchanges(asked), (), 0.0)] if asked else found
 
@@ -87,7 +87,7 @@ def _exchanges(records: Iterable[ExchangeRecord]) -> tuple[Exchange, ...]:
     return tuple(Exchange.model_validate(record.exchange) for record in records)
 
 
-def _outcomes(records: Iterable[Record], requirement: str) -> dict[int, tuple[str, float]]:
+def _results(records: Iterable[Record], requirement: str) -> dict[int, tuple[str, float]]:
     """Return what came of each evaluation, and how long it took, by index."""
     found: dict[int, tuple[str, float]] = {}
     for record in records:

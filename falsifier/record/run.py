@@ -28,9 +28,9 @@ from falsifier.record.manifest import Manifest
 from falsifier.record.replay import replayed
 from falsifier.search.budget import Budget, budget_of, what_counts
 from falsifier.search.events import Listener
-from falsifier.search.leaders import make_engines, make_scouts, told_problems
 from falsifier.search.levels import Level
 from falsifier.search.loop import search
+from falsifier.search.make_engines import make_engines, make_scouts, told_problems
 from falsifier.search.moves import Objective
 from falsifier.search.refine import level_starts, levels_of, make_refining
 from falsifier.search.request import LLMSettings, RunRequest

@@ -34,7 +34,7 @@ def level_name(number: int, count: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class LevelResult:
     """What came of one level.
 
     Attributes:
@@ -62,9 +62,9 @@ class Outcome:
         )
 
 
-def outcomes(
+def level_results(
     starts: Sequence[int], robustness: Sequence[float | None], *, falsified: bool
-) -> tuple[Outcome, ...]:
+) -> tuple[LevelResult, ...]:
     """Return what came of each level.
 
     Args:
@@ -78,5 +78,5 @@ def outcomes(
         judged = [value for value in own if value is not None and not isnan(value)]
         is_last = bool(len(own)) and first + len(own) == len(robustness)
         name = level_name(number, len(starts))
-        found.append(Outcome(name, len(own), min(judged, default=None), falsified and is_last))
+        found.append(LevelResult(name, len(own), min(judged, default=None), falsified and is_last))
     return tuple(found)

@@ -29,9 +29,9 @@ from falsifier.search.events import (
 )
 from falsifier.search.levels import Level, reached
 from falsifier.search.moves import Ask, Costs, Move, Objective, Proposer, Situation, next_move
+from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Live, Steps
-from falsifier.search.targets import Target
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
@@ -88,9 +88,9 @@ def search(
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     beside = scouts if objective != "simulations" and scouts else [None] * len(problems)
-    targets = [Target(p, e, s) for p, e, s in zip(problems, engines, beside, strict=True)]
+    states = [RequirementState(p, e, s) for p, e, s in zip(problems, engines, beside, strict=True)]
     levels = tuple(levels) or (Level(0, problems[0].space),)
-    loop = _Loop(targets, levels, budget, steps or Live(), directory, tuple(listeners), objective, prepared)
+    loop = _Loop(states, levels, budget, steps or Live(), directory, tuple(listeners), objective, prepared)
     status: ResultStatus
     try:
         loop.attach()
@@ -112,7 +112,7 @@ def search(
 class _Started(NamedTuple):
     """A candidate that is being simulated, or will be when its evaluation is waited for."""
 
-    target: Target
+    state: RequirementState
     proposer: Proposer
     wait: Callable[[], Evaluation]
 
@@ -122,7 +122,7 @@ class _Loop:
 
     def __init__(
         self,
-        targets: list[Target],
+        states: list[RequirementState],
         levels: tuple[Level, ...],
         budget: Budget,
         steps: Steps,
@@ -131,7 +131,7 @@ class _Loop:
         objective: Objective | None,
         prepared: float,
     ) -> None:
-        self.targets = targets
+        self.states = states
         self.levels = levels
         self.budget = budget
         self.steps = steps
@@ -155,25 +155,25 @@ class _Loop:
         def wrap(chat: Chat) -> Chat:
             return self.steps.chat(BoundedChat(chat, self.budget, self.clock))
 
-        for target in self.targets:
-            if isinstance(target.engine, AsksLLM):
-                target.engine.attach(self.exchanged, wrap)
-            if isinstance(target.engine, FollowsRun):
-                target.engine.begin(self.budget.simulations)
+        for state in self.states:
+            if isinstance(state.engine, AsksLLM):
+                state.engine.attach(self.exchanged, wrap)
+            if isinstance(state.engine, FollowsRun):
+                state.engine.begin(self.budget.simulations)
 
     def run(self, jobs: int, *, in_batches: bool) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         self.emit(
             RunStarted(
-                problems=tuple(t.problem for t in self.targets),
-                engines=tuple(t.engine.name for t in self.targets),
+                problems=tuple(t.problem for t in self.states),
+                engines=tuple(t.engine.name for t in self.states),
                 budget=self.budget,
                 searched=self.levels[-1].space,
                 levels=self.levels if len(self.levels) > 1 else (),
                 replayed=self.steps.replayed,
             )
         )
-        while standing := [t for t in self.targets if t.counterexample is None]:
+        while standing := [t for t in self.states if t.counterexample is None]:
             move = self.steps.move(self.count, lambda: self.decide(jobs, in_batches=in_batches))
             if move is None:
                 self.settle(self.waiting.popleft(), standing)
@@ -207,7 +207,7 @@ class _Loop:
             cores=jobs,
             left=None if limit is None else limit - self.count - len(self.waiting),
             in_batches=in_batches,
-            may_scout=self.targets[0].scout is not None,
+            may_scout=self.states[0].scout is not None,
             costs=self.costs,
         )
         return next_move(situation)
@@ -222,9 +222,9 @@ class _Loop:
             return "failed", self.failure_text()
         if self.last_defect and not self.is_answered:
             reason = f"{reason}; the language model gave no usable answer: {self.last_defect}"
-        asks = any(isinstance(target.engine, AsksLLM) for target in self.targets)
+        asks = any(isinstance(state.engine, AsksLLM) for state in self.states)
         stand_ins = (KNOWN, RANDOM_CHANGE) if asks and not self.is_answered else ()
-        evaluations = (evaluation for target in self.targets for evaluation in target.evaluations)
+        evaluations = (evaluation for state in self.states for evaluation in state.evaluations)
         if all(evaluation.candidate.origin in stand_ins for evaluation in evaluations):
             return "failed", reason if self.count else f"{reason}; nothing was simulated"
         return "not falsified", reason
@@ -240,11 +240,11 @@ class _Loop:
             failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
         return f"{failed} failed; the last error: {self.last_error}"
 
-    def ask(self, target: Target, move: Ask) -> None:
+    def ask(self, state: RequirementState, move: Ask) -> None:
         """Ask for candidates, and start to simulate them."""
-        engine = target.scout if move.proposer == "scout" else target.engine
+        engine = state.scout if move.proposer == "scout" else state.engine
         assert engine is not None
-        candidates, wanted, seconds = self.steps.ask(target.problem, engine, move.n)
+        candidates, wanted, seconds = self.steps.ask(state.problem, engine, move.n)
         if isinstance(engine, FollowsRun):
             engine.timed(seconds)
         self.turns += move.proposer == "engine"
@@ -257,16 +257,16 @@ class _Loop:
                 wanted=wanted,
                 candidates=tuple(candidates),
                 seconds=seconds,
-                problem=target.problem,
+                problem=state.problem,
                 proposer=move.proposer,
                 told=self.count,
                 spent=self.clock(),
             )
         )
-        started = self.steps.start(target.problem, candidates)
-        self.waiting.extend(_Started(target, move.proposer, wait) for wait in started)
+        started = self.steps.start(state.problem, candidates)
+        self.waiting.extend(_Started(state, move.proposer, wait) for wait in started)
 
-    def settle(self, started: _Started, standing: Sequence[Target]) -> None:
+    def settle(self, started: _Started, standing: Sequence[RequirementState]) -> None:
         """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
 
         Simulations end in the order in which they were asked for, so that a run does not depend on which one
@@ -274,22 +274,22 @@ class _Loop:
         """
         evaluation = started.wait()
         # Also against the one whose engine proposed it, because a resumed run needs that verdict.
-        judges = standing if started.target in standing else [started.target, *standing]
-        judged = [(t, evaluation if t is started.target else judge(t.problem, evaluation)) for t in judges]
+        judges = standing if started.state in standing else [started.state, *standing]
+        judged = [(t, evaluation if t is started.state else judge(t.problem, evaluation)) for t in judges]
         self.costs = self.costs.simulated(started.proposer, evaluation.seconds)
         self.untold_scouts += started.proposer == "scout"
         self.note(started, evaluation, judged)
-        for target, seen in judged:
-            target.untold.append(seen)
-            self.consider(target, seen)
+        for state, seen in judged:
+            state.untold.append(seen)
+            self.consider(state, seen)
 
-    def tell(self, standing: Sequence[Target]) -> None:
+    def tell(self, standing: Sequence[RequirementState]) -> None:
         """Tell the engines what was simulated since they were told last."""
-        count = max((len(target.untold) for target in standing), default=0)
+        count = max((len(state.untold) for state in standing), default=0)
         seconds = 0.0
-        for target in standing:
-            evaluations, target.untold = target.untold, []
-            told = [engine for engine in (target.engine, target.scout) if engine is not None and evaluations]
+        for state in standing:
+            evaluations, state.untold = state.untold, []
+            told = [engine for engine in (state.engine, state.scout) if engine is not None and evaluations]
             seconds += sum(self.steps.tell(engine, evaluations) for engine in told)
         if count:
             self.costs = self.costs.told(self.untold_scouts / count, seconds)
@@ -301,10 +301,10 @@ class _Loop:
         self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
 
     def note(
-        self, started: _Started, evaluation: Evaluation, judged: Sequence[tuple[Target, Evaluation]]
+        self, started: _Started, evaluation: Evaluation, judged: Sequence[tuple[RequirementState, Evaluation]]
     ) -> None:
         """Count and announce one simulation, judged against each requirement not yet falsified."""
-        improved = [target.note(seen) for target, seen in judged]
+        improved = [state.note(seen) for state, seen in judged]
         failed = all(seen.status != "ok" for _, seen in judged)
         self.last_error = evaluation.reason if failed else self.last_error
         self.spent = replace(
@@ -317,31 +317,31 @@ class _Loop:
         self.emit(
             Evaluated(
                 index=self.count,
-                problem=started.target.problem,
+                problem=started.state.problem,
                 evaluation=evaluation,
-                judged={target.problem.name: seen for target, seen in judged},
+                judged={state.problem.name: seen for state, seen in judged},
                 improved=any(improved),
-                best=started.target.best,
+                best=started.state.best,
                 spent=self.spent,
                 replayed=self.count < self.steps.replayed,
             )
         )
         self.count += 1
 
-    def consider(self, target: Target, evaluation: Evaluation) -> None:
+    def consider(self, state: RequirementState, evaluation: Evaluation) -> None:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
-        if not evaluation.violated or target.counterexample is not None:
+        if not evaluation.violated or state.counterexample is not None:
             return
-        confirmation = self.steps.confirm(target.problem, evaluation, self.count - 1)
+        confirmation = self.steps.confirm(state.problem, evaluation, self.count - 1)
         spent = self.clock()
         if confirmation.outcome == "confirmed":
-            target.counterexample, target.spent = confirmation, spent
+            state.counterexample, state.spent = confirmation, spent
         else:
-            target.doubtful.append(confirmation)
-            if isinstance(target.engine, FollowsRun):
-                target.engine.doubt(confirmation)
+            state.doubtful.append(confirmation)
+            if isinstance(state.engine, FollowsRun):
+                state.engine.doubt(confirmation)
         event = Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
-        if all(t.counterexample is not None for t in self.targets):
+        if all(t.counterexample is not None for t in self.states):
             self.emit_last(event)
         else:
             self.emit(event)
@@ -377,30 +377,30 @@ class _Loop:
 
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
-        results = [self.result(target, status, reason) for target in self.targets]
+        results = [self.result(state, status, reason) for state in self.states]
         overall = "falsified" if all(r.falsified for r in results) else status
         stated = results[0].reason if len(results) == 1 else reason
         self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
         return [replace(result, unrecorded=self.unrecorded) for result in results]
 
-    def result(self, target: Target, status: ResultStatus, reason: str) -> Result:
-        found = target.counterexample
-        begun = reached(self.levels, len(target.evaluations))
+    def result(self, state: RequirementState, status: ResultStatus, reason: str) -> Result:
+        found = state.counterexample
+        begun = reached(self.levels, len(state.evaluations))
         return Result(
-            problem=target.problem,
+            problem=state.problem,
             status=status if found is None else "falsified",
             reason=reason if found is None else found.reason,
             counterexample=found,
-            best=target.best,
-            evaluations=tuple(target.evaluations),
-            refuted=tuple(c for c in target.doubtful if c.outcome == "refuted"),
-            fragile=tuple(c for c in target.doubtful if c.outcome == "fragile"),
-            spent=target.spent or self.clock(),
+            best=state.best,
+            evaluations=tuple(state.evaluations),
+            refuted=tuple(c for c in state.doubtful if c.outcome == "refuted"),
+            fragile=tuple(c for c in state.doubtful if c.outcome == "fragile"),
+            spent=state.spent or self.clock(),
             searched=begun[-1].space,
             levels=self.levels if len(self.levels) > 1 else (),
-            findings=() if found is not None else target.findings(self.levels),
+            findings=() if found is not None else state.findings(self.levels),
             directory=self.directory,
-            remarks=target.remarks,
+            remarks=state.remarks,
             objective=self.objective or ("time" if self.spent.scouts else "simulations"),
         )
 

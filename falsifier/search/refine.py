@@ -9,8 +9,8 @@ from falsifier.llm.messages import Chat
 from falsifier.problem.problem import Problem
 from falsifier.problem.refinement import level_spaces
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
-from falsifier.search.leaders import make_engines
 from falsifier.search.levels import Level
+from falsifier.search.make_engines import make_engines
 from falsifier.search.parameterization import engine_parameterization, searched_space
 from falsifier.search.request import LLMSettings, RunRequest
 

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from falsifier.analyses.coverage import Coverage, ModeCoverage, PairCoverage, RangeCoverage
-from falsifier.analyses.parts import FAST, PACES, SLOW
+from falsifier.analyses.range_parts import FAST, PACES, SLOW
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, listed
 

@@ -13,7 +13,7 @@ from falsifier.core.words import counted, in_one_line
 from falsifier.llm.messages import Exchange, Message
 from falsifier.llm.tokens import count_tokens
 from falsifier.record.journal import read_journal
-from falsifier.record.questions import Iteration, Outcome, iterations
+from falsifier.record.questions import Iteration, Sample, iterations
 from falsifier.views.html import Html, el, join
 
 # Characters of a part's first line that name it.
@@ -66,23 +66,23 @@ def _left_out(directory: Path, missing: Sequence[Iteration], what: str) -> Html:
 
 
 def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
-    first = f"before sample {one.outcomes[0].index + 1}" if one.outcomes else "at the end"
+    first = f"before sample {one.samples[0].index + 1}" if one.samples else "at the end"
     asked = counted(len(one.exchanges), "question")
     tokens = sum(exchange.usage.tokens for exchange in one.exchanges)
-    came = "; ".join(o.text or "not simulated" for o in one.outcomes) or "no candidate"
+    came = "; ".join(o.text or "not simulated" for o in one.samples) or "no candidate"
     heading = f"{asked} {first}, {tokens} tokens, {one.question_seconds:.3g} s: {came}"
     shown = []
     for exchange in one.exchanges:
         shown.append(_exchange(exchange, before))
         before = exchange.messages
-    proposals = [el("li", el("b", f"Sample {o.index + 1}: "), _proposal(o)) for o in one.outcomes]
+    proposals = [el("li", el("b", f"Sample {o.index + 1}: "), _proposal(o)) for o in one.samples]
     return el("details", el("summary", heading), el("ul", *proposals), *shown, class_="exchange")
 
 
-def _proposal(outcome: Outcome) -> Html:
-    candidate = outcome.candidate
+def _proposal(sample: Sample) -> Html:
+    candidate = sample.candidate
     why = el("blockquote", candidate.rationale) if candidate.rationale else Html("")
-    came = outcome.text or "not simulated"
+    came = sample.text or "not simulated"
     return join(f"{candidate.origin}: {in_one_line(candidate)}. ", el("b", came), why)
 
 
@@ -147,15 +147,15 @@ def _name(part: str) -> str:
 def _times(shown: Sequence[Iteration]) -> Html:
     rows = []
     for one in shown:
-        numbers = [str(o.index + 1) for o in one.outcomes]
+        numbers = [str(o.index + 1) for o in one.samples]
         rows.append(
             (
                 ", ".join(numbers) or "\u2013",
-                ", ".join(dict.fromkeys(o.candidate.origin for o in one.outcomes)) or "\u2013",
+                ", ".join(dict.fromkeys(o.candidate.origin for o in one.samples)) or "\u2013",
                 f"{one.question_seconds:.3g}",
                 f"{max(0.0, one.seconds - one.question_seconds):.3g}",
                 f"{one.simulation_seconds:.3g}",
-                "; ".join(o.text for o in one.outcomes),
+                "; ".join(o.text for o in one.samples),
             )
         )
     return _table(

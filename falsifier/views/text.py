@@ -14,7 +14,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
 from falsifier.record import manifest
 from falsifier.search.budget import Spent
-from falsifier.search.levels import Outcome, outcomes
+from falsifier.search.levels import LevelResult, level_results
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 from falsifier.stl import Verdict
@@ -140,17 +140,17 @@ def level_lines(result: Result) -> list[str]:
     """Say of each level of a search that refined its inputs what was searched, and what came of it."""
     return [
         f"{found.name:<14} {found.text}: {parameterization_note(level.space)}"
-        for level, found in zip(result.levels, _outcomes(result), strict=True)
+        for level, found in zip(result.levels, _level_results(result), strict=True)
     ]
 
 
-def _outcomes(result: Result) -> tuple[Outcome, ...]:
+def _level_results(result: Result) -> tuple[LevelResult, ...]:
     if not result.levels:
         return ()
     starts = [level.first for level in result.levels]
     # What was simulated at the same time as the counterexample comes after it and does not count.
     end = result.spent.simulations if result.falsified else None
-    return outcomes(starts, [e.robustness for e in result.evaluations[:end]], falsified=result.falsified)
+    return level_results(starts, [e.robustness for e in result.evaluations[:end]], falsified=result.falsified)
 
 
 def _levels_json(result: Result) -> list[dict[str, Any]]:
@@ -161,7 +161,7 @@ def _levels_json(result: Result) -> list[dict[str, Any]]:
             "smallest": found.smallest,
             "falsified": found.falsified,
         }
-        for level, found in zip(result.levels, _outcomes(result), strict=True)
+        for level, found in zip(result.levels, _level_results(result), strict=True)
     ]
 
 

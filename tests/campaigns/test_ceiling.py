@@ -3,12 +3,12 @@ from math import inf
 import pytest
 
 from falsifier.campaigns.ceiling import Ceiling, ceiling
-from falsifier.campaigns.plan import CampaignRequest, Method, cross
+from falsifier.campaigns.request import CampaignRequest, Method, cross
 from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.leaders import price_of
+from falsifier.search.make_engines import price_of
 from falsifier.search.request import LLMSettings
 
 PAID = Method("", "openai/m")

@@ -6,7 +6,7 @@ import pytest
 from falsifier.campaigns import Follower, Method, Progress, RunProgress
 from falsifier.campaigns.progress import total
 from falsifier.errors import JournalError
-from falsifier.record.tally import RunStatus
+from falsifier.record.summary import RunStatus
 from falsifier.search.budget import Spent
 
 

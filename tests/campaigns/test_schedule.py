@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from falsifier.campaigns.schedule import Schedule
-from falsifier.campaigns.work import Done, Missing, Task
+from falsifier.campaigns.worker import Done, Missing, RunTask
 from falsifier.evaluation.workers import Workers
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import describe
@@ -22,17 +22,17 @@ from tests.problems import easy
 PROBLEM = easy()
 
 
-def task(name: str, model: str | None = None) -> Task:
+def task(name: str, model: str | None = None) -> RunTask:
     request = RunRequest(
         problems=(ProblemSource(target="python:tests.problems:easy"),),
         llm=LLMSettings(name=model) if model else None,
         budget=Budget(1),
     )
-    return Task(name, request, PROBLEM, describe(request, [PROBLEM], "corners"), Path("unused"), "")
+    return RunTask(name, request, PROBLEM, describe(request, [PROBLEM], "corners"), Path("unused"), "")
 
 
 def run(
-    tasks: list[Task],
+    tasks: list[RunTask],
     workers: Workers,
     monkeypatch: pytest.MonkeyPatch,
     work: Callable[..., Any],
@@ -56,7 +56,7 @@ class Gauge:
         self.changed = threading.Condition()
         self.inside = self.most = 0
 
-    def __call__(self, task: Task, files: object) -> Done:
+    def __call__(self, task: RunTask, files: object) -> Done:
         with self.changed:
             self.inside += 1
             self.most = max(self.most, self.inside)
@@ -78,7 +78,7 @@ def test_never_more_runs_than_slots(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_runs_with_a_language_model_have_a_limit_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     asking, together = Gauge(2), Gauge(3)
 
-    def work(task: Task, files: object) -> Done:
+    def work(task: RunTask, files: object) -> Done:
         return asking(task, files) if task.request.llm else together(task, files)
 
     tasks = [task(f"m{i}", "openai/any") for i in range(6)] + [task(f"n{i}") for i in range(6)]
@@ -94,7 +94,7 @@ def test_a_missing_file_is_sent_once_it_is_asked_for(tmp_path: Path, monkeypatch
     monkeypatch.setattr("falsifier.campaigns.schedule.fmu_file", lambda problem, digest: file)
     sent: list[dict[str, bytes]] = []
 
-    def work(task: Task, files: dict[str, bytes]) -> Done | Missing:
+    def work(task: RunTask, files: dict[str, bytes]) -> Done | Missing:
         sent.append(files)
         return Done("falsified", "") if files else Missing("digest")
 

@@ -18,7 +18,7 @@ from falsifier.record.run import falsify
 from falsifier.views.report.page import html_report
 from tests.problems import impossible
 from tests.record.test_questions import asked
-from tests.record.test_tally import evaluated
+from tests.record.test_summary import evaluated
 
 
 def test_candidates_are_found_in_batches(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from falsifier import Problem, System, confirm, evaluate, falsify, load_problem, resume
-from falsifier.campaigns.work import Missing, _with_local_fmus
+from falsifier.campaigns.worker import Missing, _with_local_fmus
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export import export_counterexample

@@ -1,6 +1,6 @@
 from math import nan
 
-from falsifier.search.levels import Level, outcomes, reached
+from falsifier.search.levels import Level, level_results, reached
 from falsifier.testing import lag_problem
 
 SPACE = lag_problem().space
@@ -13,7 +13,7 @@ def test_levels_begin_with_their_first_simulation() -> None:
 
 
 def test_what_came_of_each_level_is_told() -> None:
-    found = outcomes(STARTS, [3.0, 1.0, None, 2.0, nan, None], falsified=False)
+    found = level_results(STARTS, [3.0, 1.0, None, 2.0, nan, None], falsified=False)
     assert [f"{level.name}: {level.text}" for level in found] == [
         "level 1 of 3: 4 simulations, smallest robustness +1",
         "level 2 of 3: 2 simulations, all failed",
@@ -23,6 +23,6 @@ def test_what_came_of_each_level_is_told() -> None:
 
 def test_the_level_of_the_counterexample_is_told() -> None:
     for count, level in ((1, 0), (4, 0), (5, 1), (8, 1), (9, 2)):
-        found = outcomes(STARTS, [1.0] * (count - 1) + [-1.0], falsified=True)
+        found = level_results(STARTS, [1.0] * (count - 1) + [-1.0], falsified=True)
         assert [each.falsified for each in found].index(True) == level
         assert sum(each.falsified for each in found) == 1

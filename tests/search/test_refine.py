@@ -14,7 +14,7 @@ from falsifier.record import manifest
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
-from falsifier.search.levels import outcomes
+from falsifier.search.levels import level_results
 from falsifier.search.refine import level_starts
 from falsifier.search.result import Result
 from falsifier.testing import BIAS, FREE, START, lag_problem
@@ -41,7 +41,7 @@ def test_a_finer_level_finds_what_the_coarse_one_cannot() -> None:
     assert result.falsified
     assert result.spent.simulations <= BUDGET
     starts = [level.first for level in result.levels]
-    found = outcomes(starts, [e.robustness for e in result.evaluations], falsified=True)
+    found = level_results(starts, [e.robustness for e in result.evaluations], falsified=True)
     assert [level.falsified for level in found] == [False, True, False]
     coarse = result.evaluations[: result.levels[1].first]
     assert all(not e.violated and e.candidate.signals["u"].interpolation == "linear" for e in coarse)

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.campaigns.directory import run_directories
-from falsifier.campaigns.plan import Method, method_of
+from falsifier.campaigns.request import Method, method_of
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.problem.defaults import STL_NAME
 from falsifier.record import manifest as manifests
 from falsifier.record.manifest import Manifest
-from falsifier.record.tally import RunStatus, read_tally
+from falsifier.record.summary import RunStatus, read_summary
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding
 from falsifier.stl.verdict import Verdict
@@ -152,24 +152,24 @@ def _told_apart(runs: list[Run]) -> list[Run]:
 
 
 def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
-    tally = read_tally(directory, manifest.requirement.name)
+    summary = read_summary(directory, manifest.requirement.name)
     method = replace(method_of(manifest.request), parameterization=manifest.parameterization, together=shared)
     return Run(
         directory=directory,
         manifest=manifest,
         shared=shared,
         method=method,
-        status=tally.status,
-        reason=tally.reason,
-        robustness=tally.robustness,
-        best=tally.best,
-        verdict=tally.verdict.verdict if tally.verdict else None,
-        counterexample=tally.counterexample,
-        unconfirmed=tally.unconfirmed,
-        trajectories=tally.trajectories,
-        spent=tally.spent,
-        findings=tally.findings,
-        failures=tally.failures,
+        status=summary.status,
+        reason=summary.reason,
+        robustness=summary.robustness,
+        best=summary.best,
+        verdict=summary.verdict.verdict if summary.verdict else None,
+        counterexample=summary.counterexample,
+        unconfirmed=summary.unconfirmed,
+        trajectories=summary.trajectories,
+        spent=summary.spent,
+        findings=summary.findings,
+        failures=summary.failures,
         requirement=manifest.requirement.name,
     )
 

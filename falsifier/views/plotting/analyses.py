@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
-from falsifier.analyses.parts import labels_of
+from falsifier.analyses.range_parts import labels_of
 from falsifier.core.words import counted
 from falsifier.views.plotting.axes import caption, whole_ticks
 

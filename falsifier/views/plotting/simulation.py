@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from falsifier.analyses.parts import labels_of
+from falsifier.analyses.range_parts import labels_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation

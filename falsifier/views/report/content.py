@@ -13,7 +13,7 @@ from falsifier.problem.problem import held_text
 from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.record.journal import read_journal, recorded_candidates, recorded_trajectory
-from falsifier.search.levels import outcomes
+from falsifier.search.levels import level_results
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit, margin_words
@@ -151,7 +151,7 @@ def level_facts(run: Run) -> list[tuple[str, str]]:
     levels = run.manifest.levels
     if not levels:
         return []
-    found = outcomes([level.first for level in levels], list(run.robustness), falsified=run.falsified)
+    found = level_results([level.first for level in levels], list(run.robustness), falsified=run.falsified)
     return [(each.name, f"{each.text}: {level.searched}") for level, each in zip(levels, found, strict=True)]
 
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import pytest
 
-from falsifier.campaigns.work import Done, Missing, Task, run_task, unpack
+from falsifier.campaigns.worker import Done, Missing, RunTask, run_task, unpack
 from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -29,11 +29,11 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "store"
 
 
-def remote_task(problem: Problem, target: str) -> Task:
+def remote_task(problem: Problem, target: str) -> RunTask:
     request = RunRequest(
         problems=(ProblemSource(target=target),), engine="corners", budget=Budget(2), keep="best"
     )
-    return Task(
+    return RunTask(
         "R-0",
         request,
         problem,

@@ -12,7 +12,7 @@ from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Budget
-from falsifier.search.leaders import check_names, make_engines, make_scouts, told_problems
+from falsifier.search.make_engines import check_names, make_engines, make_scouts, told_problems
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 

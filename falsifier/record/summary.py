@@ -27,7 +27,7 @@ RunStatus = Literal["waiting", "running", "falsified", "not falsified", "interru
 FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
 
 
-class Tally:
+class Summary:
     """Numbers of one requirement in one run, updated by adding records in order.
 
     They stop at the requirement's counterexample: a shared search continues for the other requirements.
@@ -158,18 +158,18 @@ class Tally:
             self._failed[record.index] = record.reason
 
 
-def read_tally(directory: Path, requirement: str | None = None) -> Tally:
-    """Read the numbers of a run directory's complete journal; see Tally.
+def read_summary(directory: Path, requirement: str | None = None) -> Summary:
+    """Read the numbers of a run directory's complete journal; see Summary.
 
     Raises:
         JournalError: if a line is invalid, unless it is an incomplete last line.
     """
-    tally, reader = Tally(requirement), JournalReader(directory, with_candidates=False)
+    summary, reader = Summary(requirement), JournalReader(directory, with_candidates=False)
     for record in reader.new():
-        tally.add(record)
+        summary.add(record)
     if reader.begun:
-        tally.begin()
-    return tally
+        summary.begin()
+    return summary
 
 
 def _ended(status: str) -> RunStatus:

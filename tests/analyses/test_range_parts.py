@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from falsifier.analyses.parts import (
+from falsifier.analyses.range_parts import (
     PARTS,
     allowed_labels,
     cells_of,

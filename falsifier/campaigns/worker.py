@@ -41,7 +41,7 @@ _ONE_AT_A_TIME = Lock()
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class RunTask:
     """One run to carry out.
 
     Attributes:
@@ -83,7 +83,7 @@ class Done:
     packed: bytes | None = None
 
 
-def run_task(task: Task, files: Mapping[str, bytes]) -> Done | Missing:
+def run_task(task: RunTask, files: Mapping[str, bytes]) -> Done | Missing:
     """Carry out one run, or resume it.
 
     Args:

@@ -8,12 +8,12 @@ from falsifier.record.records import (
     ExchangeRecord,
     VerdictRecord,
 )
-from falsifier.record.tally import Tally
+from falsifier.record.summary import Summary
 
 
-def status(tally: Tally) -> str:
+def status(summary: Summary) -> str:
     """Read the status anew: the type checker takes an attribute that was compared once for settled."""
-    return tally.status
+    return summary.status
 
 
 def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
@@ -41,34 +41,38 @@ def confirmed(index: int, outcome: Outcome, reason: str, **spent: float | None) 
 
 
 def test_a_growing_journal_is_counted_line_by_line() -> None:
-    tally = Tally()
-    assert status(tally) == "waiting"
-    tally.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", told=0, elapsed=0.1))
-    assert status(tally) == "running"
+    summary = Summary()
+    assert status(summary) == "waiting"
+    summary.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", told=0, elapsed=0.1))
+    assert status(summary) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
-        tally.add(evaluated(i, robustness))
-    assert (tally.best, tally.best_robustness) == (4, -3.0)
-    assert (tally.spent.simulations, tally.spent.simulation_seconds, tally.spent.seconds) == (5, 2.5, 5.0)
-    tally.add(confirmed(2, "fragile", "vanishes"))
-    assert status(tally) == "running"
-    tally.add(confirmed(4, "confirmed", "yes", simulations=5.0, seconds=9.0, cost=None))
-    assert tally.counterexample == 4
-    assert tally.unconfirmed == {2: "fragile: vanishes"}
-    assert (tally.status, tally.spent.seconds, tally.spent.cost) == ("falsified", 9.0, None)
+        summary.add(evaluated(i, robustness))
+    assert (summary.best, summary.best_robustness) == (4, -3.0)
+    assert (summary.spent.simulations, summary.spent.simulation_seconds, summary.spent.seconds) == (
+        5,
+        2.5,
+        5.0,
+    )
+    summary.add(confirmed(2, "fragile", "vanishes"))
+    assert status(summary) == "running"
+    summary.add(confirmed(4, "confirmed", "yes", simulations=5.0, seconds=9.0, cost=None))
+    assert summary.counterexample == 4
+    assert summary.unconfirmed == {2: "fragile: vanishes"}
+    assert (summary.status, summary.spent.seconds, summary.spent.cost) == ("falsified", 9.0, None)
 
 
 def test_what_others_do_after_a_requirement_was_falsified_is_not_its_own() -> None:
-    tally = Tally("R")
-    tally.add(evaluated(0, -1.0))
-    tally.add(confirmed(0, "confirmed", "yes", simulations=1.0))
+    summary = Summary("R")
+    summary.add(evaluated(0, -1.0))
+    summary.add(confirmed(0, "confirmed", "yes", simulations=1.0))
     other = evaluated(1, 5.0).model_copy(update={"verdicts": {"S": None}})
-    tally.add(other)
-    tally.add(EndedRecord(status="not falsified", reason="S stands", spent={"simulations": 2.0}))
-    assert (status(tally), tally.reason, tally.spent.simulations) == ("falsified", "yes", 1)
+    summary.add(other)
+    summary.add(EndedRecord(status="not falsified", reason="S stands", spent={"simulations": 2.0}))
+    assert (status(summary), summary.reason, summary.spent.simulations) == ("falsified", "yes", 1)
 
 
 def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
-    tally = Tally()
+    summary = Summary()
     usage = Usage(prompt_tokens=100, completion_tokens=20, reasoning_tokens=5, cost=0.25)
     exchange = Exchange(
         llm="openai/any",
@@ -77,13 +81,13 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     )
     unanswered = exchange.model_copy(update={"reply": None, "problem": "timeout"})
     for each in (exchange, unanswered, exchange):
-        tally.add(ExchangeRecord(exchange=each.model_dump(mode="json"), elapsed=1.0))
-    assert (tally.spent.tokens, tally.spent.reasoning_tokens, tally.spent.cost) == (240, 10, 0.5)
+        summary.add(ExchangeRecord(exchange=each.model_dump(mode="json"), elapsed=1.0))
+    assert (summary.spent.tokens, summary.spent.reasoning_tokens, summary.spent.cost) == (240, 10, 0.5)
 
 
 def test_a_run_that_goes_on_is_running_again() -> None:
-    tally = Tally()
-    tally.add(EndedRecord(status="interrupted", reason="", spent={}))
-    assert status(tally) == "interrupted"
-    tally.add(evaluated(0, 1.0))
-    assert status(tally) == "running"
+    summary = Summary()
+    summary.add(EndedRecord(status="interrupted", reason="", spent={}))
+    assert status(summary) == "interrupted"
+    summary.add(evaluated(0, 1.0))
+    assert status(summary) == "running"

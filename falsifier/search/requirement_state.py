@@ -14,7 +14,7 @@ from falsifier.search.vacuity import Vacuity
 
 
 @dataclass(slots=True)
-class Target:
+class RequirementState:
     """One requirement in a running search.
 
     Attributes:
