@@ -6,21 +6,20 @@ needs a display.
 
 from typing import TYPE_CHECKING
 
-from falsifier.views.plotting.analyses import plot_coverage
-from falsifier.views.plotting.diagnosis import plot_diagnosis
+from falsifier.views.plotting.analyses import plot_coverage, plot_robustness_map
+from falsifier.views.plotting.axes import png, save_figure, svg
 from falsifier.views.plotting.diagram import plot_diagram
-from falsifier.views.plotting.prediction import plot_predictions
-from falsifier.views.plotting.robustness_map import plot_robustness_map
 from falsifier.views.plotting.runs import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from falsifier.views.plotting.simulation import (
     plot,
+    plot_diagnosis,
     plot_evaluation,
     plot_panel,
+    plot_panels,
     plot_requirement,
-    png,
-    save_figure,
+    plot_signal,
+    plot_trajectory,
 )
-from falsifier.views.plotting.trajectory import plot_signal, plot_trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure
@@ -35,7 +34,7 @@ __all__ = [
     "plot_history",
     "plot_iteration_times",
     "plot_panel",
-    "plot_predictions",
+    "plot_panels",
     "plot_rates",
     "plot_requirement",
     "plot_robustness_map",
@@ -43,4 +42,5 @@ __all__ = [
     "plot_trajectory",
     "png",
     "save_figure",
+    "svg",
 ]

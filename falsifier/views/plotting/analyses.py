@@ -1,8 +1,8 @@
-"""Figure of what a run has tried: values over time, combinations, and what outputs reached."""
+"""Figures of what a run has tried, and of the neighbourhood of a counterexample or a near miss."""
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
 from falsifier.analyses.range_parts import labels_of
 from falsifier.core.words import counted
-from falsifier.views.plotting.axes import caption, whole_ticks
+from falsifier.counterexamples.robustness_map import RobustnessMap
+from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # What was never tried is red, as gaps must strike the eye; the more simulations, the darker the blue.
-_NEVER, _OUTPUT, _TRIED = "#f2b8b0", "#1f5fa8", "#9dbbe0"
+_NEVER, _TRIED = "#f2b8b0", "#9dbbe0"
 # A figure has at most this many panels of each kind: inputs, parameters, pairs, outputs.
 _PANELS = 8
 _COLUMNS = 4
+# Shades of each of the two colours of a map.
+_SHADES = 128
 
 
 def plot_coverage(found: Coverage, title: str = "") -> "Figure":
@@ -95,7 +98,7 @@ def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -
 def _plot_output(ax: "Axes", o: OutputCoverage) -> None:
     ax.fill_between(o.times, o.lows, o.highs, color=_TRIED, linewidth=0)
     for line in (o.lows, o.highs):
-        ax.plot(o.times, line, color=_OUTPUT, linewidth=0.8)
+        ax.plot(o.times, line, color=OUTPUT, linewidth=0.8)
     ax.set(xlabel="time [s]", ylabel=caption(f"{o.name} [{o.unit}]" if o.unit else o.name))
     ax.set_title("smallest and largest value", fontsize=9)
 
@@ -129,3 +132,76 @@ def _whole(axis: "Axis", r: RangeCoverage) -> None:
 
 def _label(r: RangeCoverage) -> str:
     return caption(f"{r.searched.name} [{r.searched.unit}]" if r.searched.unit else r.searched.name)
+
+
+def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
+    """Plot robustness over the size of the change, and over the two most influential inputs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _plot_sizes(left, found)
+    if len(found.grid) > 1:
+        _plot_map(right, found)
+    else:
+        _plot_line(right, found)
+    figure.suptitle(f"{caption(title)}: robustness around the {_centre(found)}".removeprefix(": "))
+    return figure
+
+
+def _centre(found: RobustnessMap) -> str:
+    return "counterexample" if found.original < 0 else "nearest miss"
+
+
+def _colour(found: RobustnessMap) -> str:
+    return VIOLATED if found.original < 0 else OUTPUT
+
+
+def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
+    violates = found.robustness < 0
+    for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
+        if mask.any():
+            ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
+    ax.plot(0.0, found.original, "o", color=_colour(found), label=_centre(found))
+    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+    ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
+    ax.legend()
+
+
+def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
+    first, second = (found.coordinates[i] for i in found.axes)
+    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", **_scale(found))
+    low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
+    if low < 0 <= high:
+        ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
+    elif low < high:  # one colour: lines show which way it changes
+        ax.clabel(ax.contour(*found.grid, found.surface, levels=4, colors="black", linewidths=0.5))
+    ax.plot(first.value, second.value, "o", color="black", markersize=5)
+    ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
+    bar = ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")
+    ticks = sorted({min(low, 0.0), 0.0, max(high, 0.0)})
+    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+
+
+def _scale(found: RobustnessMap) -> dict[str, Any]:
+    """Return a colour scale that contains 0, where red, for violations, ends and blue begins."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
+
+    low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
+    reds = colormaps["Reds_r"](np.linspace(0.1, 0.75, _SHADES))
+    blues = colormaps["Blues"](np.linspace(0.15, 0.8, _SHADES))
+    if low >= 0:
+        return {"cmap": ListedColormap(blues), "norm": Normalize(0.0, high or 1.0)}
+    if high < 0:
+        return {"cmap": ListedColormap(reds), "norm": Normalize(low, 0.0)}
+    both = ListedColormap(np.vstack([reds, blues]))
+    return {"cmap": both, "norm": TwoSlopeNorm(0.0, low, high or -low)}
+
+
+def _plot_line(ax: "Axes", found: RobustnessMap) -> None:
+    coordinate = found.coordinates[found.axes[0]]
+    ax.plot(found.grid[0], found.surface[0], color=OUTPUT, linewidth=1.2)
+    ax.plot(coordinate.value, found.original, "o", color=_colour(found))
+    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+    ax.set(xlabel=caption(coordinate.label), ylabel="robustness")

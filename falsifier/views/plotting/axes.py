@@ -1,7 +1,9 @@
-"""New axes, the figure that axes belong to, and text on it; without pyplot, which keeps global state."""
+"""What all figures share: colours, new axes, text, files; without pyplot, which keeps global state."""
 
 import textwrap
 from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from falsifier.core.literals import one_line
@@ -10,6 +12,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
+# Red is kept for violations. What came nearest to one has not the colour of an alarm.
+OUTPUT, INPUT, VIOLATED, NEAREST = "#1f5fa8", "#2f7d4f", "#b3261e", "#b35900"
+LIMIT, QUIET, EACH = "#333333", "#8a8a8a", "#9aa7b5"
 
 # Maximum number of characters of a title or label.
 _LONGEST_CAPTION = 120
@@ -57,3 +63,25 @@ def figure_of(ax: "Axes") -> "Figure":
     figure = ax.get_figure(root=True)
     assert isinstance(figure, Figure)
     return figure
+
+
+def save_figure(figure: "Figure", path: Path) -> None:
+    """Write a figure; the file extension determines the format."""
+    figure.savefig(path, dpi=130)
+
+
+def png(figure: "Figure", *, dpi: int) -> bytes:
+    """Return a figure as the content of a PNG file."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
+
+
+def svg(figure: "Figure") -> bytes:
+    """Return a figure as the content of an SVG file without a background; equal figures give equal bytes."""
+    from matplotlib import rc_context
+
+    buffer = BytesIO()
+    with rc_context({"svg.hashsalt": "falsifier"}):
+        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    return buffer.getvalue()

@@ -7,34 +7,43 @@ import numpy as np
 
 from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import Run, Statistics, group, statistics
-from falsifier.campaigns.analysis.curves import falsification_curve
+from falsifier.campaigns.analysis.curves import falsification_curve, improvements, thinned
 from falsifier.core.words import counted
-from falsifier.views.plotting.axes import caption, figure_of, own_axes
+from falsifier.views.plotting.axes import EACH, OUTPUT, QUIET, VIOLATED, caption, figure_of, own_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_VALUE, _BEST, _ZERO, _FOUND = "#9aa7b5", "#1f5fa8", "#8a8a8a", "#b3261e"
+# Maximum number of simulations drawn per run.
+_MOST_DRAWN = 1000
 
 
-def plot_history(run: Run, ax: "Axes | None" = None) -> "Figure":
-    """Plot the robustness of each simulation of a run, the smallest so far, and the counterexample.
+def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
+    """Plot the robustness of each simulation of runs, the smallest so far, and the counterexamples.
+
+    Of a long run, the smallest robustness in each of a thousand equal parts is drawn.
 
     Args:
-        run: a run returned by load or load_run.
+        runs: runs returned by load or load_run, of one requirement and method.
         ax: where to draw; None: a new figure.
     """
-    ax = ax if ax is not None else own_axes()
-    numbers = np.arange(1, len(run.robustness) + 1)
-    ax.plot(numbers, run.robustness, ".", color=_VALUE, markersize=4, label="robustness")
-    ax.step(numbers, run.best_so_far, where="post", color=_BEST, linewidth=1.4, label="smallest so far")
-    ax.axhline(0, color=_ZERO, linewidth=0.8, linestyle="--")
-    if run.counterexample is not None:
-        found = run.counterexample
-        ax.plot(found + 1, run.robustness[found], "o", color=_FOUND, label="counterexample")
-    ax.set(xlabel="simulation", ylabel="robustness", title=caption(f"{run.requirement}: {run.method.label}"))
-    ax.legend()
+    ax = ax if ax is not None else own_axes(9.0, 3.2)
+    for run in runs:
+        ax.plot(*thinned(run.robustness, _MOST_DRAWN), ".", color=EACH, markersize=4, label="robustness")
+        numbers, smallest = improvements(run.robustness)
+        until = (np.append(numbers, len(run.robustness)), np.append(smallest, smallest[-1:]))
+        ax.step(*until, where="post", color=OUTPUT, linewidth=1.4, label="smallest so far")
+        if run.counterexample is not None:
+            found = run.counterexample
+            ax.plot(found + 1, run.robustness[found], "o", color=VIOLATED, label="counterexample")
+    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+    ax.set(xlabel="simulation", ylabel="robustness")
+    if runs:
+        ax.set_title(caption(f"{runs[0].requirement}: {runs[0].method.label}"))
+    entries = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    if entries:
+        ax.legend(entries.values(), entries.keys())
     return figure_of(ax)
 
 
@@ -99,7 +108,9 @@ def plot_iteration_times(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figu
         if run.spent.simulations:
             totals.setdefault(run.method.label, []).append(run.spent.seconds / run.spent.simulations)
     ax = ax if ax is not None else own_axes(max(5.0, 1.4 * len(totals)))
-    bars = ax.bar(list(map(caption, totals)), [float(np.mean(each)) for each in totals.values()], color=_BEST)
+    bars = ax.bar(
+        list(map(caption, totals)), [float(np.mean(each)) for each in totals.values()], color=OUTPUT
+    )
     ax.bar_label(bars, fmt="%.3g", fontsize=8, padding=2)
     ax.set(ylabel="seconds per simulation (mean)")
     return figure_of(ax)

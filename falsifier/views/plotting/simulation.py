@@ -1,30 +1,39 @@
-"""Figures of one simulation."""
+"""Figures of one simulation: what was required, what broke or decided, and the inputs."""
 
-from io import BytesIO
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from falsifier.analyses.range_parts import labels_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
+from falsifier.stl import Formula
+from falsifier.stl.formula import Always, Eventually, Until
 from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
-from falsifier.views.plotting.axes import caption, figure_of, own_axes, whole_ticks, wrapped
+from falsifier.views.plotting.axes import (
+    INPUT,
+    LIMIT,
+    NEAREST,
+    OUTPUT,
+    QUIET,
+    VIOLATED,
+    caption,
+    figure_of,
+    own_axes,
+    whole_ticks,
+    wrapped,
+)
 from falsifier.views.plotting.panels import Bound, Panel, panels
-from falsifier.views.plotting.trajectory import plot_trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_OUTPUT, _INPUT, _BOUND, _CRITICAL, _WINDOW = "#1f5fa8", "#2f7d4f", "#b3261e", "#b3261e", "#8a8a8a"
-# Of a simulation that does not violate: not the colour of an alarm.
-_NEAREST = "#b35900"
 # In inches; and the number of characters of a title's line.
 _PANEL_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 0.18, 110
 # A margin below this share of a panel's height is enlarged, with this share of the simulated time around it.
@@ -42,6 +51,11 @@ _CORNERS = (
 _LABELLED = 3
 # Share of a panel's height above which a predicate is written below its line.
 _TOP = 0.85
+# Operators with a time window, as formulas write them, and colours of their windows.
+_OPERATORS: dict[type[Formula], str] = {Always: "G", Eventually: "F", Until: "U"}
+_COLOURS = ("#8a5a00", "#2f7d4f", "#6a3d9a", "#1f5fa8")
+# Height of a window's bar and of its row, as a share of the axes.
+_BAR, _ROW = 0.025, 0.11
 
 
 def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
@@ -71,8 +85,6 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
     trajectory, verdict = evaluation.trajectory, evaluation.verdict
     if trajectory is None or verdict is None:
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
-    from matplotlib.figure import Figure
-
     drawn = panels(
         problem.requirement.formula,
         trajectory,
@@ -82,23 +94,64 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         _labels(problem),
         problem.info.components,
     )
-    colour = _decided_colour(verdict)
-    title = _title(problem, evaluation, verdict)
+    return plot_panels(drawn, verdict, _title(problem, evaluation, verdict))
+
+
+def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = "") -> "Figure":
+    """Plot the quantities of one simulation below each other, with a legend.
+
+    Args:
+        drawn: the quantities, at least one.
+        verdict: what broke or decided; None: nothing is marked.
+        title: text above, on any number of lines.
+    """
+    from matplotlib.figure import Figure
+
     height = _PANEL_HEIGHT * len(drawn) + _LINE_HEIGHT * (title.count("\n") + 1)
     figure = Figure(figsize=(9, 0.8 + height), layout="constrained")
     axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
     group = ""
     for ax, panel in zip(axes, drawn, strict=True):
-        plot_panel(ax, panel, colour)
+        plot_panel(ax, panel, _decided_colour(verdict))
         if panel.component != group:
             group = panel.component
             ax.set_title(caption(group), loc="left", fontsize=9, weight="bold")
-        if panel.critical == verdict.moment and _is_hidden(ax, verdict):
-            _plot_inset(ax, panel, verdict, _enlarged(panel, verdict))
-        ax.axvline(verdict.moment, color=colour, linewidth=0.8, linestyle=":")
+        if verdict is not None:
+            if panel.critical == verdict.moment and _is_hidden(ax, verdict):
+                _plot_inset(ax, panel, verdict, _enlarged(panel, verdict))
+            ax.axvline(verdict.moment, color=_decided_colour(verdict), linewidth=0.8, linestyle=":")
     axes[-1].set_xlabel("time [s]")
-    figure.suptitle(title, fontsize=10)
+    if title:
+        figure.suptitle(title, fontsize=10)
+    if keys := _keys(drawn, verdict):
+        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), frameon=False, fontsize=8)
     return figure
+
+
+def _keys(drawn: Sequence[Panel], verdict: Verdict | None) -> list[Any]:
+    """Return the legend: an entry for each kind of mark that is drawn."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    colour = _decided_colour(verdict)
+    bounds = [(bound, panel.times) for panel in drawn for bound in panel.bounds]
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5, "color": colour}
+    keys: list[Any] = []
+    if bounds:
+        keys.append(Line2D([], [], color=LIMIT, linewidth=1.2, linestyle="--", label="limit"))
+    if any(bound.start > times[0] or bound.end < times[-1] for bound, times in bounds):
+        keys.append(Patch(facecolor=QUIET, alpha=0.15, label="time in which it counts"))
+    if any(panel.broken for panel in drawn):
+        keys.append(Patch(facecolor=colour, alpha=0.25, label="violated"))
+    if any(panel.critical is not None for panel in drawn):
+        marked = "farthest off" if verdict is not None and verdict.violated else "nearest to a violation"
+        keys.append(Line2D([], [], **dot, label=marked))
+    if any(panel.decided is not None for panel in drawn):
+        keys.append(Line2D([], [], **dot, markerfacecolor="none", label="decided the robustness"))
+    if any(panel.points for panel in drawn):
+        points: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 3.5, "color": INPUT}
+        keys.append(Line2D([], [], **points, label="control point of an input"))
+    return keys
 
 
 def _title(problem: Problem, evaluation: Evaluation, verdict: Verdict) -> str:
@@ -117,8 +170,8 @@ def _decided(verdict: Verdict) -> list[str]:
     return [f"{'violated' if verdict.violated else 'not violated'}, {decided}"]
 
 
-def _decided_colour(verdict: Verdict) -> str:
-    return _CRITICAL if verdict.violated else _NEAREST
+def _decided_colour(verdict: Verdict | None) -> str:
+    return VIOLATED if verdict is None or verdict.violated else NEAREST
 
 
 def _labels(problem: Problem) -> dict[str, dict[int, str]]:
@@ -213,16 +266,16 @@ def _covered(ax: "Axes", panel: Panel, corner: tuple[float, float, float, float]
     return count
 
 
-def plot_panel(ax: "Axes", panel: Panel, critical: str = _CRITICAL) -> None:
+def plot_panel(ax: "Axes", panel: Panel, critical: str = VIOLATED) -> None:
     """Draw a quantity with its bounds, windows and critical point, or an input with its control points."""
     is_input = panel.limits is not None
-    color = _INPUT if is_input else _OUTPUT
+    color = INPUT if is_input else OUTPUT
     style = "steps-post" if panel.steps else "default"
     ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
     for bound in panel.bounds:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
-        ax.plot(panel.times[within], bound.values[within], color=_BOUND, linewidth=1.2, linestyle="--")
-        ax.axvspan(bound.start, bound.end, color=_WINDOW, alpha=0.08, linewidth=0)
+        ax.plot(panel.times[within], bound.values[within], color=LIMIT, linewidth=1.2, linestyle="--")
+        ax.axvspan(bound.start, bound.end, color=QUIET, alpha=0.08, linewidth=0)
     for start, end in panel.broken:
         ax.axvspan(start, end, color=critical, alpha=0.15, linewidth=0)
     for time, filling in ((panel.critical, critical), (panel.decided, "none")):
@@ -231,13 +284,13 @@ def plot_panel(ax: "Axes", panel: Panel, critical: str = _CRITICAL) -> None:
             at = panel.times[k], panel.values[k]
             ax.plot(*at, "o", color=critical, markersize=5, markerfacecolor=filling)
     if panel.points:
-        ax.plot(*zip(*panel.points, strict=True), "o", color=_INPUT, markersize=3.5)
+        ax.plot(*zip(*panel.points, strict=True), "o", color=INPUT, markersize=3.5)
     if panel.limits is not None:
         low, high = panel.limits
         margin = 0.06 * (high - low)
         ax.set_ylim(low - margin, high + margin)
         for limit in panel.limits:
-            ax.axhline(limit, color=_WINDOW, linewidth=0.6, linestyle=":")
+            ax.axhline(limit, color=QUIET, linewidth=0.6, linestyle=":")
     if panel.labels is not None:
         whole_ticks(ax.yaxis, panel.labels)
     for bound in panel.bounds[:_LABELLED]:
@@ -254,16 +307,72 @@ def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
     low, high = ax.get_ylim()
     side, offset = ("top", -3) if at[1] > low + _TOP * (high - low) else ("bottom", 2)
     text, where = caption(bound.predicate), (3, offset)
-    ax.annotate(text, at, where, textcoords="offset points", va=side, color=_BOUND, fontsize=8)
+    ax.annotate(text, at, where, textcoords="offset points", va=side, color=LIMIT, fontsize=8)
 
 
-def save_figure(figure: "Figure", path: Path) -> None:
-    """Write a figure; the file extension determines the format."""
-    figure.savefig(path, dpi=130)
+def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
+    """Plot the deciding quantity, and below it the window of each operator on the path to the critical time.
+
+    Args:
+        problem: the problem with the requirement.
+        evaluation: an evaluation with its trajectory.
+        ax: where to draw; None: a new figure.
+
+    Raises:
+        ValueError: if the evaluation has no trajectory.
+    """
+    from matplotlib.transforms import blended_transform_factory
+
+    figure = plot_requirement(problem, evaluation, ax)
+    ax = figure.axes[0] if ax is None else ax
+    assert evaluation.trajectory is not None
+    path = monitor_for(problem).diagnose(evaluation.trajectory).path
+    windows = [step for step in path if step.window is not None]
+    in_axes = blended_transform_factory(ax.transData, ax.transAxes)
+    low, high = ax.get_ylim()
+    room = _ROW * (len(windows) + 1)
+    ax.set_ylim(low - room * (high - low) / (1 - room), high)
+    for row, step in enumerate(windows):
+        assert step.window is not None
+        start, end = step.window
+        y, colour = _ROW * (len(windows) - row), _COLOURS[row % len(_COLOURS)]
+        ax.fill_between([start, end], y, y - _BAR, color=colour, transform=in_axes, linewidth=0, alpha=0.8)
+        label = f"{_OPERATORS[type(step.formula)]} over [{start:.6g}, {end:.6g}] s"
+        ax.text(start, y, label, color=colour, transform=in_axes, va="bottom", fontsize=8)
+    return figure_of(ax)
 
 
-def png(figure: "Figure", *, dpi: int) -> bytes:
-    """Return a figure as the content of a PNG file."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi)
-    return buffer.getvalue()
+def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
+    """Plot signals over time, one small panel per signal.
+
+    Args:
+        trajectory: the simulation.
+        names: names of the signals; None: all.
+    """
+    from matplotlib.figure import Figure
+
+    names = trajectory.names if names is None else names
+    figure = Figure(figsize=(8, 0.6 + 1.1 * len(names)), layout="constrained")
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, name in zip(axes, names, strict=True):
+        plot_signal(trajectory, name, ax)
+        ax.set_xlabel("")
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def plot_signal(trajectory: Trajectory, name: str, ax: "Axes | None" = None, *, label: str = "") -> "Figure":
+    """Plot one signal over time.
+
+    Args:
+        trajectory: the simulation.
+        name: name of the signal.
+        ax: where to draw; None: a new figure.
+        label: label of the line in a legend; if given, each line gets its own colour.
+    """
+    ax = ax if ax is not None else own_axes(8, 2.5)
+    colour = None if label else OUTPUT
+    ax.plot(trajectory.times, trajectory[name], linewidth=1.2, label=caption(label) or None, color=colour)
+    unit = trajectory.units.get(name, "")
+    ax.set(xlabel="time [s]", ylabel=caption(f"{name} [{unit}]" if unit else name))
+    return figure_of(ax)

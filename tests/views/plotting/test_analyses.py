@@ -1,12 +1,21 @@
-import numpy as np
+from pathlib import Path
 
-from falsifier import Candidate, Signal, Trajectory
+import numpy as np
+import pytest
+
+from falsifier import Trajectory
 from falsifier.analyses.coverage import coverage_of
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.space import Freedom
+from falsifier.counterexamples.robustness_map import robustness_map
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.manifest import InputRecord
-from falsifier.views.plotting import plot_coverage, png
+from falsifier.testing import START, lag_problem
+from falsifier.views.plotting import plot_coverage, plot_robustness_map, png, save_figure
 from tests.analyses.test_coverage import TIMES, described
-from tests.pictures import colours
-from tests.views.plotting.support import ys
+from tests.pictures import CRITICAL, OUTPUT, colours
+from tests.views.plotting.support import xs, ys
 
 NEVER = "#f2b8b0"
 U = InputRecord(name="u", low=0.0, high=10.0)
@@ -33,3 +42,36 @@ def test_red_is_what_was_never_tried() -> None:
     found = [coverage_of(described(halves), [(c, None) for c in cs]) for cs in ([one], [one, both])]
     pictures = [png(plot_coverage(each), dpi=50) for each in found]
     assert [NEVER in colours(picture) for picture in pictures] == [True, False]
+
+
+def test_two_coordinates_are_a_map_whose_boundary_lies_where_the_violation_ends() -> None:
+    # x(10) is u, nearly: it violates where u is above 0.5.
+    lag = lag_problem("G[10,10] (x <= 0.5)", free=Freedom(5, 0.1), parameters=[START])
+    start = evaluate(lag, Candidate({"u": Signal((0.0,), (0.54,), "constant")}, {"x0": 0.0}))
+    found = robustness_map(lag, start, samples=32, points=5)
+    figure = plot_robustness_map(found, "LAG")
+    sizes, surface = figure.axes[:2]
+    assert figure.get_suptitle() == "LAG: robustness around the counterexample"
+    assert (surface.get_xlabel(), surface.get_ylabel()) == ("u [V]", "x0")
+    drawn = {line.get_label(): ys(line) for line in sizes.get_lines()}
+    assert (drawn["violated"] < 0).all() and (drawn["satisfied"] >= 0).all()
+    assert len(drawn["violated"]) + len(drawn["satisfied"]) == 32
+    assert drawn["counterexample"].tolist() == [start.robustness]
+    (boundary,) = [c for c in surface.collections if type(c).__name__ == "QuadContourSet"]
+    across = np.concatenate([path.vertices for path in boundary.get_paths()])
+    assert across[:, 0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_single_coordinate_is_a_line_through_the_counterexample(tmp_path: Path) -> None:
+    lag = lag_problem(points=1)
+    start = evaluate(lag, lag.space.decode([1.0]))
+    figure = plot_robustness_map(robustness_map(lag, start, samples=8, points=5))
+    assert figure.get_suptitle() == "robustness around the counterexample"
+    line, counterexample, _ = figure.axes[1].get_lines()
+    assert figure.axes[1].get_xlabel() == "u [V]"
+    # Down to 0.9, 5 % of the range of 2: there it does not violate any more.
+    assert xs(line)[[0, -1]] == pytest.approx([0.9, 1.0])
+    assert np.sign(ys(line)[[0, -1]]).tolist() == [1.0, -1.0]
+    assert (xs(counterexample).tolist(), ys(counterexample).tolist()) == ([1.0], [start.robustness])
+    save_figure(figure, tmp_path / "map.png")
+    assert {OUTPUT, CRITICAL} <= colours(tmp_path / "map.png")
