@@ -22,8 +22,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from falsifier import Result, falsify
 from falsifier.context.gather import gather
 from falsifier.engines.preview import preview
-from falsifier.llm.scripted import ScriptedChat
-from falsifier.llm.tokens import count_tokens
+from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.usage import count_tokens
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from tests.fixtures import limp_home, simulink

@@ -24,7 +24,7 @@ from falsifier.llm.prompts.courses import column_decimals
 from falsifier.llm.prompts.numbers import plain
 from falsifier.llm.prompts.observations import course_line, drawn_course
 from falsifier.llm.prompts.shapes import Course, Points
-from falsifier.llm.tokens import count_tokens
+from falsifier.llm.usage import count_tokens
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 

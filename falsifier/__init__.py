@@ -82,8 +82,7 @@ if TYPE_CHECKING:
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
-    from falsifier.llm.replay import RecordedChat
-    from falsifier.llm.scripted import ScriptedChat
+    from falsifier.llm.replay import RecordedChat, ScriptedChat
     from falsifier.problem.loading import load_problem, load_problems
     from falsifier.problem.problem import Problem
     from falsifier.problem.requirement import Requirement
@@ -148,7 +147,7 @@ _EXPORTS = {
     "Requirement": "falsifier.problem.requirement",
     "Result": "falsifier.search.result",
     "RobustnessMap": "falsifier.counterexamples.robustness_map",
-    "ScriptedChat": "falsifier.llm.scripted",
+    "ScriptedChat": "falsifier.llm.replay",
     "SearchSpace": "falsifier.core.space",
     "Searched": "falsifier.analyses.assess",
     "Shrunk": "falsifier.counterexamples.shrink",

@@ -95,9 +95,9 @@ def forker() -> Forker:
 
 def serve(descriptor: int) -> None:
     """Fork for each request; the copies run it and end."""
-    from falsifier.llm.tokens import count_tokens
+    from falsifier.llm.usage import count_tokens
 
-    importlib.import_module("falsifier.llm.litellm_import").load_litellm()
+    importlib.import_module("falsifier.llm.litellm_adapter").load_litellm()
     large = [importlib.import_module(name) for name in _LARGE]
     parts = [m.name for package in large for m in walk_packages(package.__path__, f"{package.__name__}.")]
     for name in (*_SLOW, *parts):

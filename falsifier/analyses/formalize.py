@@ -9,15 +9,15 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, simulate
 from falsifier.llm.conversation import MAX_REASKS, NoValidReplyError, RejectedReplyError, converse
-from falsifier.llm.messages import Chat, ChatRequest, Exchange
-from falsifier.llm.prompts.formalizing import formalizing_messages
-from falsifier.llm.readings import (
+from falsifier.llm.formalizing import (
     ExampleSignal,
     ReadingReply,
     example_trajectory,
+    formalizing_messages,
     read_readings,
     readings_schema,
 )
+from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement

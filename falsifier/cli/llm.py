@@ -183,7 +183,7 @@ def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
 
 def _size(messages: Sequence["Message"]) -> str:
     """Tokens, and how many of them a provider can keep from question to question."""
-    from falsifier.llm.tokens import count_tokens
+    from falsifier.llm.usage import count_tokens
 
     constant, changing = (sum(count_tokens(m.content) for m in part) for part in (messages[:1], messages[1:]))
     total = constant + changing

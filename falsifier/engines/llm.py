@@ -31,8 +31,7 @@ from falsifier.llm.prompts import (
     trimmed,
 )
 from falsifier.llm.prompts.circumstances import Circumstances
-from falsifier.llm.prompts.what_if import predicted
-from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
+from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf, predicted
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 

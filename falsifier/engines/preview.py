@@ -10,8 +10,7 @@ from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Message, ReplyKind, Tool
 from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, View, build_prompt, render, trimmed, variant_named
 from falsifier.llm.prompts.circumstances import Circumstances
-from falsifier.llm.prompts.what_if import what_if_tool
-from falsifier.llm.tools import MOST_CANDIDATES
+from falsifier.llm.tools import MOST_CANDIDATES, what_if_tool
 from falsifier.problem.problem import Problem
 
 

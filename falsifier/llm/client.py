@@ -8,13 +8,20 @@ from typing import Any
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.errors import ChatError
 from falsifier.llm.failures import UnreadableReplyError, classify
-from falsifier.llm.incoming import cleaned
-from falsifier.llm.litellm_import import dropped_parameters, listed_price, load_litellm
-from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, Usage
+from falsifier.llm.litellm_adapter import (
+    calls_in,
+    dropped_parameters,
+    echo_of,
+    listed_price,
+    load_litellm,
+    sent_message,
+    sent_tool,
+    storable,
+)
+from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, Usage, cleaned
 from falsifier.llm.providers import find_key, known
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
-from falsifier.llm.wire import calls_in, echo_of, sent_message, sent_tool, storable
 
 # In s; reasoning models may think for minutes.
 DEFAULT_TIMEOUT = 600.0

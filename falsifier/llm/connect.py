@@ -9,7 +9,7 @@ from falsifier.errors import ChatSetupError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.ladder import LadderChat
-from falsifier.llm.litellm_import import check_name, check_options, listed_price
+from falsifier.llm.litellm_adapter import check_name, check_options, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode, key_variable

@@ -7,8 +7,17 @@ from falsifier.core.printable import printable
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError
 from falsifier.llm.failures import ContextExceededError
-from falsifier.llm.incoming import LONGEST_REPLY, cleaned
-from falsifier.llm.messages import UNREADABLE, Chat, ChatReply, ChatRequest, Exchange, Message, ToolCall
+from falsifier.llm.messages import (
+    LONGEST_REPLY,
+    UNREADABLE,
+    Chat,
+    ChatReply,
+    ChatRequest,
+    Exchange,
+    Message,
+    ToolCall,
+    cleaned,
+)
 
 T = TypeVar("T")
 OnExchange = Callable[[Exchange], None]

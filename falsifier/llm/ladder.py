@@ -7,7 +7,7 @@ from typing import Any
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, ToolsUnsupportedError
-from falsifier.llm.litellm_import import may_take_tools
+from falsifier.llm.litellm_adapter import may_take_tools
 from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, below
 
 # Replies in a row that the server could not parse, before they are asked for in a plainer way: one is the

@@ -1,10 +1,14 @@
 """What is sent to and received from a language model: frozen values, written to the journal unchanged."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Mapping
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
+
+from falsifier.core.printable import printable
+from falsifier.core.secrets import redact_held
 
 Role = Literal["system", "user", "assistant", "tool"]
 Source = Literal["llm", "script", "recording", "cache"]
@@ -15,6 +19,10 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 UNREADABLE = "unreadable"
 # What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
 ReplyKind = Literal["json", "points"]
+# Some 250,000 tokens, more than any LLM writes in one reply. What is longer is cut, and rejected when read.
+LONGEST_REPLY = 1_000_000
+# Each call is answered with a message; no LLM makes more than a few at a time.
+_MOST_CALLS = 100
 Effort = Literal["none", "minimal", "low", "medium", "high"]
 
 
@@ -190,6 +198,41 @@ class Exchange(_Value):
     def seconds(self) -> float:
         """Wall-clock seconds until the reply arrived."""
         return 0.0 if self.reply is None else self.reply.seconds
+
+
+def cleaned(reply: ChatReply, secrets: Iterable[str] = ()) -> ChatReply:
+    """Return a reply without secrets and without what a terminal would act on, and not longer than the limit.
+
+    Args:
+        reply: as it came.
+        secrets: secrets in addition to those in the environment: an LLM or a server may repeat what it was
+            sent.
+    """
+    secrets = tuple(secrets)
+
+    def text(sent: str) -> str:
+        return redact_held(printable(sent[:LONGEST_REPLY]), secrets)
+
+    def echo(sent: dict[str, Any]) -> dict[str, Any]:
+        # Sent back to the provider as it is, and never shown.
+        plain = json.dumps(sent, default=str) if sent else ""
+        clean = redact_held(plain, secrets)
+        return sent if clean == plain else dict(json.loads(clean))
+
+    def call(sent: ToolCall) -> ToolCall:
+        return ToolCall(
+            id=text(sent.id), name=text(sent.name), arguments=text(sent.arguments), echo=echo(sent.echo)
+        )
+
+    return reply.model_copy(
+        update={
+            "text": text(reply.text),
+            "reasoning": text(reply.reasoning),
+            "finish_reason": text(reply.finish_reason),
+            "tool_calls": tuple(map(call, reply.tool_calls[:_MOST_CALLS])),
+            "echo": echo(reply.echo),
+        }
+    )
 
 
 class Chat(Protocol):

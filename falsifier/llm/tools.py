@@ -2,17 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import Tool, ToolCall
+from falsifier.llm.prompts.numbers import number
 from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.what_if import NAME, answer, predicted, what_if_tool
 from falsifier.llm.replies import ReplyForm
 from falsifier.stl import Verdict
+from falsifier.stl.margins import signed
 
+NAME = "predict"
 # Maximum number of candidates predicted per call; a longer answer would cost tokens for little benefit.
 MOST_CANDIDATES = 10
 
@@ -89,7 +91,7 @@ class PredictionTool:
         if len(found) > MOST_CANDIDATES:
             lines.append(f"and {len(found) - MOST_CANDIDATES} more: not predicted; send fewer per call")
         left = self.what_if.calls - self.answered
-        return answer(lines, error=self.what_if.predictor.recent_error, left=left)
+        return _answer(lines, error=self.what_if.predictor.recent_error, left=left)
 
     def _lines(self, found: Sequence[Candidate | RejectedReplyError]) -> list[str]:
         valid = [self.reveal(one) for one in found if isinstance(one, Candidate)]
@@ -100,3 +102,51 @@ class PredictionTool:
             else f"not predicted: {one}"
             for one in found
         ]
+
+
+def what_if_tool(parameters: dict[str, Any], *, calls: int) -> Tool:
+    """Describe the tool to the LLM.
+
+    Args:
+        parameters: JSON Schema of the arguments: a reply's candidates, without rationale.
+        calls: maximum number of calls that are answered.
+    """
+    return Tool(
+        name=NAME,
+        description=(
+            "Predicts the robustness of candidates, using dynamics fitted to the samples so far. Nothing is "
+            "simulated, so a prediction is free and a sample is not; but predictions can be wrong, and the "
+            "answer states the size of the recent errors. Use it before you reply: compare different "
+            "structures first, then refine the most promising one. Candidates have the form of the reply, "
+            f"without rationale. At most {counted(calls, 'call')} per turn can be answered."
+        ),
+        parameters=parameters,
+    )
+
+
+def predicted(variant: Variant, verdict: Verdict) -> str:
+    """The prediction for one candidate, limited to what the variant shows of samples."""
+    parts = [f"predicted robustness {signed(verdict.robustness, 3)}"]
+    if variant.has("critical"):
+        by = f" by {verdict.predicate}" if variant.has("requirement") and verdict.predicate else ""
+        parts.append(f"decided at about t = {number(verdict.critical_time, 4)} s{by}")
+    return ", ".join(parts)
+
+
+def _answer(lines: Sequence[str], *, error: float, left: int) -> str:
+    """Answer one call.
+
+    Args:
+        lines: one line per candidate.
+        error: error of recent predictions as a share of the spread of the predicted signals.
+        left: number of calls that remain.
+    """
+    more = f"{counted(left, 'more call')} can be answered" if left else "This was the last call"
+    return "\n".join(
+        (
+            *(f"Candidate {i}: {line}" for i, line in enumerate(lines, start=1)),
+            f"Root mean square error of recent predictions: {100 * error:.2g} % of the signals' usual "
+            "spread.",
+            f"{more}; then reply with your candidates.",
+        )
+    )

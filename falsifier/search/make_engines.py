@@ -160,7 +160,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
 
 def price_of(llm: LLMSettings) -> "Price | None":
     """Return what a language model costs: as stated, otherwise as listed; None if unknown."""
-    from falsifier.llm.litellm_import import listed_price
+    from falsifier.llm.litellm_adapter import listed_price
     from falsifier.llm.model_file import is_model_file
     from falsifier.llm.usage import Price
 

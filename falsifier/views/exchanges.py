@@ -11,7 +11,7 @@ from pathlib import Path
 
 from falsifier.core.words import counted, in_one_line
 from falsifier.llm.messages import Exchange, Message
-from falsifier.llm.tokens import count_tokens
+from falsifier.llm.usage import count_tokens
 from falsifier.record.journal import read_journal
 from falsifier.record.questions import Iteration, Sample, iterations
 from falsifier.views.html import Html, el, join

@@ -294,7 +294,7 @@ def test_an_empty_sentence_is_not_sent(server: Server, target: str) -> None:
 
 
 def test_readings_are_judged_on_a_nominal_simulation(target: str) -> None:
-    from falsifier.llm.scripted import ScriptedChat
+    from falsifier.llm.replay import ScriptedChat
 
     good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
     found = formalize(target, "It is slow.", ScriptedChat([json.dumps({"readings": [good]})]))

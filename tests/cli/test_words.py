@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from falsifier.cli import cli
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.spec import read_spec
 from tests.analyses.test_lint import SPEC

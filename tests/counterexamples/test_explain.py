@@ -7,7 +7,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.explain import explain, narrate
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.testing import Array, lag_problem
 from tests.problems import broken, conditional
 

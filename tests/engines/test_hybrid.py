@@ -21,7 +21,7 @@ from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run

@@ -22,9 +22,8 @@ from falsifier.llm.conversation import NoValidReplyError
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
-from falsifier.llm.replay import RecordedChat
+from falsifier.llm.replay import RecordedChat, ScriptedChat
 from falsifier.llm.retry import Gate, RetryingChat
-from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run, read_journal

@@ -3,7 +3,7 @@
 from falsifier.engines.llm import make_llm_engine
 from falsifier.engines.preview import preview
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.testing import lag_problem
 
 

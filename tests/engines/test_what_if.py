@@ -16,7 +16,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.record.journal import holds_run, read_journal
 from falsifier.record.records import ExchangeRecord
 from falsifier.record.run import falsify, resume

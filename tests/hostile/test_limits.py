@@ -17,8 +17,7 @@ from falsifier.errors import SpecError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError, classify
 from falsifier.llm.messages import ChatRequest, Message
-from falsifier.llm.tokens import count_tokens
-from falsifier.llm.usage import Price, usage_of
+from falsifier.llm.usage import Price, count_tokens, usage_of
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings

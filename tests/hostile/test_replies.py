@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
-from falsifier.llm.incoming import LONGEST_REPLY
-from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.messages import LONGEST_REPLY, ChatReply, ChatRequest, Exchange, Message
+from falsifier.llm.replay import ScriptedChat
 from falsifier.llm.replies import ReplyForm
-from falsifier.llm.scripted import ScriptedChat
 
 FREE = Freedom(max_control_points=50, min_interval=0.1)
 SPACE = SearchSpace(

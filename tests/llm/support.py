@@ -4,7 +4,7 @@ import json
 
 from falsifier.llm.conversation import RejectedReplyError, converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, Tool, ToolCall
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 
 ADD = Tool(
     name="add",

@@ -6,7 +6,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Tool, ToolCall, Usage
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=5, cost=0.01), seconds=3.0)

@@ -15,8 +15,7 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
 from falsifier.llm.messages import ChatRequest, Message
 from falsifier.llm.providers import first_mode
-from falsifier.llm.tokens import count_tokens
-from falsifier.llm.usage import Price
+from falsifier.llm.usage import Price, count_tokens
 from tests.llm.server import Received, Server, Step, serving
 
 SCHEMA = {

@@ -6,7 +6,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.failures import ContextExceededError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, ToolCall
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from tests.llm.support import ADD, ask_with_tools, calling, wrong
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="a number, please"),))

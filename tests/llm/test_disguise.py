@@ -22,7 +22,7 @@ from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
 from falsifier.llm.prompts.observations import monitor_for
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.stl import parse

@@ -1,7 +1,6 @@
 import pytest
 
-from falsifier.llm.incoming import LONGEST_REPLY, cleaned
-from falsifier.llm.messages import ChatReply, ToolCall
+from falsifier.llm.messages import LONGEST_REPLY, ChatReply, ToolCall, cleaned
 
 KEY = "an-ordinary-looking-key"
 

@@ -1,7 +1,7 @@
 import pytest
 
 from falsifier.errors import ChatSetupError
-from falsifier.llm.litellm_import import check_name, listed_price, may_take_tools
+from falsifier.llm.litellm_adapter import check_name, listed_price, may_take_tools
 
 
 @pytest.mark.parametrize("llm", ["openai", "openai/", "openai//", "ollama_chat/ "])

@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.llm.readings import ExampleSignal, example_trajectory, read_readings, readings_schema
+from falsifier.llm.formalizing import ExampleSignal, example_trajectory, read_readings, readings_schema
 
 TIMES = np.linspace(0.0, 2.0, 5)
 

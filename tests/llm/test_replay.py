@@ -2,8 +2,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import RecordedChat
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import RecordedChat, ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 

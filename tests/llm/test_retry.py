@@ -10,8 +10,8 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.replay import ScriptedChat
 from falsifier.llm.retry import Gate, RetryingChat
-from falsifier.llm.scripted import ScriptedChat
 from tests.llm.server import Step, serving
 from tests.llm.test_client import REQUEST
 

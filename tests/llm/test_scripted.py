@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 

@@ -4,8 +4,7 @@ from typing import Any
 import pytest
 
 from falsifier.llm.messages import ChatRequest, Message, Usage
-from falsifier.llm.tokens import count_tokens
-from falsifier.llm.usage import Price, usage_of
+from falsifier.llm.usage import Price, count_tokens, usage_of
 from tests.llm.support import QUESTION
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="x" * 400),))

@@ -4,8 +4,8 @@ import pytest
 
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import converse
+from falsifier.llm.litellm_adapter import sent_message
 from falsifier.llm.messages import Message, ToolCall
-from falsifier.llm.wire import sent_message
 from tests.llm.server import Step, serving
 from tests.llm.support import ADD, QUESTION, SCHEMA, add
 

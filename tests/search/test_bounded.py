@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.search.bounded import BoundedChat
 from falsifier.search.budget import Budget, LimitReached, Spent
 

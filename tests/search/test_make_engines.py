@@ -10,7 +10,7 @@ from falsifier.context.values import Context, Level, Named
 from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError, SpecError
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import check_names, make_engines, make_scouts, told_problems
 from falsifier.search.request import LLMSettings, RunRequest

@@ -1,5 +1,5 @@
 from falsifier.engines.uniform import Uniform
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.search.moves import Ask
 from falsifier.search.steps import Live
 from falsifier.testing import lag_problem

@@ -1,7 +1,7 @@
 import json
 
 from falsifier.analyses.formalize import formalize
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.template_advice import Advice
 from falsifier.views.readings_text import advice_text, formalized_json, formalized_text
 

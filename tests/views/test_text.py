@@ -7,7 +7,7 @@ import pytest
 from falsifier.engines import make_engine
 from falsifier.engines.llm import make_llm_engine
 from falsifier.errors import ChatError
-from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.replay import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from falsifier.errors import ChatError
 from falsifier.llm.prompts.blocks import Prompt, SampleLines
 from falsifier.llm.prompts.render import render
-from falsifier.llm.tokens import count_tokens
+from falsifier.llm.usage import count_tokens
 
 # Fits LLMs with a context of 32k tokens and leaves room for reasoning.
 DEFAULT_PROMPT_TOKENS = 16_000

@@ -1,5 +1,5 @@
 from falsifier.core.model import Experiment, ModelInfo, Variable
-from falsifier.llm.prompts.formalizing import formalizing_messages
+from falsifier.llm.formalizing import formalizing_messages
 from falsifier.problem.templates import TEMPLATES
 
 INFO = ModelInfo(

@@ -1,7 +1,7 @@
 import pytest
 
 from falsifier.llm.prompts.variants import VARIANTS
-from falsifier.llm.prompts.what_if import NAME, answer, predicted, what_if_tool
+from falsifier.llm.tools import NAME, answer, predicted, what_if_tool
 from falsifier.stl import Verdict
 
 VERDICT = Verdict(-0.123456, 12.3456, "x <= 0.9")
