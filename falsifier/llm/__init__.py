@@ -1,14 +1,8 @@
 """Language models: typed prompts, typed replies and one interface to every provider.
 
-A chat is any object with ``complete(request) -> reply``. ``connect`` builds one from an LLM's name by nesting
-small wrappers, each with a single concern::
-
-    CachedChat      answers repeated requests from disk               cache
-    RecordedChat    plays back a journal's replies, then asks         replay
-    RetryingChat    retries temporary failures                        retry
-    LadderChat      asks for JSON in the strictest accepted way       ladder
-    LiteLLMChat     sends one request: one reply or one clear error   client
-
+A chat is any object with ``complete(request) -> reply``. ``connect`` makes one from an LLM's name: a
+``LiteLLMChat``, which asks one server, and ``CachedChat`` around it, which answers repeated requests from
+disk. A run wraps it in ``RecordedChat``, which plays back a journal's replies first.
 ``ScriptedChat`` follows a script instead. ``converse`` repeats a question until the reply is valid.
 ``prompts`` builds what an LLM is sent, ``replies`` reads what it returns. Nothing in this package depends on
 the engines or the search.

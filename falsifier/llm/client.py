@@ -1,4 +1,4 @@
-"""One request to an LLM through litellm: sent once, then either a reply or one of our own errors."""
+"""An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,31 +7,47 @@ from typing import Any
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.errors import ChatError
-from falsifier.llm.failures import UnreadableReplyError, classify
+from falsifier.llm.failures import (
+    FormatUnsupportedError,
+    ToolsUnsupportedError,
+    UnreadableReplyError,
+    classify,
+)
 from falsifier.llm.litellm_adapter import (
     calls_in,
     dropped_parameters,
     echo_of,
     listed_price,
     load_litellm,
+    may_take_tools,
     sent_message,
     sent_tool,
     storable,
 )
-from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, Usage, cleaned
+from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, Usage, below, cleaned
 from falsifier.llm.providers import find_key, known
+from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, Gate, retried
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
 
 # In s; reasoning models may think for minutes.
 DEFAULT_TIMEOUT = 600.0
+# Replies in a row that the server could not parse, before they are asked for in a plainer way: one is the
+# LLM's mistake, several are the server's.
+_MOST_UNREADABLE = 2
 # In s; the longest that a socket can wait is 2**31 ms.
 _LONGEST_TIMEOUT = 2e6
 
 
-@dataclass(frozen=True)
+@dataclass
 class LiteLLMChat:
     """An LLM of any provider that litellm supports.
+
+    It is asked by JSON Schema, else for any JSON object, else in words only; what worked is remembered. The
+    next way is tried if the server rejects one, or repeatedly cannot parse what it makes the LLM write.
+    Requests that offer tools have ways of their own: some servers accept a schema and accept tools but reject
+    the two together. Below the last way, or if the server rejects tools altogether, they are sent without
+    tools.
 
     Attributes:
         llm: litellm's name, e.g. ``openai/gpt-5-mini``.
@@ -40,9 +56,12 @@ class LiteLLMChat:
         options: further parameters of litellm's ``completion``, passed unchanged.
         timeout: seconds to wait for a complete reply.
         price: price stated by the user; None: litellm's table.
-        mode: how to ask for a reply that follows a schema.
+        mode: how the next reply that follows a schema is asked for, if no tools are offered.
         content: what the server serves, if it was started for a model file; records then say this instead
             of the server's address, which is another one each time.
+        gate: shared between all runs that use the same account.
+        attempts: maximum number of requests per reply if failures are temporary.
+        first_delay: seconds before the second of them.
     """
 
     llm: str
@@ -53,6 +72,15 @@ class LiteLLMChat:
     price: Price | None = None
     mode: Mode = MODES[0]
     content: str = ""
+    gate: Gate = field(default_factory=Gate)
+    attempts: int = DEFAULT_ATTEMPTS
+    first_delay: float = FIRST_DELAY
+    _mode_with_tools: Mode = field(init=False)
+    _takes_tools: bool | None = field(init=False, default=None)
+    _unreadable: int = field(init=False, default=0)
+
+    def __post_init__(self) -> None:
+        self._mode_with_tools = self.mode
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -66,7 +94,77 @@ class LiteLLMChat:
         return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
     def complete(self, request: ChatRequest) -> ChatReply:
+        """Ask in the strictest way that the server accepts, and again after temporary failures.
+
+        Raises:
+            ChatError: if no reply can be obtained.
+        """
+        return retried(
+            lambda: self._asked(request),
+            self.gate,
+            attempts=self.attempts,
+            first_delay=self.first_delay,
+            seconds_left=lambda: request.seconds_left,
+        )
+
+    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
+        """Do nothing; storing replies is CachedChat's concern."""
+
+    def _asked(self, request: ChatRequest) -> ChatReply:
+        if request.tools and not self._may_offer_tools():
+            request = _without_tools(request)
+        while True:
+            mode = max(self.mode, self._mode_with_tools, key=MODES.index) if request.tools else self.mode
+            try:
+                return self._noted(request, mode, self.send(request, mode))
+            except FormatUnsupportedError:
+                plainer = below(mode) if request.reply_schema is not None else None
+                if plainer is None and not request.tools:
+                    raise
+                if plainer is None:
+                    request = self._refused_with_tools(request)
+                else:
+                    self._descend(request, plainer)
+            except ToolsUnsupportedError:
+                request = self._refused_with_tools(request)
+
+    def _noted(self, request: ChatRequest, mode: Mode, reply: ChatReply) -> ChatReply:
+        """Return a reply; after several that the server could not parse, ask in a plainer way from now on."""
+        self._unreadable = self._unreadable + 1 if reply.finish_reason == UNREADABLE else 0
+        plainer = below(mode) if request.reply_schema is not None else None
+        if self._unreadable >= _MOST_UNREADABLE and plainer is not None:
+            self._unreadable = 0
+            self._descend(request, plainer)
+        return reply
+
+    def _descend(self, request: ChatRequest, plainer: Mode) -> None:
+        if request.tools:
+            self._mode_with_tools = plainer
+        else:
+            self.mode = plainer
+
+    def _may_offer_tools(self) -> bool:
+        if self._takes_tools is None:
+            self._takes_tools = may_take_tools(self.llm, api_base=self.api_base)
+        return self._takes_tools
+
+    def _refused_with_tools(self, request: ChatRequest) -> ChatRequest:
+        """Remember that the server rejects tools; return the request without them."""
+        if any(message.role == "tool" for message in request.messages):
+            # The conversation contains tool calls already, which cannot be sent without the tools.
+            raise ChatError(
+                f"{self.llm}: the server first accepted a tool, then rejected it in the same turn; "
+                "use --engine llm, which offers no tools"
+            )
+        self._takes_tools = False
+        return _without_tools(request)
+
+    def send(self, request: ChatRequest, mode: Mode | None = None) -> ChatReply:
         """Send one request.
+
+        Args:
+            request: what is sent.
+            mode: how to ask for a reply that follows a schema; None: as the next one is asked for.
 
         Returns:
             The reply; one without text, and with the finish reason ``UNREADABLE``, if the server could not
@@ -78,10 +176,11 @@ class LiteLLMChat:
             ToolsUnsupportedError: if the server rejects the tools that are offered.
             ChatError: for any other failure; it names the LLM and the key's variable.
         """
+        mode = mode or self.mode
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
         litellm = load_litellm()
-        arguments = self._arguments(request)
+        arguments = self._arguments(request, mode)
         left = request.seconds_left
         if left is not None and left <= 0:  # the import above may have taken it
             raise ChatError(f"{self.llm}: nothing was sent: the time limit ended while the client was loaded")
@@ -123,9 +222,6 @@ class LiteLLMChat:
                 failure.lost = self._lost(request, timed_out=1)
             raise failure from None
 
-    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Do nothing; storing replies is CachedChat's concern."""
-
     def _lost(self, request: ChatRequest, *, timed_out: int) -> Usage:
         price = self.price or listed_price(self.llm, api_base=self.api_base)
         return lost_usage(request, llm=self.llm, price=price, timed_out=timed_out)
@@ -133,7 +229,7 @@ class LiteLLMChat:
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}
 
-    def _arguments(self, request: ChatRequest) -> dict[str, Any]:
+    def _arguments(self, request: ChatRequest, mode: Mode) -> dict[str, Any]:
         provider = known(self.llm)
         arguments = self._options()
         if provider.openai_client:
@@ -142,12 +238,12 @@ class LiteLLMChat:
             arguments["reasoning_effort"] = self.effort
             if provider.effort == "allowed":
                 arguments["allowed_openai_params"] = ["reasoning_effort"]
-        if request.reply_schema is not None and self.mode == "json_schema":
+        if request.reply_schema is not None and mode == "json_schema":
             arguments["response_format"] = {
                 "type": "json_schema",
                 "json_schema": {"name": "reply", "strict": True, "schema": request.reply_schema},
             }
-        elif request.reply_schema is not None and self.mode == "json_object":
+        elif request.reply_schema is not None and mode == "json_object":
             arguments["response_format"] = {"type": "json_object"}
         if request.tools:
             arguments["tools"] = [sent_tool(tool) for tool in request.tools]
@@ -204,6 +300,10 @@ class LiteLLMChat:
         if "max_tokens" in effective:
             effective["max_tokens"] = arguments["max_tokens"]
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
+
+
+def _without_tools(request: ChatRequest) -> ChatRequest:
+    return request.model_copy(update={"tools": ()})
 
 
 def _refusal(message: Any) -> str:

@@ -8,12 +8,11 @@ from typing import Any
 from falsifier.errors import ChatSetupError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
-from falsifier.llm.ladder import LadderChat
 from falsifier.llm.litellm_adapter import check_name, check_options, listed_price
 from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode, key_variable
-from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate, RetryingChat
+from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate
 from falsifier.llm.usage import Price
 
 _HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word ready."),))
@@ -71,7 +70,7 @@ def connect(
     own = served(llm) if is_model_file(llm) else None
     if own is not None:
         llm, api_base, price = own.name, own.address, price or Price(0.0, 0.0)
-    client = LiteLLMChat(
+    chat: Chat = LiteLLMChat(
         llm=llm,
         effort=effort,
         api_base=api_base,
@@ -80,8 +79,9 @@ def connect(
         price=price,
         mode=mode or first_mode(llm),
         content="" if own is None else own.content,
+        gate=gate or Gate(),
+        attempts=attempts,
     )
-    chat: Chat = RetryingChat(LadderChat(client), gate or Gate(), attempts=attempts)
     return chat if cache is None else CachedChat(chat, cache)
 
 

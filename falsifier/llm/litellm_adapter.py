@@ -12,6 +12,7 @@ from typing import Any
 from falsifier.errors import ChatError, ChatSetupError, did_you_mean
 from falsifier.llm.messages import Message, Tool, ToolCall
 from falsifier.llm.providers import PROVIDERS, known, provider_of
+from falsifier.llm.transport import guarded_client
 from falsifier.llm.usage import Price
 
 # What litellm would do on import or first use, and the variables that prevent it.
@@ -46,7 +47,19 @@ def load_litellm() -> Any:
     # nothing about the first, and is told of the second.
     for text in (".*`ReadOnly` qualifier", "Pydantic serializer warnings"):
         warnings.filterwarnings("ignore", message=text, category=UserWarning)
+    _guard(litellm)
     return litellm
+
+
+def _guard(litellm: Any) -> None:
+    """Let litellm make its HTTP clients so that requests can be limited and cut.
+
+    It takes a client for OpenAI's library only; its own handler makes one where it is first used.
+    """
+    from litellm.llms.custom_httpx.http_handler import HTTPHandler, get_ssl_configuration
+
+    litellm.client_session = guarded_client(verify=get_ssl_configuration())
+    HTTPHandler.create_client = lambda self: guarded_client(verify=get_ssl_configuration(self.ssl_verify))
 
 
 def check_name(llm: str) -> None:

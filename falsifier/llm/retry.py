@@ -4,20 +4,21 @@ import logging
 import random
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Any
 
 from falsifier.core.words import counted
 from falsifier.errors import ChatError
 from falsifier.llm.failures import TransientChatError
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
+from falsifier.llm.messages import ChatReply, Usage
 
 _LOG = logging.getLogger(__name__)
 
 # With doubling delays the last request is sent about a minute after the first: enough for a server restart.
 DEFAULT_ATTEMPTS = 7
+FIRST_DELAY = 1.0
+# If the server asks for a longer wait, the request fails; in s.
+_LONGEST_DELAY = 120.0
 
 
 class Gate:
@@ -69,74 +70,63 @@ class Gate:
             return self._open_at - time.monotonic()
 
 
-@dataclass(frozen=True)
-class RetryingChat:
-    """Retries after rate limits, timeouts, lost connections and server errors.
+def retried(
+    ask: Callable[[], ChatReply],
+    gate: Gate,
+    *,
+    attempts: int = DEFAULT_ATTEMPTS,
+    first_delay: float = FIRST_DELAY,
+    seconds_left: Callable[[], float | None] = lambda: None,
+) -> ChatReply:
+    """Ask, and ask again after rate limits, timeouts, lost connections and server errors.
 
-    Attributes:
-        inner: chat to ask.
+    Args:
+        ask: sends the question.
         gate: shared between all runs that use the same account.
-        attempts: maximum number of requests per reply.
+        attempts: maximum number of requests.
         first_delay: seconds before the second request; each further delay is twice as long, with jitter.
-        longest_delay: maximum number of seconds between two requests; if the server asks for more, the
-            request fails.
+        seconds_left: seconds until the answer is of no use any more; None: it always is.
+
+    Raises:
+        ChatError: if the last attempt failed, there is no time for another one, or for a failure that waiting
+            does not cure. Its ``lost`` says what was paid for nothing.
     """
-
-    inner: Chat
-    gate: Gate = field(default_factory=Gate)
-    attempts: int = DEFAULT_ATTEMPTS
-    first_delay: float = 1.0
-    longest_delay: float = 120.0
-
-    @property
-    def llm(self) -> str:
-        return self.inner.llm
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        return self.inner.parameters
-
-    def complete(self, request: ChatRequest) -> ChatReply:
-        """Ask, and ask again after temporary failures.
-
-        Raises:
-            ChatError: if the last attempt failed, there is no time for another one, or for a failure that
-                waiting does not cure.
-        """
-        lost: list[Usage] = []
-        try:
-            reply = self._complete(request, lost)
-        except ChatError as error:
-            error.lost = sum(lost[1:], lost[0]) if lost else error.lost
-            raise
-        return reply.model_copy(update={"usage": sum(lost, reply.usage)}) if lost else reply
-
-    def _complete(self, request: ChatRequest, lost: list[Usage]) -> ChatReply:
-        for attempt in range(1, self.attempts + 1):
+    lost: list[Usage] = []
+    try:
+        for attempt in range(1, attempts + 1):
             try:
-                with self.gate.passage(request.seconds_left):
-                    reply = self.inner.complete(request)
-                return reply.model_copy(update={"attempts": attempt})
+                with gate.passage(seconds_left()):
+                    reply = ask()
             except TransientChatError as error:
                 lost += [error.lost] if error.lost else []
-                asked = error.retry_after
-                if asked is not None and asked > self.longest_delay:
-                    raise ChatError(
-                        f"the server asks to wait {asked:g} s; try again later. {error}"
-                    ) from None
-                limit = min(self.attempts, error.patience or self.attempts)
+                limit = min(attempts, error.patience or attempts)
                 if attempt >= limit:
                     raise ChatError(
                         f"{counted(attempt, 'attempt')} failed, the last one so: {error}"
                     ) from None
-                own = self.first_delay * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)
-                delay = min(own, self.longest_delay) if asked is None else asked
-                left = request.seconds_left
+                delay = _delay(error, first_delay * 2 ** (attempt - 1))
+                left = seconds_left()
                 if left is not None and delay >= left:
                     raise ChatError(f"no time is left to ask again. {error}") from None
                 _LOG.warning("%s. Retrying in %.0f s (attempt %d of %d).", error, delay, attempt + 1, limit)
-                (self.gate.pause if error.for_all else self.gate.wait)(delay)
-        raise AssertionError("attempts is at least 1")
+                (gate.pause if error.for_all else gate.wait)(delay)
+            else:
+                return reply.model_copy(update={"attempts": attempt, "usage": sum(lost, reply.usage)})
+    except ChatError as error:
+        error.lost = sum(lost[1:], lost[0]) if lost else error.lost
+        raise
+    raise AssertionError("attempts is at least 1")
 
-    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        self.inner.accepted(request, reply)
+
+def _delay(error: TransientChatError, usual: float) -> float:
+    """Seconds before the next request: as the server asks, else the usual ones with jitter.
+
+    Raises:
+        ChatError: if the server asks for more than is worth waiting for.
+    """
+    if error.retry_after is None:
+        return min(usual * random.uniform(0.75, 1.25), _LONGEST_DELAY)
+    if error.retry_after > _LONGEST_DELAY:
+        wait = f"{error.retry_after:g} s"
+        raise ChatError(f"the server asks to wait {wait}; try again later. {error}") from None
+    return error.retry_after

@@ -4,8 +4,8 @@ A client library's timeout starts again with every byte that arrives, so a serve
 is never too late for it. Here the call runs in a thread of its own, is waited for only so long, and its
 connections are cut when it is given up, in whatever state they are.
 
-litellm makes its HTTP clients in many places. What they share is httpx's transport, whose one method is
-therefore replaced; requests that are not made within ``within`` pass through it unchanged.
+The client library makes its HTTP clients of what ``guarded_client`` returns; requests of those that are not
+made within ``within`` are sent as httpx would.
 """
 
 import atexit
@@ -16,7 +16,8 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar, copy_context
-from functools import cache
+from functools import partial
+from http.cookiejar import CookieJar, DefaultCookiePolicy
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -82,7 +83,6 @@ def within(seconds: float, action: Callable[[], T]) -> T:
         RefusedReplyError: if a server's reply was refused.
         BrokenReplyError: if the action failed because of the connection, or of a reply that is not readable.
     """
-    _guard_transport()
     call = _Call()
     outcome: SimpleQueue[tuple[T | None, BaseException | None]] = SimpleQueue()
 
@@ -157,12 +157,9 @@ class _Call:
             self._connections.clear()
 
     def send(
-        self,
-        handle: Callable[[Any, "httpx.Request"], "httpx.Response"],
-        transport: Any,
-        request: "httpx.Request",
+        self, handle: "Callable[[httpx.Request], httpx.Response]", request: "httpx.Request"
     ) -> "httpx.Response":
-        """Send a request as the transport would, on a connection of its own, and check the response."""
+        """Send a request on a connection of its own, and check the response."""
         import httpx
 
         if self._has_ended:  # litellm looks up prices and the like in threads that outlive the call
@@ -174,7 +171,7 @@ class _Call:
         request.extensions = {**request.extensions, "trace": self._note}
         self.fault = ""
         with self._noting_faults():
-            response = handle(transport, request)
+            response = handle(request)
         self._check(request, response)
         response.stream = self._read(response)
         return response
@@ -309,17 +306,28 @@ def _unreadable(body: bytes) -> str:
 _CALL: ContextVar[_Call | None] = ContextVar("_CALL", default=None)
 
 
-@cache
-def _guard_transport() -> None:
+def guarded_client(*, verify: Any = True) -> "httpx.Client":
+    """Return an HTTP client whose requests are limited within ``within``; it follows no redirect.
+
+    Args:
+        verify: how certificates are checked, as httpx takes it.
+    """
     import httpx
 
-    handle = httpx.HTTPTransport.handle_request
+    # A server's cookies would be sent to it with later requests, of other runs too.
+    none = CookieJar(policy=DefaultCookiePolicy(allowed_domains=()))
+    # It finds the proxies of the environment, which a client with a transport of its own does not look for.
+    plain = httpx.Client(verify=verify, timeout=None, cookies=none)
 
-    def handle_request(self: httpx.HTTPTransport, request: httpx.Request) -> httpx.Response:
-        call = _CALL.get()
-        return handle(self, request) if call is None else call.send(handle, self, request)
+    class Guarded(httpx.BaseTransport):
+        def handle_request(self, request: httpx.Request) -> httpx.Response:
+            call, handle = _CALL.get(), partial(plain.send, stream=True)
+            return handle(request) if call is None else call.send(handle, request)
 
-    httpx.HTTPTransport.handle_request = handle_request  # type: ignore[method-assign]
+        def close(self) -> None:
+            plain.close()
+
+    return httpx.Client(transport=Guarded(), cookies=none)
 
 
 def _too_long() -> str:

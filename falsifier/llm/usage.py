@@ -1,8 +1,8 @@
 """What a request cost, in tokens and in money; an unknown cost is None, never zero.
 
 Tokens are counted without any network; nothing is downloaded. The vocabulary is one that litellm contains.
-LLMs differ mainly in how they split numbers: three digits to a token, or each digit alone. For an unlisted LLM
-the larger count is used, so that limits hold.
+LLMs differ mainly in how they split numbers: three digits to a token, or each digit alone. For an unlisted
+LLM the larger count is used, so that limits hold.
 """
 
 import os

@@ -19,11 +19,9 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
 from falsifier.llm.conversation import NoValidReplyError
-from falsifier.llm.failures import TransientChatError
-from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.llm.replay import RecordedChat, ScriptedChat
-from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.retry import Gate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run, read_journal
@@ -111,8 +109,7 @@ def test_the_road_to_a_valid_reply() -> None:
     )
     exchanges: list[Exchange] = []
     with serving(*script) as server:
-        client = LiteLLMChat("openai/m", api_base=server.url)
-        chat = RetryingChat(LadderChat(client), Gate(), first_delay=0.01)
+        chat = LiteLLMChat("openai/m", api_base=server.url, first_delay=0.01)
         engine = make_llm_engine(problem, chat, variant="MP4", on_exchange=exchanges.append)
         engine.tell([evaluate(problem, *engine.ask())])
         (instead,) = engine.ask()
@@ -365,13 +362,6 @@ def test_token_budget_ends_a_run() -> None:
     assert result.status == "not falsified"
     assert "300 tokens" in result.reason
     assert result.spent.calls == 3
-
-
-def test_transient_failures_reach_the_engine_only_when_patience_ends() -> None:
-    chat = RetryingChat(
-        ScriptedChat([TransientChatError("busy"), reply([0.1] * 4)]), Gate(sleep=lambda _: None)
-    )
-    assert len(make_llm_engine(lag_problem(), chat, variant="MP4").ask()) == 1
 
 
 def test_free_parameterizations_come_from_mp5_only() -> None:

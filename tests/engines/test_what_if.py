@@ -14,7 +14,6 @@ from falsifier.engines.preview import preview_tool
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
 from falsifier.llm.replay import ScriptedChat
 from falsifier.record.journal import holds_run, read_journal
@@ -178,7 +177,7 @@ def test_no_tool_where_no_call_is_allowed() -> None:
 def test_a_server_that_refuses_tools_gets_the_second_round() -> None:
     refusal = Step(status=400, message="this model does not support tools")
     with serving() as server:
-        chat = LadderChat(LiteLLMChat("openai/mine", api_base=server.url))
+        chat = LiteLLMChat("openai/mine", api_base=server.url)
         engine = hybrid(chat)
         judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
         refused: list[Received] = []
@@ -199,7 +198,7 @@ def test_a_server_that_refuses_tools_gets_the_second_round() -> None:
 def test_calls_come_over_the_wire_beside_the_schema() -> None:
     asking = Step(calls=(("predict", json.loads(candidates(1.25))),))
     with serving() as server:
-        engine = hybrid(LadderChat(LiteLLMChat("openai/mine", api_base=server.url)))
+        engine = hybrid(LiteLLMChat("openai/mine", api_base=server.url))
         judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
         for turn in range(20):
             server.script[:] = [Step(candidates(0.011 * turn - 0.9, 0.013 * turn + 0.3))] * 3

@@ -58,7 +58,7 @@ ENDLESS: dict[str, Behaviour] = {
 def _warm_up() -> None:
     """The first request imports much, which takes seconds."""
     with misbehaving(answers()) as server:
-        LiteLLMChat("openai/m", api_base=server.url).complete(REQUEST)
+        LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
 
 
 def ended(action: Callable[[], Any]) -> list[Any]:
@@ -81,7 +81,7 @@ def ended(action: Callable[[], Any]) -> list[Any]:
 def test_a_request_ends_in_time_and_is_cut(behaviour: str) -> None:
     with misbehaving(ENDLESS[behaviour]) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, timeout=0.5)
-        (error,) = ended(lambda: chat.complete(REQUEST))
+        (error,) = ended(lambda: chat.send(REQUEST))
         assert isinstance(error, ChatError)
         assert server.gone.wait(HANG)
 
@@ -163,14 +163,14 @@ RESPONSES = st.one_of(
 @example(response(b"[" * 2060, status="301 x"))
 def test_any_response_is_a_reply_or_an_error_that_says_so(data: bytes) -> None:
     with misbehaving(sends(data)) as server:
-        (found,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url, timeout=20.0).complete(REQUEST))
+        (found,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url, timeout=20.0).send(REQUEST))
     assert isinstance(found, ChatReply | ChatError), found
 
 
 def test_a_reply_that_never_ends_is_refused_by_its_size() -> None:
     with misbehaving(in_turn(sends(HEAD + b"\r\n"), trickles_of(b" " * 65536))) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, timeout=HANG)
-        (error,) = ended(lambda: chat.complete(REQUEST))
+        (error,) = ended(lambda: chat.send(REQUEST))
         assert "more than 16 MiB" in str(error)
         assert server.gone.wait(HANG)
 
@@ -185,7 +185,7 @@ def trickles_of(block: bytes) -> Behaviour:
 
 def test_a_compressed_reply_is_not_unpacked() -> None:
     with misbehaving(sends(response(b"\x1f\x8b", headers="content-encoding: gzip\r\n"))) as server:
-        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url).complete(REQUEST))
+        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url).send(REQUEST))
     assert "the reply is compressed (gzip)" in str(error)
 
 
@@ -245,7 +245,7 @@ BROKEN: dict[str, tuple[Behaviour, str]] = {
 def test_a_reply_that_is_none_is_told_with_its_cause_and_cure_in_one_line(what: str, llm: str) -> None:
     behaviour, cause = BROKEN[what]
     with misbehaving(behaviour) as server:
-        (error,) = ended(lambda: LiteLLMChat(llm, api_base=server.url, timeout=HANG).complete(REQUEST))
+        (error,) = ended(lambda: LiteLLMChat(llm, api_base=server.url, timeout=HANG).send(REQUEST))
         assert isinstance(error, ChatError)
         told = str(error)
         assert told.startswith(f"{llm} at {server.url}: ") and "\n" not in told
@@ -257,7 +257,7 @@ def test_a_reply_that_is_none_is_told_with_its_cause_and_cure_in_one_line(what: 
 
 def test_a_server_without_a_name_is_told() -> None:
     chat = LiteLLMChat("openai/m", api_base="http://no-such-host.invalid/v1", timeout=HANG)
-    (error,) = ended(lambda: chat.complete(REQUEST))
+    (error,) = ended(lambda: chat.send(REQUEST))
     assert isinstance(error, ChatError)
     assert "name is not known" in str(error) and "--api-base" in str(error)
 
@@ -273,6 +273,6 @@ def test_https_to_a_server_without_tls_is_told() -> None:
 
         threading.Thread(target=answer, daemon=True).start()
         address = f"https://127.0.0.1:{listening.getsockname()[1]}/v1"
-        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=address, timeout=HANG).complete(REQUEST))
+        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=address, timeout=HANG).send(REQUEST))
     assert isinstance(error, ChatError)
     assert "does not speak TLS" in str(error) and "http or https in --api-base" in str(error)

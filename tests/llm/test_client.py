@@ -141,7 +141,7 @@ WIRES = [
 @pytest.mark.parametrize("wire", WIRES, ids=lambda w: w.model)
 def test_what_is_sent(wire: Wire) -> None:
     with serving(Step("an answer")) as server:
-        reply = chat_for(wire, server).complete(REQUEST)
+        reply = chat_for(wire, server).send(REQUEST)
     (received,) = server.received
     assert reply.text == "an answer"
     assert received.path == wire.path
@@ -152,6 +152,8 @@ def test_what_is_sent(wire: Wire) -> None:
         assert lowered(received)[wire.header[0]] == wire.header[1]
     assert reply.usage.prompt_tokens == 100
     assert reply.usage.completion_tokens == 20
+    # What every request has whose reply is limited and whose connection can be cut.
+    assert lowered(received)["accept-encoding"] == "identity"
 
 
 def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
@@ -172,7 +174,7 @@ def test_effective_parameters_name_what_was_dropped() -> None:
             "openai/gpt-5-mini", effort="low", api_base=server.url, options={"temperature": 0.5}
         )
         other = LiteLLMChat("openai/other", api_base=server.url, options={"temperature": 0.5})
-        dropped, kept = known.complete(REQUEST).parameters, other.complete(REQUEST).parameters
+        dropped, kept = known.send(REQUEST).parameters, other.send(REQUEST).parameters
     assert dropped["dropped"] == ["temperature"]
     assert "temperature" not in dropped
     assert dropped["effort"] == "low"
@@ -183,18 +185,18 @@ def test_effective_parameters_name_what_was_dropped() -> None:
 
 def test_a_server_of_ones_own_needs_no_key() -> None:
     with serving(Step("a")) as server:
-        LiteLLMChat("openai/mine", api_base=server.url).complete(REQUEST)
+        LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST)
     assert lowered(server.received[0])["authorization"] == "Bearer none"
 
 
 def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     with serving(Step("a"), Step("b"), Step("c"), Step("d")) as server:
-        foreign = LiteLLMChat("openai/gpt-5-mini", api_base=server.url).complete(REQUEST)
-        hosted = LiteLLMChat("huggingface/openai/gpt-oss-20b", api_base=server.url).complete(REQUEST)
-        local = LiteLLMChat("ollama_chat/qwen3", api_base=server.root).complete(REQUEST)
+        foreign = LiteLLMChat("openai/gpt-5-mini", api_base=server.url).send(REQUEST)
+        hosted = LiteLLMChat("huggingface/openai/gpt-oss-20b", api_base=server.url).send(REQUEST)
+        local = LiteLLMChat("ollama_chat/qwen3", api_base=server.root).send(REQUEST)
         priced = LiteLLMChat(
             "openai/gpt-5-mini", api_base=server.url, price=Price(prompt=0.25, completion=2.0)
-        ).complete(REQUEST)
+        ).send(REQUEST)
     assert foreign.usage.cost is None
     assert hosted.usage.cost is None
     assert local.usage.cost == 0
@@ -205,7 +207,7 @@ def test_reasoning_tokens_and_text_are_kept() -> None:
     step = Step("answer", extra={"reasoning_content": "first I thought"})
     with serving(step, Step("<think>hidden</think>shown")) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
-        first, second = chat.complete(REQUEST), chat.complete(REQUEST)
+        first, second = chat.send(REQUEST), chat.send(REQUEST)
     assert first.reasoning == "first I thought"
     assert first.usage.reasoning_tokens == 12
     assert second.text.endswith("shown")
@@ -213,10 +215,10 @@ def test_reasoning_tokens_and_text_are_kept() -> None:
 
 def test_missing_counts_are_estimated_and_cost_is_unknown() -> None:
     with serving(Step("x" * 400, usage=None)) as server:
-        usage = LiteLLMChat("ollama_chat/x", api_base=server.root).complete(REQUEST).usage
+        usage = LiteLLMChat("ollama_chat/x", api_base=server.root).send(REQUEST).usage
         assert not usage.estimated  # Ollama always counts
     with serving(Step("x" * 400, usage={"prompt_tokens": 0, "completion_tokens": 0})) as server:
-        usage = LiteLLMChat("hosted_vllm/x", api_base=server.url).complete(REQUEST).usage
+        usage = LiteLLMChat("hosted_vllm/x", api_base=server.url).send(REQUEST).usage
     assert usage.estimated
     assert usage.completion_tokens == count_tokens("x" * 400) > 40
     assert usage.cost is None
@@ -226,15 +228,13 @@ def test_missing_counts_are_estimated_and_cost_is_unknown() -> None:
 def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
     with serving(Step("{}")) as server:
         with pytest.raises(ChatError, match="nothing was sent: the time limit ended"):
-            LiteLLMChat("openai/mine", api_base=server.url).complete(
-                REQUEST.model_copy(update={"deadline": 0.0})
-            )
+            LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST.model_copy(update={"deadline": 0.0}))
         assert not server.received
 
 
 def test_refusal_is_told_apart() -> None:
     with serving(Step(None, extra={"refusal": "I would rather not"})) as server:
-        reply = LiteLLMChat("openai/mine", api_base=server.url).complete(REQUEST)
+        reply = LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST)
     assert reply.finish_reason == "refusal"
     assert reply.text == "I would rather not"
 
@@ -248,7 +248,7 @@ class TestFailures:
         with serving(*script) as server:
             chat = LiteLLMChat(model, api_base=server.url, **kwargs)
             with pytest.raises(ChatError) as caught:
-                chat.complete(REQUEST)
+                chat.send(REQUEST)
         return caught.value, len(server.received)
 
     def test_rate_limit(self, model: str) -> None:
@@ -306,7 +306,7 @@ class TestFailures:
         with serving() as server:
             pass
         with pytest.raises(TransientChatError, match=r"127\.0\.0\.1"):
-            LiteLLMChat(model, api_base=server.url).complete(REQUEST)
+            LiteLLMChat(model, api_base=server.url).send(REQUEST)
 
 
 def test_importing_the_layer_does_not_import_litellm() -> None:
@@ -340,7 +340,7 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.messages import ChatRequest, Message
 request = ChatRequest(messages=(Message(role="user", content="?"),))
 for model, base in zip(sys.argv[1::2], sys.argv[2::2]):
-    LiteLLMChat(model, effort="low", api_base=base).complete(request)
+    LiteLLMChat(model, effort="low", api_base=base).send(request)
 import os, time
 time.sleep(0.5)
 print(reached, os.environ.get("FROM_DOTENV"))
@@ -371,7 +371,7 @@ def test_nothing_else_is_reached_printed_or_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("effort", ["none", "minimal"])
 def test_the_smallest_efforts_are_sent_or_reported_as_dropped(effort: str) -> None:
     with serving(Step("yes")) as server:
-        reply = LiteLLMChat("openai/gpt-5-mini", effort=effort, api_base=server.url).complete(REQUEST)
+        reply = LiteLLMChat("openai/gpt-5-mini", effort=effort, api_base=server.url).send(REQUEST)
         (asked,) = server.received
     assert (asked.body.get("reasoning_effort") == effort) != ("effort" in reply.parameters.get("dropped", []))
 
@@ -379,4 +379,4 @@ def test_the_smallest_efforts_are_sent_or_reported_as_dropped(effort: str) -> No
 def test_a_timeout_longer_than_a_socket_can_wait() -> None:
     with serving(Step("ok")) as server:
         chat = LiteLLMChat("openai/some-model", api_base=server.url, timeout=1e12)
-        assert chat.complete(REQUEST).text == "ok"
+        assert chat.send(REQUEST).text == "ok"

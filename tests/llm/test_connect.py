@@ -6,8 +6,8 @@ import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.cache import CachedChat
+from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import check_llm, connect, preflight
-from falsifier.llm.retry import RetryingChat
 from falsifier.llm.usage import Price
 from tests.llm.server import Step, serving
 
@@ -55,7 +55,7 @@ def test_the_nearest_provider_is_suggested() -> None:
 
 
 def test_a_cache_is_opt_in(tmp_path: Path) -> None:
-    assert isinstance(connect("ollama_chat/x"), RetryingChat)
+    assert isinstance(connect("ollama_chat/x"), LiteLLMChat)
     assert isinstance(connect("ollama_chat/x", cache=tmp_path), CachedChat)
 
 

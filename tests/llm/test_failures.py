@@ -6,7 +6,7 @@ from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import ContextExceededError, TransientChatError, classify
-from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.retry import Gate
 from tests.llm.test_client import REQUEST
 
 
@@ -88,7 +88,7 @@ def free_port() -> int:
 def test_where_nothing_listens_on_this_machine_little_patience_helps(model: str) -> None:
     address = f"http://127.0.0.1:{free_port()}/v1"
     naps: list[float] = []
-    chat = RetryingChat(LiteLLMChat(model, api_base=address), Gate(sleep=naps.append))
+    chat = LiteLLMChat(model, api_base=address, gate=Gate(sleep=naps.append))
     with pytest.raises(ChatError, match=f"nothing is listening at {address}: start the ") as caught:
         chat.complete(REQUEST)
     assert len(naps) == 2

@@ -4,7 +4,6 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import converse
 from falsifier.llm.failures import ToolsUnsupportedError
-from falsifier.llm.ladder import LadderChat
 from tests.llm.server import Step, serving
 from tests.llm.support import PLAIN, QUESTION, add
 from tests.llm.test_client import REQUEST
@@ -27,7 +26,7 @@ class TestLadder:
     @pytest.mark.parametrize("refusal", REFUSALS, ids=lambda step: step.message)
     def test_refused_tools_are_left_out_and_never_offered_again(self, refusal: Step) -> None:
         with serving(refusal, Step("3"), Step("4")) as server:
-            chat = LadderChat(LiteLLMChat("openai/mine", api_base=server.url))
+            chat = LiteLLMChat("openai/mine", api_base=server.url)
             assert chat.complete(QUESTION).text == "3"
             assert chat.complete(QUESTION).text == "4"
         assert ["tools" in r.body for r in server.received] == [True, False, False]
@@ -35,7 +34,7 @@ class TestLadder:
 
     def test_where_both_are_refused_together_the_schema_goes_with_tools_only(self) -> None:
         with serving(TOGETHER, TOGETHER, Step("3"), Step("4"), Step("5")) as server:
-            chat = LadderChat(LiteLLMChat("openai/mine", api_base=server.url))
+            chat = LiteLLMChat("openai/mine", api_base=server.url)
             texts = [chat.complete(q).text for q in (QUESTION, QUESTION, PLAIN)]
         assert texts == ["3", "4", "5"]
         assert ["tools" in r.body for r in server.received] == [True, True, True, True, False]
@@ -44,13 +43,13 @@ class TestLadder:
 
     def test_below_the_last_rung_tools_go(self) -> None:
         with serving(TOGETHER, TOGETHER, TOGETHER, Step("3")) as server:
-            assert LadderChat(LiteLLMChat("openai/mine", api_base=server.url)).complete(QUESTION).text == "3"
+            assert LiteLLMChat("openai/mine", api_base=server.url).complete(QUESTION).text == "3"
         assert "tools" not in server.received[-1].body
         assert server.received[-1].body["response_format"]["type"] == "json_schema"
 
     def test_a_refusal_within_a_turn_is_an_error(self) -> None:
         with serving(Step(calls=(("add", {"terms": [1]}),)), REFUSALS[0]) as server:
-            chat = LadderChat(LiteLLMChat("openai/mine", api_base=server.url))
+            chat = LiteLLMChat("openai/mine", api_base=server.url)
             with pytest.raises(ChatError, match="in the same turn"):
                 converse(chat, QUESTION, str.strip, lambda _: None, respond=add)
 
@@ -63,7 +62,7 @@ class TestLadder:
 def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
     refused = Step(status=400, message="response_format is not supported")
     with serving(refused, refused, Step("in words"), Step("again")) as server:
-        chat = LadderChat(LiteLLMChat("openai/m", api_base=server.url))
+        chat = LiteLLMChat("openai/m", api_base=server.url)
         first, second = chat.complete(REQUEST), chat.complete(REQUEST)
     kinds = [r.body.get("response_format", {}).get("type") for r in server.received]
     assert kinds == ["json_schema", "json_object", None, None]
@@ -81,7 +80,7 @@ UNPARSED = [
 @pytest.mark.parametrize("unparsed", UNPARSED, ids=lambda step: step.message)
 def test_what_a_server_cannot_parse_twice_is_asked_for_more_plainly(unparsed: Step) -> None:
     with serving(unparsed, Step("one"), unparsed, unparsed, Step("two")) as server:
-        chat = LadderChat(LiteLLMChat("openai/m", api_base=server.url))
+        chat = LiteLLMChat("openai/m", api_base=server.url)
         texts = [chat.complete(REQUEST).text for _ in range(5)]
     assert texts == ["", "one", "", "", "two"]
     kinds = [r.body["response_format"]["type"] for r in server.received]
@@ -91,11 +90,11 @@ def test_what_a_server_cannot_parse_twice_is_asked_for_more_plainly(unparsed: St
 def test_a_server_that_cannot_constrain_the_llm_is_asked_more_plainly() -> None:
     refused = Step(status=400, message="Failed to initialize samplers: std::exception")
     with serving(refused, Step("one")) as server:
-        assert LadderChat(LiteLLMChat("openai/m", api_base=server.url)).complete(REQUEST).text == "one"
+        assert LiteLLMChat("openai/m", api_base=server.url).complete(REQUEST).text == "one"
 
 
 def test_ladder_ends_at_its_last_rung() -> None:
     refused = Step(status=400, message="grammar is not supported")
     with serving(refused, refused, refused) as server, pytest.raises(ChatError, match="grammar"):
-        LadderChat(LiteLLMChat("openai/m", api_base=server.url)).complete(REQUEST)
+        LiteLLMChat("openai/m", api_base=server.url).complete(REQUEST)
     assert len(server.received) == 3

@@ -16,7 +16,6 @@ from falsifier.llm import model_file
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
-from falsifier.llm.ladder import LadderChat
 from falsifier.llm.messages import UNREADABLE, ChatRequest, Exchange, Mode, ToolCall
 from tests import patience
 from tests.command import falsifier
@@ -52,8 +51,8 @@ def server(model: Path) -> Iterator[str]:
         yield url
 
 
-def chat(server: str, mode: Mode = "json_schema", **options: Any) -> LadderChat:
-    return LadderChat(LiteLLMChat("openai/tiny", api_base=server, options=SHORT | options, mode=mode))
+def chat(server: str, mode: Mode = "json_schema", **options: Any) -> LiteLLMChat:
+    return LiteLLMChat("openai/tiny", api_base=server, options=SHORT | options, mode=mode)
 
 
 @pytest.mark.parametrize("question", [PLAIN, QUESTION], ids=["alone", "with-a-tool"])

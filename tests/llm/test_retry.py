@@ -1,7 +1,6 @@
 """Patience with passing failures, shared between runs."""
 
 import threading
-import time
 from types import SimpleNamespace
 
 import pytest
@@ -11,11 +10,15 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.replay import ScriptedChat
-from falsifier.llm.retry import Gate, RetryingChat
+from falsifier.llm.retry import Gate, retried
 from tests.llm.server import Step, serving
 from tests.llm.test_client import REQUEST
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+
+
+def asked(chat: ScriptedChat, gate: Gate, *, attempts: int = 7, within: float | None = None) -> ChatReply:
+    return retried(lambda: chat.complete(QUESTION), gate, attempts=attempts, seconds_left=lambda: within)
 
 
 class Naps:
@@ -31,8 +34,7 @@ class Naps:
 def test_waits_longer_each_time_and_counts_attempts() -> None:
     naps = Naps()
     passing = TransientChatError("busy")
-    chat = RetryingChat(ScriptedChat([passing, passing, passing, "done"]), Gate(sleep=naps))
-    reply = chat.complete(QUESTION)
+    reply = asked(ScriptedChat([passing, passing, passing, "done"]), Gate(sleep=naps))
     assert reply.text == "done"
     assert reply.attempts == 4
     assert [round(n) for n in naps.taken] == sorted(round(n) for n in naps.taken)
@@ -41,23 +43,23 @@ def test_waits_longer_each_time_and_counts_attempts() -> None:
 
 
 def test_gives_up_and_says_so() -> None:
-    chat = RetryingChat(ScriptedChat(lambda _: TransientChatError("busy")), Gate(sleep=Naps()), attempts=3)
+    chat = ScriptedChat(lambda _: TransientChatError("busy"))
     with pytest.raises(ChatError, match="3 attempts failed, the last one so: busy") as caught:
-        chat.complete(QUESTION)
+        asked(chat, Gate(sleep=Naps()), attempts=3)
     assert not isinstance(caught.value, TransientChatError)
 
 
 def test_does_not_repeat_what_waiting_does_not_cure() -> None:
     inner = ScriptedChat([ChatError("no such model"), "never"])
     with pytest.raises(ChatError, match="no such model"):
-        RetryingChat(inner, Gate(sleep=Naps())).complete(QUESTION)
+        asked(inner, Gate(sleep=Naps()))
     assert len(inner.requests) == 1
 
 
 def test_ends_when_the_server_asks_for_too_long_a_wait() -> None:
     inner = ScriptedChat([TransientChatError("limit", retry_after=3600.0), "never"])
     with pytest.raises(ChatError, match="3600 s"):
-        RetryingChat(inner, Gate(sleep=Naps())).complete(QUESTION)
+        asked(inner, Gate(sleep=Naps()))
 
 
 @pytest.mark.parametrize(("for_all", "held_up"), [(True, 30.0), (False, 0.0)])
@@ -74,7 +76,7 @@ def test_a_rate_limit_holds_up_all_runs_of_a_gate(
     monkeypatch.setattr("falsifier.llm.retry.time", SimpleNamespace(monotonic=lambda: now))
     gate = Gate(sleep=sleep)
     limit = TransientChatError("limit", retry_after=30.0, for_all=for_all)
-    assert RetryingChat(ScriptedChat([limit, "a"]), gate).complete(QUESTION).text == "a"
+    assert asked(ScriptedChat([limit, "a"]), gate).text == "a"
     assert others == [held_up]
     assert now == 130.0
 
@@ -90,14 +92,14 @@ def test_who_comes_during_a_pause_waits_for_its_end(monkeypatch: pytest.MonkeyPa
     gate = Gate(sleep=sleep)
     gate.pause(12.0)
     gate.pause(5.0)
-    assert RetryingChat(ScriptedChat(["b"]), gate).complete(QUESTION).attempts == 1
+    assert asked(ScriptedChat(["b"]), gate).attempts == 1
     assert now == 12.0
 
 
 def test_concurrency_is_limited() -> None:
     with serving(*(Step("ok", together=2, delay=0.05) for _ in range(6))) as server:
         gate = Gate(concurrency=2)
-        chats = [RetryingChat(LiteLLMChat("openai/m", api_base=server.url), gate) for _ in range(6)]
+        chats = [LiteLLMChat("openai/m", api_base=server.url, gate=gate) for _ in range(6)]
         replies: list[ChatReply] = []
         threads = [
             threading.Thread(target=lambda chat=chat: replies.append(chat.complete(REQUEST)))
@@ -119,7 +121,7 @@ def test_server_restarts_while_asked() -> None:
         Step("back"),
     ]
     with serving(*steps) as server:
-        chat = RetryingChat(LiteLLMChat("openai/m", api_base=server.url), Gate(), first_delay=0.01)
+        chat = LiteLLMChat("openai/m", api_base=server.url, first_delay=0.01)
         reply = chat.complete(REQUEST)
     assert reply.text == "back"
     assert reply.attempts == 4
@@ -164,24 +166,20 @@ def test_any_limit_can_be_waited_for() -> None:
 
 def test_a_wait_beyond_the_deadline_is_not_begun() -> None:
     naps = Naps()
-    chat = RetryingChat(
-        ScriptedChat([TransientChatError("busy", retry_after=50.0), "late"]), Gate(sleep=naps)
-    )
+    chat = ScriptedChat([TransientChatError("busy", retry_after=50.0), "late"])
     with pytest.raises(ChatError, match=r"no time is left to ask again\. busy"):
-        chat.complete(QUESTION.model_copy(update={"deadline": time.monotonic() + 20.0}))
+        asked(chat, Gate(sleep=naps), within=20.0)
     assert naps.taken == []
 
 
 def test_requests_that_timed_out_are_counted_as_paid() -> None:
     late = TransientChatError("late")
     late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, timed_out=1)
-    answered = RetryingChat(ScriptedChat([late, late, "yes"]), Gate(sleep=lambda _: None))
-    usage = answered.complete(QUESTION).usage
+    usage = asked(ScriptedChat([late, late, "yes"]), Gate(sleep=lambda _: None)).usage
     assert (usage.timed_out, usage.estimated) == (2, True)
     plain = ScriptedChat(["yes"]).complete(QUESTION).usage
     assert usage.prompt_tokens == plain.prompt_tokens + 100
     assert usage.cost == (None if plain.cost is None else plain.cost + 1.0)
-    given_up = RetryingChat(ScriptedChat([late, late]), Gate(sleep=lambda _: None), attempts=2)
     with pytest.raises(ChatError) as caught:
-        given_up.complete(QUESTION)
+        asked(ScriptedChat([late, late]), Gate(sleep=lambda _: None), attempts=2)
     assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, timed_out=2)

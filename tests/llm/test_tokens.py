@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from falsifier.llm import tokens
+from falsifier.llm import usage as tokens
 from falsifier.llm.usage import count_tokens
 
 NUMBERS = "speed: 0:0 2.5:34.7 5:54.21 20:119.581"
